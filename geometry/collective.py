@@ -6,10 +6,16 @@ Only mpi4py's lower-case methods of the communicator are used, so that nothing h
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from geometry.cores import lent, node_cores
+
 T = TypeVar("T")
+
+_NAP = 1e-3
+"""Time between two looks of a waiting rank at whether the work is done [s]."""
 
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
@@ -35,6 +41,41 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
     if error is not None:
         raise error
     return result
+
+
+def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
+    """Do long work on rank 0, which is lent the cores of its node, and broadcast the result.
+
+    The other ranks sleep meanwhile. In a collective call of MPI they would keep their cores busy.
+
+    Args:
+        comm: MPI communicator, or None.
+        work: What to do; its result must be picklable.
+
+    Returns:
+        The result, on every rank.
+
+    Raises:
+        Exception: Whatever the work raised, on every rank.
+
+    Note:
+        Collective.
+    """
+    if comm is None or comm.size == 1:
+        return work()
+
+    def lending() -> T:
+        try:
+            with lent(node_cores()):
+                return work()
+        finally:
+            comm.Ibarrier().Wait()
+
+    if comm.rank:
+        done = comm.Ibarrier()
+        while not done.Test():
+            time.sleep(_NAP)
+    return on_root(comm, lending)
 
 
 def together(comm: Any, work: Callable[[], T]) -> T:

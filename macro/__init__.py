@@ -25,6 +25,7 @@ from macro.contact.loaded_face import (
     displacements_under,
     patch_compliance_matrix,
 )
+from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
     UnilateralContactState,
@@ -37,6 +38,7 @@ from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import PlanarFace, planar_face
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
+from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 from macro.mesh.supports import check_supports
 from macro.mesh.tagged import TaggedMesh
 from macro.meshed_body import MeshedBody, Support, Traction
@@ -66,6 +68,7 @@ __all__ = [
     "MeshQuality",
     "MeshedBody",
     "PlanarFace",
+    "RoughFace",
     "Support",
     "TaggedMesh",
     "Traction",
@@ -81,6 +84,8 @@ __all__ = [
     "planar_face",
     "read_mesh",
     "rough_block_mesh",
+    "rough_stepped_mesh",
+    "stepped_mesh",
     "vector_space",
     "write_fields",
     "write_rough_fields",

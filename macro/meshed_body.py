@@ -145,8 +145,16 @@ class MeshedBody(ElasticBody):
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
+        return self.solver_of(self.stiffness)
+
+    def solver_of(self, matrix: PETSc.Mat) -> PETSc.KSP:
+        """Return a linear solver for the stiffness and what else holds the body.
+
+        Args:
+            matrix: A matrix with the entries of the stiffness, its near-nullspace attached.
+        """
         return body_solver(
-            self.stiffness,
+            matrix,
             self.space,
             degree=self.degree,
             poisson_ratio=self.poisson_ratio,

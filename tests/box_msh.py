@@ -11,7 +11,7 @@ CUBE = np.array(
 SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 
 
-def write_box(path, ticks, *, turn=None, shift=(0, 0, 0), top="top", halves=False):
+def write_box(path, ticks, *, turn=None, shift=(0, 0, 0), halves=False, crown=0.0):
     """Write a box between ticks along x, y and z, turned and then shifted.
 
     Args:
@@ -19,15 +19,16 @@ def write_box(path, ticks, *, turn=None, shift=(0, 0, 0), top="top", halves=Fals
         ticks: Coordinates of the lattice along each axis.
         turn: A rotation, shape (3, 3).
         shift: A shift.
-        top: Name of the face at the largest z.
         halves: Whether the cells and the top beyond the middle along x have names of their own.
+        crown: Curvature of the top along x, about its middle.
     """
     counts = np.array([len(axis) for axis in ticks])
     number = np.arange(counts.prod()).reshape(counts) + 1
     points = np.stack(np.meshgrid(*ticks, indexing="ij"), axis=-1).reshape(-1, 3)
+    below = (points[:, 2] - ticks[2][0]) / (ticks[2][-1] - ticks[2][0])
+    points[:, 2] -= 0.5 * crown * (points[:, 0] - 0.5 * (ticks[0][0] + ticks[0][-1])) ** 2 * below
     points = points @ np.asarray(np.eye(3) if turn is None else turn).T + np.asarray(shift)
     names = {**FACES, "upper half": 7}
-    names = {top if name == "top" else name: tag for name, tag in names.items()}
     lines, volumes = [], {"body": 10, "other": 11}
     middle = 0.5 * (ticks[0][0] + ticks[0][-1])
 
@@ -58,4 +59,4 @@ def write_box(path, ticks, *, turn=None, shift=(0, 0, 0), top="top", halves=Fals
         for k, (kind, tag, corner) in enumerate(lines)
     ]
     Path(path).write_text("\n".join([*text, "$EndElements", ""]), encoding="utf-8")
-    return path
+    return Path(path)

@@ -11,8 +11,8 @@ Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raise
     neck         pipe of diameters 55 … 71, 40 long, below z = 0; its end holds the flange
 
 Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
-rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names: volume `flange`, surfaces `raised face`,
-`washers` and `pipe end`.
+rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names:
+volume `flange`, surfaces `raised face`, `washers` and `pipe end`.
 """
 
 import argparse
@@ -46,7 +46,7 @@ def name(dimension: int, tags: list[int], label: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=1.5)
+    parser.add_argument("--size", type=float, default=2.0)
     parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
     choice = parser.parse_args()
     gmsh.initialize(["", "-v", "2"])
@@ -75,7 +75,7 @@ def main() -> None:
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)  # edges around a full circle
     field = gmsh.model.mesh.field.add("MathEval")  # coarser with the distance from the face's rim
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
-    gmsh.model.mesh.field.setString(field, "F", f"{choice.size} * (1 + 0.12 * {away})")
+    gmsh.model.mesh.field.setString(field, "F", f"{choice.size} * (1 + 0.15 * {away})")
     gmsh.model.mesh.field.setAsBackgroundMesh(field)
     gmsh.model.mesh.generate(3)
     gmsh.write(str(choice.out))

@@ -25,8 +25,8 @@ FACETS = {
 }
 """Corners of the facets of tetrahedra and of hexahedra, in XDMF's order."""
 
-VIEWS = {"brake_pad": (42, -60), "flange": (32, -60), "seal_ring": (35, 35)}
-"""Elevation and azimuth of the views [degrees]."""
+VIEWS = {"brake_pad": (42, -60, 1.45), "flange": (32, -60, 1.3), "seal_ring": (30, -25, 1.2)}
+"""Elevation and azimuth of the views [degrees], and their zoom."""
 
 GREY, LIGHT = np.array([0.78, 0.82, 0.88]), np.array([0.35, -0.35, 0.87])
 
@@ -82,10 +82,11 @@ def draw(name: str, folder: Path, out: Path) -> None:
     body.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours))
     lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     body.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-    body.set_box_aspect(upper - lower, zoom=1.3)
-    body.view_init(*VIEWS[name])
+    elevation, azimuth, zoom = VIEWS[name]
+    body.set_box_aspect(upper - lower, zoom=zoom)
+    body.view_init(elevation, azimuth)
     body.set_axis_off()
-    figure.savefig(out / f"{name}.png", dpi=110)
+    figure.savefig(out / f"{name}.png", dpi=90)
 
 
 def main() -> None:

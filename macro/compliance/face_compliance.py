@@ -35,16 +35,23 @@ class FaceCompliance:
         growth: Derivative of C with respect to the block's height, symmetric, (K², K²) [1/N].
         stresses: The same for the stresses σ_xx, σ_yy and σ_xy in the face, shape (3, K², K²)
             [1/mm²].
+        rough: C from a coarser discretisation, which shows the error; None where there is none.
     """
 
     normal: Array
     growth: Array
     stresses: Array
+    rough: Array | None = None
 
     @property
     def count(self) -> int:
         """Modes K along a side."""
         return int(np.sqrt(len(self.normal)) + 0.5)
+
+    @property
+    def arrays(self) -> dict[str, Array]:
+        """Its arrays by name, as the cache keeps them."""
+        return {name: part for name, part in asdict(self).items() if part is not None}
 
 
 def face_compliance(
@@ -86,7 +93,7 @@ def face_compliance(
     """
     if use_cache:
         block = (lengths, height, material, sides, count)
-        compute = lambda: asdict(face_compliance(*block, comm, coarse=coarse))  # noqa: E731
+        compute = lambda: face_compliance(*block, comm, coarse=coarse).arrays  # noqa: E731
         return FaceCompliance(**cached("face", (*block, coarse), compute, comm))
     if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
         raise InputError(

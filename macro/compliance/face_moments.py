@@ -101,7 +101,9 @@ class FaceMoments:
             *(slopes[..., a : a + 1] * axes[a] for a in (0, 1)),
             0.5 * (slopes[..., :1] * axes[1] + slopes[..., 1:] * axes[0]),
         ]
-        columns = (3 * points.nodes[..., None] + np.arange(3)).reshape(len(points.x), -1)
+        columns = (3 * points.nodes[..., None] + np.arange(3)).reshape(
+            len(points.x), 3 * points.nodes.shape[1]
+        )
         starts = columns.shape[1] * np.arange(len(points.x) + 1)
         size = len(points.x), 3 * len(self._body.space.tabulate_dof_coordinates())
         return tuple(

@@ -12,6 +12,7 @@ Theory: section 6 of ``demos/theory.md``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -33,7 +34,7 @@ from macro.compliance.face_moments import FaceMoments
 from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
 from macro.linear_solvers.node_matrices import distributed
-from macro.linear_solvers.options import DIRECT_DEFAULTS, linear_solver, solve_linear
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver, solve_linear
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.outer_facets import OuterFacets, outer_facets
 from macro.meshed_body import MeshedBody
@@ -111,6 +112,13 @@ def raised(body: ElasticBody) -> ElasticBody:
     return body
 
 
+def lowered(body: ElasticBody) -> ElasticBody | None:
+    """Return the body with linear elements, where it has quadratic ones on a mesh of its own."""
+    if isinstance(body, MeshedBody) and body.degree == 2:
+        return replace(body, order=1)
+    return None
+
+
 def mesh_face_compliance(
     body: ElasticBody,
     facets: ContactFacets,
@@ -147,17 +155,11 @@ def mesh_face_compliance(
         if fields is None
         else _Corrections(body, facets, rectangle, material, fields)
     )
-    solver = _solver(body)
-    load, solution = body.stiffness.createVecs()
     found = np.zeros((4, count**2, count**2))
-    for mode in range(count**2):
-        held = loads.write(mode, load)
-        solve_linear(solver, load, solution)
-        total = body.function(solution.array_r)
-        if held is not None:
-            total.x.array[:] += held.x.array
+    for mode, values in _solutions(body, loads, count**2):
+        total = body.function(values)
+        total.x.array[:] += loads.prescribed(mode)
         found[:, :, mode] = moments.of(total)
-        compat.collect_garbage(solution.comm)
     area = float(np.prod(rectangle.lengths))
     # per unit moment: a mode has the moment A, and its own displacements' moments are over A
     return _gathered(found / area, area, material, fields)
@@ -200,6 +202,14 @@ class _Loads:
         self._sum = distributed(csr_matrix(ones, shape=size), body.owned_dofs, body.comm)
         self._local, self._free = self._sum.createVecLeft(), body.free
 
+    def write(self, mode: int, load: PETSc.Vec) -> None:
+        """Write the load of a mode."""
+        raise NotImplementedError
+
+    def prescribed(self, mode: int) -> Array:
+        """Return the displacements that supports prescribe, this rank's with ghosts."""
+        return np.zeros(1)
+
     def write_sum(self, local: Array, load: PETSc.Vec) -> None:
         """Write the load of all ranks, from this rank's (n, 3) at its nodes."""
         self._local.array[:] = local.ravel()
@@ -217,7 +227,7 @@ class _Pressures(_Loads):
         super().__init__(body, moments.points.nodes)
         self._moments = moments
 
-    def write(self, mode: int, load: PETSc.Vec) -> Any:
+    def write(self, mode: int, load: PETSc.Vec) -> None:
         """Write the load of a mode."""
         local = self._moments.load(mode).reshape(-1, 3)[self.nodes]
         self.write_sum(local, load)
@@ -250,19 +260,22 @@ class _Corrections(_Loads):
         self._displacements = self._displacement(self._support_nodes)
         self._product = compat.compile_form(ufl.action(body.form, self._held))
 
-    def write(self, mode: int, load: PETSc.Vec) -> Any:
-        """Write the load of a mode, and return the displacements that the supports prescribe."""
+    def write(self, mode: int, load: PETSc.Vec) -> None:
+        """Write the load of a mode."""
         self.write_sum(self._tractions[..., mode], load)
-        values = -self._displacements[self._row.ravel(), self._supported % 3, mode]
-        self._held.x.array[:] = 0.0
-        self._held.x.array[self._supported] = values
+        self._held.x.array[:] = self.prescribed(mode)
         load.axpy(-1.0, compat.assemble_vector(self._product))
         if self._elsewhere is not None:
             form, function, nodes, displacements = self._elsewhere
             function.x.array.reshape(-1, 3)[nodes] = displacements[..., mode]
             load.axpy(-1.0, compat.assemble_vector(form))
         self.leave_out_supports(load)
-        return self._held
+
+    def prescribed(self, mode: int) -> Array:
+        """Return the displacements that supports prescribe, this rank's with ghosts."""
+        values = np.zeros(len(self._held.x.array))
+        values[self._supported] = -self._displacements[self._row.ravel(), self._supported % 3, mode]
+        return values
 
     def _integrated(self, outer: OuterFacets) -> Array:
         """Return the forces at the nodes by the half-space's tractions, (nodes, 3, K²) [N]."""
@@ -325,8 +338,31 @@ class _Corrections(_Loads):
         return action, displacement, nodes, self._displacement(nodes)
 
 
-def _solver(body: ElasticBody) -> PETSc.KSP:
-    """Return a factorisation where many loads pay for it and it fits, else the body's solver."""
-    if body.dofs > _FACTORISED:
-        return body.solver
-    return linear_solver(body.stiffness, preconditioner=DIRECT_DEFAULTS)
+def _solutions(body: ElasticBody, loads: _Loads, count: int) -> Iterator[tuple[int, Array]]:
+    """Yield every mode and its displacements, this rank's owned ones."""
+    if body.dofs <= _FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
+        yield from enumerate(_by_factors(body, loads, count))
+        return
+    load, solution = body.stiffness.createVecs()
+    for mode in range(count):
+        loads.write(mode, load)
+        solve_linear(body.solver, load, solution)
+        yield mode, solution.array_r
+        compat.collect_garbage(solution.comm)
+
+
+def _by_factors(body: ElasticBody, loads: _Loads, count: int) -> Array:
+    """Return the displacements of all modes by one factorisation, shape (modes, owned dofs)."""
+    solver = linear_solver(body.stiffness, preconditioner=DIRECT_DEFAULTS)
+    load = body.stiffness.createVecRight()
+    right = np.zeros((body.owned_dofs, count), order="F")
+    for mode in range(count):
+        loads.write(mode, load)
+        right[:, mode] = load.array_r
+    solution = np.zeros_like(right, order="F")
+    size = (body.owned_dofs, body.dofs), (None, count)
+    dense = [PETSc.Mat().createDense(size, array=a, comm=load.comm) for a in (right, solution)]
+    solver.pc.getFactorMatrix().matSolve(*dense)
+    for part in (*dense, solver.pc, solver):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return solution.T

@@ -9,7 +9,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -18,7 +17,8 @@ from macro import compat
 from macro.contact.contact_tangent import ContactTangent
 from macro.contact.interface import Interface
 from macro.contact.newton import NONLINEAR_DEFAULTS, NewtonReport, newton_tolerance
-from macro.elasticity import rigid_body_modes
+from macro.contact.user_equations import UserEquations
+from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     KRYLOV_DEFAULTS,
@@ -62,9 +62,9 @@ class ContactProblem:
         interfaces: The interfaces; their conditions are set to `bcs`.
         tangent: Derivative of the residual as UFL; None: `ufl.derivative`.
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
-            default conjugate gradients with smoothed aggregation and rigid body modes, or with a
-            factorisation of small problems. What stands behind ``-patchlaw_`` on the command line
-            wins.
+            default conjugate gradients with algebraic multigrid, hypre's for linear elements and
+            PETSc's for quadratic ones, or with a factorisation of small problems. What stands
+            behind ``-patchlaw_`` on the command line wins.
         in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
             preconditioner knows them: needed where only contact holds the body. The preconditioner
             is made anew in every Newton step then.
@@ -92,34 +92,26 @@ class ContactProblem:
         petsc_options: Mapping[str, object] | None = None,
         in_matrix: bool = False,
     ) -> None:
-        self.displacement, self._bcs = displacement, list(bcs)
+        self.displacement = displacement
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
         self.report: NewtonReport | None = None
         space = displacement.function_space
         if any(interface.space is not space for interface in self.interfaces):
             raise InputError("an interface is that of another space than the displacement's")
-        if displacement not in residual.coefficients():
-            raise InputError("the residual does not depend on the displacement")
+        self._equations = UserEquations(residual, displacement, bcs, tangent)
         for interface in self.interfaces:
-            interface.constrain(self._bcs)
-        tangent = ufl.derivative(residual, displacement) if tangent is None else tangent
-        tangent = ufl.algorithms.expand_derivatives(tangent)  # linear ones lose the displacement
-        self._ingredients = [*tangent.coefficients(), *tangent.constants()]
-        self._form, self._slope = compat.compile_form(residual), compat.compile_form(tangent)
-        self._residual = compat.assemble_vector(self._form)
-        self._matrix = compat.assemble_matrix(self._slope, self._bcs)
-        self._known = self._values()
-        nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
-        self._matrix.setNearNullSpace(rigid_body_modes(nodes, self._comm))
-        self._in_matrix = [each for each in self.interfaces if in_matrix and each.assembles]
-        applied = [each for each in self.interfaces if each not in self._in_matrix]
-        self._tangent = ContactTangent(self._matrix, applied)
+            interface.constrain(self._equations.bcs)
+        matrix = self._equations.matrix
+        self._assembling, self._in_matrix = in_matrix, list[Interface]()
+        self._tangent = ContactTangent(matrix, self.interfaces)
         self._norms: list[float] = []
-        self._contact = self._matrix.createVecRight()
+        self._contact = matrix.createVecRight()
         self._inner = self._contact.duplicate()
-        usual = _FACTORISED if self._matrix.getSize()[0] <= _SMALL else ALGEBRAIC_DEFAULTS
+        usual = _FACTORISED if matrix.getSize()[0] <= _SMALL else _multigrid(space)
+        # multigrid smooths with the shell otherwise, whose tangent moves on
+        apart = {"pc_use_amat": False}
         given = dict(petsc_options or {})
-        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **given}
+        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **apart, **given}
         self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
         self._snes = self._solver()
 
@@ -137,7 +129,8 @@ class ContactProblem:
         start = self.displacement.x.array.copy()
         planes = [interface.forces.plane for interface in self.interfaces]
         self._norms = []
-        solution = compat.petsc_vector(self.displacement).copy()
+        self._share_tangents()
+        solution = self._equations.vector.copy()
         try:
             with default_options(PREFIX, self._options):
                 self._snes.solve(None, solution)
@@ -147,7 +140,7 @@ class ContactProblem:
             for interface, plane in zip(self.interfaces, planes, strict=True):
                 interface.forces.plane = plane
             raise
-        self._take(solution)
+        self._equations.take(solution)
         compat.collect_garbage(solution.comm)
         self._finish()
         return int(self._snes.its)
@@ -158,25 +151,18 @@ class ContactProblem:
         It is the sum of F less contact over the constrained unknowns, component by component.
         """
         self._write_forces()
-        compat.assemble_vector_into(self._residual, self._form)
-        self._sum(self._residual)
-        forces = self._residual.array_r - self._contact.array_r
-        held = np.zeros(len(forces), dtype=bool)
-        for condition in self._bcs:
-            dofs, _ = condition.dof_indices()
-            held[dofs[dofs < len(held)]] = True
-        own = np.where(held, forces, 0.0).reshape(-1, 3).sum(axis=0)
-        return np.asarray(self._comm.allreduce(own))
+        return self._equations.reaction(self._contact)
 
-    @property
-    def _comm(self) -> Any:
-        return self.displacement.function_space.mesh.comm
+    def _share_tangents(self) -> None:
+        """Decide which tangents are assembled: those that can be, under their indenters now."""
+        self._in_matrix = [each for each in self.interfaces if self._assembling and each.assembles]
+        self._tangent.interfaces = [each for each in self.interfaces if each not in self._in_matrix]
 
     def _solver(self) -> PETSc.SNES:
-        snes = PETSc.SNES().create(self._comm)
+        snes = PETSc.SNES().create(self._equations.comm)
         snes.setOptionsPrefix(PREFIX)
         snes.setFunction(self._write_residual, self._contact.duplicate())
-        snes.setJacobian(self._update_tangent, self._tangent.shell, self._matrix)
+        snes.setJacobian(self._update_tangent, self._tangent.shell, self._equations.matrix)
         snes.setConvergenceTest(self._converged)
         with default_options(PREFIX, self._options):
             snes.setFromOptions()
@@ -185,15 +171,9 @@ class ContactProblem:
         return snes
 
     def _write_residual(self, _snes: Any, x: PETSc.Vec, residual: PETSc.Vec) -> None:
-        self._take(x)
-        now = compat.petsc_vector(self.displacement)
-        compat.assemble_vector_into(self._residual, self._form)
-        compat.lift(self._residual, self._slope, self._bcs, now)
-        self._sum(self._residual)
+        self._equations.take(x)
         self._write_forces()
-        self._residual.axpy(-1.0, self._contact)
-        compat.write_misfit(self._residual, self._bcs, now)
-        residual.array[:] = self._residual.array_r
+        self._equations.write_residual(self._contact, residual)
 
     def _write_forces(self) -> None:
         """Write the contact forces of all interfaces, those on constrained unknowns included."""
@@ -202,21 +182,17 @@ class ContactProblem:
             interface.add_forces(self.displacement, self._contact)
 
     def _update_tangent(self, snes: PETSc.SNES, _x: Any, _shell: Any, _matrix: Any) -> None:
-        values = self._values()
-        same = all(map(np.array_equal, values, self._known))
-        if self._in_matrix or not self._comm.allreduce(same, min):
-            compat.assemble_matrix_into(self._matrix, self._slope, self._bcs)
-            self._known = values
+        self._equations.update_matrix(always=self._assembling)
         for interface in self.interfaces:
             if interface in self._in_matrix:
-                interface.add_tangent(self.displacement, self._matrix)
+                interface.add_tangent(self.displacement, self._equations.matrix)
             else:
                 interface.move_tangent(self.displacement)
         if self._forcing:
             snes.ksp.setTolerances(rtol=newton_tolerance(self._norms[-1], snes.getTolerances()[0]))
 
     def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
-        self._matrix.mult(compat.petsc_vector(self.displacement), self._inner)
+        self._equations.matrix.mult(self._equations.vector, self._inner)
         scale = max(self._contact.norm(), _INNER * self._inner.norm())
         self._norms.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
@@ -256,20 +232,9 @@ class ContactProblem:
                     remedy="make the laws up to a larger approach",
                 ) from error
 
-    def _take(self, x: PETSc.Vec) -> None:
-        """Put a vector of PETSc into the displacement."""
-        values = self.displacement.x.array
-        values[: x.local_size] = x.array_r[: x.local_size]
-        self.displacement.x.scatter_forward()
 
-    def _values(self) -> list[Array]:
-        """Return all that the tangent depends on."""
-        return [
-            np.array(each.x.array if hasattr(each, "x") else each.value)
-            for each in self._ingredients
-        ]
-
-    @staticmethod
-    def _sum(vector: PETSc.Vec) -> None:
-        """Add the contributions of all ranks."""
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+def _multigrid(space: Any) -> Mapping[str, object]:
+    """Return PETSc's options of algebraic multigrid for a space of displacements."""
+    if compat.lagrange_degree(space) == 2:
+        return ALGEBRAIC_DEFAULTS
+    return algebraic_options(hexahedral=space.mesh.topology.cell_name() == "hexahedron")

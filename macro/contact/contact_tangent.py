@@ -26,11 +26,12 @@ class ContactTangent:
         interfaces: The interfaces.
 
     Attributes:
+        interfaces: The interfaces; others may be set.
         shell: The sum, a PETSc matrix without entries; this object must be kept as long as it.
     """
 
     def __init__(self, matrix: PETSc.Mat, interfaces: Sequence[AddsProduct]) -> None:
-        self._matrix, self._interfaces = matrix, interfaces
+        self._matrix, self.interfaces = matrix, interfaces
         self.shell = PETSc.Mat().createPython(
             matrix.getSizes(), WeakContext(self), comm=matrix.comm
         )
@@ -39,7 +40,7 @@ class ContactTangent:
     def mult(self, _shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the product with x; PETSc calls this."""
         self._matrix.mult(x, y)
-        for interface in self._interfaces:
+        for interface in self.interfaces:
             interface.add_product(x, y)
 
 

@@ -24,7 +24,7 @@ from macro.contact.chosen_face import ChosenFace, chosen_face
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.contact_tangent import ContactTangent, free_unknowns
 from macro.contact.interface_laws import InterfaceLaws, laws_on_face
-from macro.contact.interface_state import InterfaceState
+from macro.contact.interface_state import InterfaceResults, InterfaceState
 from macro.contact.loaded_face import LoadedFace, Mode
 
 Array = NDArray[np.float64]
@@ -37,7 +37,7 @@ class _Displacements:
     space: Any
 
 
-class Interface:
+class Interface(InterfaceResults):
     """Contact laws between a planar face of a body and a rigid plane, as a term of its equations.
 
     The body, its material and its supports are the user's; displacements are in mm and stresses in
@@ -110,7 +110,6 @@ class Interface:
         self._make(face, chosen, crown)
         self._free: PETSc.Vec | None = None
         self._tangents: list[ContactTangent] = []
-        self._state: InterfaceState | None = None
         self.constrain(bcs)
         self.indenter = indenter
 
@@ -280,60 +279,9 @@ class Interface:
         together(self.comm, check)
 
     @property
-    def state(self) -> InterfaceState:
-        """The contact at the latest `evaluate`.
-
-        Raises:
-            InputError: Before that.
-        """
-        if self._state is None:
-            raise InputError("nothing is solved or evaluated on this interface yet")
-        return self._state
-
-    @property
-    def force(self) -> float:
-        """Force on the face against its normal [N]."""
-        return self.state.force
-
-    @property
-    def moment(self) -> Array:
-        """First moments of the pressures about the middle of the patches, shape (2,) [N mm]."""
-        return self.state.moment
-
-    @property
-    def area(self) -> float | None:
-        """Real contact area [mm²]; None where a law does not know it."""
-        return self.state.area
-
-    @property
-    def patch_pressure(self) -> Array:
-        """Mean pressures of the patches, shape (N,) [MPa]."""
-        return self.state.patch_pressure
-
-    @property
-    def patch_closure(self) -> Array:
-        """Mean closures of the patches, shape (N,) [mm]."""
-        return self.state.patch_closure
-
-    @property
-    def closure(self) -> Array:
-        """Closures of this rank's samples, patches or quadrature points, shape (n,) [mm]."""
-        return self.state.closure
-
-    @property
-    def pressure(self) -> Array:
-        """Pressures of this rank's samples, shape (n,) [MPa]."""
-        return self.state.pressure
-
-    @property
     def points(self) -> Array:
         """Places of this rank's samples in coordinates of the face, shape (n, 2) [mm]."""
         return np.column_stack((self.sampling.x, self.sampling.y))
-
-    @property
-    def plane(self) -> RigidPlane:
-        """The plane, also where it follows from loads; its centre is the middle of the patches."""
-        return self.state.plane
 
     @cached_property
     def _points_by_free(self) -> PETSc.Mat:

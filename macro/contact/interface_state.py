@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import together
+from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
 from macro.contact.contact_forces import ContactForces, ContactLaw
@@ -76,6 +77,63 @@ class InterfaceState:
             closure=closure,
             pressure=pressure,
         )
+
+
+class InterfaceResults:
+    """The contact at the latest evaluation, read part by part without communication."""
+
+    _state: InterfaceState | None = None
+
+    @property
+    def state(self) -> InterfaceState:
+        """The contact at the latest `evaluate`.
+
+        Raises:
+            InputError: Before that.
+        """
+        if self._state is None:
+            raise InputError("nothing is solved or evaluated on this interface yet")
+        return self._state
+
+    @property
+    def force(self) -> float:
+        """Force on the face against its normal [N]."""
+        return self.state.force
+
+    @property
+    def moment(self) -> Array:
+        """First moments of the pressures about the middle of the patches, shape (2,) [N mm]."""
+        return self.state.moment
+
+    @property
+    def area(self) -> float | None:
+        """Real contact area [mm²]; None where a law does not know it."""
+        return self.state.area
+
+    @property
+    def patch_pressure(self) -> Array:
+        """Mean pressures of the patches, shape (N,) [MPa]."""
+        return self.state.patch_pressure
+
+    @property
+    def patch_closure(self) -> Array:
+        """Mean closures of the patches, shape (N,) [mm]."""
+        return self.state.patch_closure
+
+    @property
+    def closure(self) -> Array:
+        """Closures of this rank's samples, patches or quadrature points, shape (n,) [mm]."""
+        return self.state.closure
+
+    @property
+    def pressure(self) -> Array:
+        """Pressures of this rank's samples, shape (n,) [MPa]."""
+        return self.state.pressure
+
+    @property
+    def plane(self) -> RigidPlane:
+        """The plane, also where it follows from loads; its centre is the middle of the patches."""
+        return self.state.plane
 
 
 def _contact_area(

@@ -107,7 +107,9 @@ class LawContactProblem:
             gap = gap + sampling.displacements(preload)
         self.forces = ContactForces(face, sampling, laws, gap)
         self.equilibrium = Equilibrium(body, self.forces)
-        self.newton = NewtonSolver(self.equilibrium, body.solver)
+        self.newton = NewtonSolver(
+            self.equilibrium, face if mode == "pointwise" else None, body.solver
+        )
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))

@@ -22,6 +22,7 @@ from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.loaded_face import Sampling
+from macro.contact.stiff_contact import ContactPreconditioner
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -73,7 +74,7 @@ class NewtonReport:
 
 
 class NewtonSolver:
-    """Solves a problem repeatedly with one preconditioner.
+    """Solves a problem repeatedly.
 
     A linear system is solved to the tolerance max(min(ρ, 0.1), 0.3 rtol/ρ), where ρ is the relative
     residual. A tolerance proportional to ρ keeps convergence quadratic (Dembo, Eisenstat & Steihaug
@@ -82,7 +83,8 @@ class NewtonSolver:
 
     Args:
         problem: The equations.
-        preconditioner: A linear solver whose preconditioner is set up and used for every tangent.
+        face: The contact face.
+        solver: Linear solver of the body alone, whose preconditioner is set up.
 
     Attributes:
         snes: PETSc's solver.
@@ -92,10 +94,10 @@ class NewtonSolver:
         Collective.
     """
 
-    def __init__(self, problem: Equilibrium, preconditioner: PETSc.KSP) -> None:
+    def __init__(self, problem: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
         self._problem = problem
         self._residuals: list[float] = []
-        base = preconditioner.getOperators()[1]
+        base = solver.getOperators()[1]
         user = PETSc.Options(PREFIX)
         self.forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
@@ -106,7 +108,7 @@ class NewtonSolver:
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
-        self._preconditioner = _SharedPreconditioner(preconditioner.pc)
+        self._preconditioner = ContactPreconditioner(problem, face, solver)
         self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
@@ -140,6 +142,7 @@ class NewtonSolver:
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat
     ) -> None:
         self._problem.update_tangent(displacement)
+        self._preconditioner.update()
         if self.forcing:
             wanted = snes.getTolerances()[0]
             snes.ksp.setTolerances(rtol=newton_tolerance(self._residuals[-1], wanted))
@@ -159,21 +162,6 @@ def newton_tolerance(now: float, wanted: float) -> float:
         wanted: Relative residual that the steps aim at.
     """
     return max(min(_LOOSEST, now), _SPARE * wanted / now)
-
-
-class _SharedPreconditioner:
-    """Another solver's preconditioner.
-
-    PETSc keeps a solver's matrix in its preconditioner. If two solvers shared one, the first would
-    solve with the matrix of the second.
-    """
-
-    def __init__(self, preconditioner: PETSc.PC) -> None:
-        self._preconditioner = preconditioner
-
-    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write the preconditioner's y for x."""
-        self._preconditioner.apply(x, y)
 
 
 class DisplacementBasis:

@@ -1,14 +1,16 @@
-"""Which linear solver a block gets: by its mesh, its element and its Poisson's ratio.
+"""Which linear solver a body gets: by its mesh, its element and its largest Poisson's ratio.
 
 Towards ν = ½ the resistance to volume changes grows beside that to shear as
 λ/μ = 2ν/(1 − 2ν). What smooths one kind of error on a grid, or interpolates it to the next grid,
 does not smooth the other, and iterations grow with (1 − 2ν)^-½. On lattices a Chebyshev smoother of
 higher degree over a wider range of eigenvalues compensates for that up to ν = 0.495. Beyond, and on
 other meshes, a factorisation is used where it fits into memory. Iterations to 1e-8, measured from
-10⁴ to 2·10⁵ unknowns:
+10⁴ to 2·10⁵ unknowns on lattices, and to 5·10⁶ on other meshes:
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
-    refined meshes  11 to 15 up to ν = 0.3, 18 at 0.4, 24 at 0.45
+    other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,
+                    the supports and the jump of the moduli; 31 on tetrahedra of 8 : 1 and 16 : 1,
+                    28 to 43 on hexahedra of 8 : 1 and 20 : 1
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Theory: section 11 of ``demos/theory.md``.
@@ -107,10 +109,10 @@ def body_solver(
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
     if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
     if degree == 2 and requested in ("", "mg"):
-        options = quadratic_options(hexahedral=hexahedral)
-        return linear_solver(matrix, vertex_grid(matrix, space, free), options)
+        grid = vertex_grid(matrix, space, free)
+        return linear_solver(matrix, grid, quadratic_options(space.mesh))
+    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
     return linear_solver(matrix, preconditioner=algebraic_options(hexahedral=hexahedral))
 
 

@@ -150,5 +150,5 @@ def size_note(tagged: TaggedMesh) -> str | None:
     if _SMALL <= np.linalg.norm(lengths) <= _LARGE:
         return None
     size = " × ".join(f"{length:.4g}" for length in lengths)
-    guess = '"m"' if np.linalg.norm(lengths) < _SMALL else '"um"'
+    guess = '"m"' if np.linalg.norm(lengths) < _SMALL else '"mm" or "um"'
     return f"the mesh of the body is {size} mm large; is its unit right? (mesh_unit = {guess}?)"

@@ -12,6 +12,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
+from macro.mesh.facet_nodes import facet_nodes
 
 Array = NDArray[np.float64]
 
@@ -167,25 +168,17 @@ def contact_facets(
             on: its normal points into this body.
     """
     side_of_body = -1.0 if opposed else 1.0
-    topology = mesh.topology
-    topology.create_connectivity(2, 3)
-    topology.create_connectivity(3, 2)
-    cells_of, facets_of = topology.connectivity(2, 3), topology.connectivity(3, 2)
-    vertices, shapes = compat.reference_facets(topology.cell_name())
-    cell = cells_of.array[cells_of.offsets[facets]]  # an outer facet has one cell
-    owned = cell < topology.index_map(3).size_local
-    cell, facets = cell[owned], facets[owned]
-    mates = facets_of.array.reshape(-1, len(shapes))[cell]
-    side = np.argmax(mates == facets[:, None], axis=1)
-    at = shapes[side]
-    rows = np.take_along_axis(compat.cell_vertices(mesh)[cell], at, axis=1)
-    corners = mesh.geometry.x[rows]
+    found = facet_nodes(mesh, facets)
+    owned = found.cell < mesh.topology.index_map(3).size_local
+    vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
+    side = found.side[owned]
+    corners = mesh.geometry.x[found.corners[owned]]
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
-        cell=cell,
+        cell=found.cell[owned],
         side=side,
-        reference=vertices[at],
+        reference=vertices[shapes[side]],
         corners=frame.in_plane(corners),
         depth=-side_of_body * frame.height(corners),
     )

@@ -32,6 +32,7 @@ class BodyModes:
         matrix: D, symmetric; mode k K + l varies as mode k along x and l along y, shape (K², K²)
             [mm/N].
         origin: Corner of the top, where the contact face does not start with it [mm].
+        rough: D from a coarser discretisation, which shows the error; None where there is none.
 
     Raises:
         InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
@@ -41,6 +42,7 @@ class BodyModes:
     lengths: tuple[float, float]
     matrix: Array
     origin: tuple[float, float] = (0.0, 0.0)
+    rough: Array | None = None
 
     def __post_init__(self) -> None:
         matrix = np.asarray(self.matrix, float)
@@ -111,6 +113,10 @@ class BodyModes:
             raise InputError("so many modes are not there", value=count, allowed=allowed)
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
         return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
+
+    def coarser(self) -> BodyModes | None:
+        """Return the compliance from a coarser discretisation; None where there is none."""
+        return None if self.rough is None else BodyModes(self.lengths, self.rough, self.origin)
 
     def _placed(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """Return places counted from the corner of the top."""

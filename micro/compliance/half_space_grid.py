@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from geometry.cores import cores, in_threads
 from micro.closed_forms.love import corner_integral
 
 Array = NDArray[np.float64]
@@ -22,7 +23,10 @@ Field = NDArray[Any]
 Indices = NDArray[np.intp]
 
 _CHUNK = 2**15
-"""Numbers in a block of rows that is transformed at a time: temporaries stay in the cache."""
+"""Numbers in a block of rows or columns that is transformed at a time: temporaries stay in the
+cache."""
+_COLUMNS = 8
+"""Columns at least that are transformed at a time, as many as share a line of the cache."""
 
 
 def love_kernel(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
@@ -50,18 +54,17 @@ def padded_spectrum(padded: tuple[int, int], spacing: tuple[float, float]) -> Ar
     """Return the transform of Love's kernel on a padded grid, where convolution is not circular.
 
     The padding holds the kernel too, though no pressure acts there: the spectrum of a kernel
-    without steps is positive.
+    without steps is positive. The kernel is even, so that cosines of a quarter of it are enough.
 
     Args:
-        padded: Cells (mx, my) of the padded grid, at least twice the loaded ones less one.
+        padded: Cells (mx, my) of the padded grid, even, at least twice the loaded ones.
         spacing: Sides (dx, dy) of a cell [mm].
 
     Returns:
-        Real half spectrum, shape (mx, my // 2 + 1) [mm].
+        Real quarter spectrum, shape (mx // 2 + 1, my // 2 + 1) [mm].
     """
-    nearest = [np.minimum(np.arange(m), m - np.arange(m)) for m in padded]
     kernel = love_kernel((padded[0] // 2 + 1, padded[1] // 2 + 1), spacing)
-    return np.ascontiguousarray(fft.rfft2(kernel[nearest[0][:, None], nearest[1]]).real)
+    return np.asarray(fft.dctn(kernel, type=1, overwrite_x=True, workers=cores()))
 
 
 def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
@@ -75,12 +78,12 @@ def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Ar
         spacing: Sides (dx, dy) of a cell [mm].
 
     Returns:
-        Real half spectrum, shape (nx, ny // 2 + 1) [mm].
+        Real quarter spectrum, shape (nx // 2 + 1, ny // 2 + 1) [mm].
 
     Source:
         Johnson 1985, eq. 13.7; Stanley & Kato 1997, doi 10.1115/1.2833523.
     """
-    qx = 2.0 * np.pi * fft.fftfreq(grid[0], spacing[0])
+    qx = 2.0 * np.pi * fft.rfftfreq(grid[0], spacing[0])
     qy = 2.0 * np.pi * fft.rfftfreq(grid[1], spacing[1])
     q = np.hypot(qx[:, None], qy)
     return np.divide(2.0, q, out=np.zeros_like(q), where=q > 0.0)
@@ -109,26 +112,26 @@ class Cells(NamedTuple):
 
 
 class Convolution:
-    """Multiplication by a real spectrum, in the precision of that spectrum.
+    """Multiplication by a real and even spectrum, in the precision of that spectrum, on all cores.
 
-    Rows are transformed block by block into one complex array, in which everything else happens in
-    place: no large array is allocated per call. Rows that are empty, or not wanted, are never
-    transformed.
+    Rows are transformed block by block into one complex array. Its columns are then transformed,
+    multiplied and transformed back, a few at a time, so that all that happens to a column happens
+    in the cache. Rows that are empty, or not wanted, and the padding are never stored. The result
+    does not depend on the number of threads.
 
     Args:
-        spectrum: Real half spectrum of the kernel, shape (mx, my // 2 + 1).
+        spectrum: Real quarter spectrum of the kernel, shape (mx // 2 + 1, my // 2 + 1).
         grid: Cells (nx, ny) of the fields.
         padded: Cells (mx, my) of the grid on which the convolution is circular.
-        work: Complex array, as large as the spectrum at least; overwritten by every call.
+        work: Complex array of nx (my // 2 + 1) numbers at least; overwritten by every call.
     """
 
     def __init__(
         self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
     ) -> None:
         self.grid, self.padded = grid, padded
-        self._factors = np.repeat(spectrum, 2, axis=1)  # of real and imaginary parts
-        parts = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
-        self._work = parts[: spectrum.size].reshape(spectrum.shape)
+        self._spectrum = spectrum
+        self._work = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
 
     def __call__(self, field: Field, rows: Indices | None = None) -> Field:
         """Convolve a field in place.
@@ -141,17 +144,28 @@ class Convolution:
         Returns:
             ``field``, holding the result on the same rows.
         """
-        blocks = list(self._blocks(rows))
-        self._work[self.grid[0] if rows is None else 0 :] = 0.0
-        for here, there in blocks:
-            self._work[there] = fft.rfft(field[here], n=self.padded[1], axis=1)
-        work = fft.fft(self._work, axis=0, overwrite_x=True)
-        parts = work.view(self._factors.dtype)
-        np.multiply(parts, self._factors, out=parts)
-        work = fft.ifft(work, axis=0, overwrite_x=True)
-        for here, there in blocks:
-            back = fft.irfft(work[there], n=self.padded[1], axis=1)
-            field[here] = back[:, : self.grid[1]]
+        (mx, my), count, waves = self.padded, len(field), self._spectrum.shape[1]
+        work = self._work[: count * waves].reshape(count, waves)
+        loaded: Any = slice(0, count) if rows is None else rows
+
+        def along_rows(here: slice) -> None:
+            work[here] = fft.rfft(field[here], n=my, axis=1)
+
+        def along_columns(here: slice) -> None:
+            column = np.zeros((mx, here.stop - here.start), work.dtype)
+            column[loaded] = work[:, here]
+            column = fft.fft(column, axis=0, overwrite_x=True)
+            part, half = self._spectrum[:, here], mx // 2 + 1
+            column[:half] *= part
+            column[half:] *= part[mx - half : 0 : -1]
+            work[:, here] = fft.ifft(column, axis=0, overwrite_x=True)[loaded]
+
+        def back_along_rows(here: slice) -> None:
+            field[here] = fft.irfft(work[here], n=my, axis=1)[:, : self.grid[1]]
+
+        in_threads(along_rows, _blocks(count, _CHUNK // my))
+        in_threads(along_columns, _blocks(waves, max(_CHUNK // mx, _COLUMNS)))
+        in_threads(back_along_rows, _blocks(count, _CHUNK // my))
         return field
 
     def on_cells(self, cells: Cells, values: Array) -> Array:
@@ -162,13 +176,11 @@ class Convolution:
         found = self(field, cells.rows).ravel()[cells.place]
         return found.astype(np.float64) * scale
 
-    def _blocks(self, rows: Indices | None) -> Iterator[tuple[slice, slice | Indices]]:
-        """Yield blocks of rows: where they are in the field and where in the grid."""
-        size = max(1, _CHUNK // self.padded[1])
-        count = self.grid[0] if rows is None else len(rows)
-        for first in range(0, count, size):
-            here = slice(first, min(first + size, count))
-            yield here, here if rows is None else rows[here]
+
+def _blocks(count: int, size: int) -> Iterator[slice]:
+    """Yield blocks of at least one and at most some of consecutive rows or columns."""
+    for first in range(0, count, max(1, size)):
+        yield slice(first, min(first + max(1, size), count))
 
 
 class HalfSpaceGrid:
@@ -198,12 +210,13 @@ class HalfSpaceGrid:
             spectrum = periodic_spectrum(grid, spacing)
             waves = spectrum
         else:
-            padded, period = _good(2 * n - 1 for n in grid), _good(grid)
+            period = _good(grid)
+            padded = 2 * period[0], 2 * period[1]
             spectrum = padded_spectrum(padded, spacing)
             waves = periodic_spectrum(period, spacing)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
-        work = np.empty(spectrum.shape, complex)  # one for all: they take turns
+        work = np.empty(grid[0] * (padded[1] // 2 + 1), complex)  # one for all: they take turns
         self.compliance = Convolution(spectrum, grid, padded, work)
         self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
         self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)

@@ -50,6 +50,11 @@ _NEAREST = 1e-9
 _POINTS, _MORE = 4, 3.0
 """Points of a rule beyond half the number of modes, and more for every factor e by which the
 rectangle is longer than the distance. They leave 1e-8 of the largest value, 4 more 1e-12."""
+_FAR, _ALONE = 1.5, 7
+"""Length over the distance below which one rule serves the whole length, and its points beyond half
+the number of modes."""
+_DEGREE = 5
+"""Degree of the pressures beyond a side."""
 _GRADED = 28
 """Points along an axis that integrate over the rectangle what pressures beyond it do: 1e-6 are left
 of displacements and stresses."""
@@ -139,17 +144,25 @@ class RectangleFields:
         nearest = np.clip(points[:, :2], low, high)
         apart = np.linalg.norm(points - np.pad(nearest, ((0, 0), (0, 1))), axis=1)
         apart = np.maximum(apart, _NEAREST * max(self.lengths))
-        steps = np.ceil(np.log1p(max(high - low) / apart)).astype(int)
-        for step in np.unique(steps):
-            rule = round(0.5 * self.count + _POINTS + _MORE * step)
-            members = np.flatnonzero(steps == step)
-            for some in np.array_split(members, -(-len(members) * 4 * rule**2 // _BATCH)):
+        sizes = np.stack([self._size(axis, part, apart) for axis, part in enumerate(parts)], axis=1)
+        for size in np.unique(sizes, axis=0):
+            members = np.flatnonzero((sizes == size).all(axis=1))
+            many = int(np.prod(np.abs(size))) * 4
+            for some in np.array_split(members, -(-len(members) * many // _BATCH)):
                 rules = [
-                    self._rule(axis, part, nearest[some, axis], apart[some], rule)
+                    self._rule(axis, part, nearest[some, axis], apart[some], int(size[axis]))
                     for axis, part in enumerate(parts)
                 ]
                 found[some] = self._summed(points[some], *rules)
         return found
+
+    def _size(self, axis: int, part: int, apart: Array) -> NDArray[np.intp]:
+        """Return the points of a rule on either side of the nearest point, or −those of one."""
+        low, high = self._interval(axis, part)
+        longer = (high - low) / apart
+        least = 0.5 * (self.count if part == 0 else _DEGREE)
+        both = np.round(least + _POINTS + _MORE * np.ceil(np.log1p(longer)))
+        return np.where(longer < _FAR, -np.round(least + _ALONE), both).astype(np.intp)
 
     def _summed(
         self, points: Array, along_x: tuple[Array, Array], along_y: tuple[Array, Array]
@@ -168,8 +181,11 @@ class RectangleFields:
         self, axis: int, part: int, nearest: Array, apart: Array, rule: int
     ) -> tuple[Array, Array]:
         """Return places (n, 2 rule) along an axis, and the pressures there times weights."""
-        nodes, weights = legendre.leggauss(rule)
+        nodes, weights = legendre.leggauss(abs(rule))
         low, high = self._interval(axis, part)
+        if rule < 0:
+            t = np.broadcast_to(0.5 * (low + high + (high - low) * nodes), (len(apart), -rule))
+            return t, self._pressures(axis, part, t) * (0.5 * (high - low) * weights)
         places, factors = [], []
         for way, extent in ((-1.0, nearest - low), (1.0, high - nearest)):
             end = 0.5 * np.arcsinh(extent / apart)[:, None]
@@ -177,13 +193,17 @@ class RectangleFields:
             places.append(nearest[:, None] + way * apart[:, None] * np.sinh(t))
             factors.append(apart[:, None] * np.cosh(t) * end * weights)
         place, factor = np.concatenate(places, axis=1), np.concatenate(factors, axis=1)
+        return place, self._pressures(axis, part, place) * factor[:, None]
+
+    def _pressures(self, axis: int, part: int, place: Array) -> Array:
+        """Return the modes at places (n, m), and what they go on with, shape (n, K, m)."""
+        low, high = self._interval(axis, part)
         if part:
-            distance = (low - place if part > 0 else place - high) * -1.0
+            distance = place - low if part > 0 else high - place
             values = self._beyond(axis, part, distance.ravel())
         else:
             values = mode_values(place.ravel(), self.lengths[axis], self.count)
-        values = values.reshape(self.count, *place.shape).transpose(1, 0, 2)
-        return place, values * factor[:, None]
+        return values.reshape(self.count, *place.shape).transpose(1, 0, 2)
 
     def _beyond(self, axis: int, part: int, distance: Array) -> Array:
         """Return the modes at distances beyond a side, shape (K, n)."""

@@ -20,7 +20,7 @@ from multiscale.couplings.face_terms import (
     LEAST_WITH_SIDES,
     FaceTerms,
 )
-from multiscale.couplings.mesh_body import MeshTerms
+from multiscale.couplings.mesh_body import MeshTerms, PairTerms
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
 
@@ -123,20 +123,42 @@ def has_body_term(setup: ProblemSetup) -> bool:
 
 
 def scene_body(setup: ProblemSetup, *, side_term: bool | None = None) -> FaceTerms:
-    """Return the body of a scene.
+    """Return the body of a scene, with its counter-body where that is a mesh.
 
     Args:
         setup: The problem set up from the scene, of a coupling with a body.
         side_term: Whether free sides that bound the interface are a term of their own; by default
             they are in half-space models.
 
+    Raises:
+        InputError: When the surface reaches beyond a contact face.
+
     Note:
-        Collective where the body is a mesh.
+        Collective where a body is a mesh.
     """
     if side_term is None:
         side_term = isinstance(setup.micro, HalfSpaceModel)
-    if setup.bodies.first is not None:
-        return MeshTerms.of(setup.bodies.first, setup.surface.lengths, side_term=side_term)
+    bodies, lengths = setup.bodies, setup.surface.lengths
+    first: FaceTerms
+    if bodies.first is not None:
+        first = MeshTerms.of(bodies.first, lengths, side_term=side_term)
+    else:
+        first = _block(setup, side_term=side_term)
+    if bodies.counter is None:
+        return first
+    if first.margin:
+        raise InputError(
+            "a block with a margin has no smooth modes in common with a counter-body on a mesh",
+            key="block.margin",
+            value=first.margin,
+            allowed="0; or both bodies from meshes",
+        )
+    second = MeshTerms.of(bodies.counter, lengths, side_term=False, behind=True)
+    return PairTerms(first=first, second=second)
+
+
+def _block(setup: ProblemSetup, *, side_term: bool) -> Body:
+    """Return the block of a scene."""
     block, lengths, shape = block_section(setup.scene), setup.surface.lengths, setup.shape
     sides = None
     if side_term and block.sides == "free" and not shape.margin:

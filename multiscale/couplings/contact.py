@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
-from geometry.collective import on_root
+from geometry.collective import on_root, on_root_alone
 from micro import (
     START_KINDS,
     FiniteSlopes,
@@ -93,7 +93,7 @@ class ContactCoupling:
                 **self._of_cells(),
             )
 
-        return on_root(self._comm, solve)
+        return on_root_alone(self._comm, solve)
 
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""
@@ -149,7 +149,9 @@ class ContactCoupling:
 
     def stiffness(self) -> tuple[float | None, int]:
         """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
-        return on_root(self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns))
+        return on_root_alone(
+            self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
+        )
 
     def interface_stiffness(self) -> float:
         """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].
@@ -168,7 +170,7 @@ class ContactCoupling:
                 raise InputError("contacts without cells have no conductance")
             return self._model.interface_stiffness(self.latest)
 
-        return on_root(self._comm, found)
+        return on_root_alone(self._comm, found)
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""
@@ -245,7 +247,7 @@ def on_body(
         if body is not None and face is not None:
             model = replace(model, body=body.term(face, higher=higher))
             if body.side_term is not None:
-                share = model.contact_modulus / material.contact_modulus
+                share = body.side_share(model.contact_modulus)
                 model = replace(model, sides=replace(body.side_term, share=share))
         if not order:
             return model

@@ -107,6 +107,14 @@ class FaceTerms(ABC):
         """Width by which the modes' rectangle exceeds the contact on every side [mm]."""
         return 0.0
 
+    def side_share(self, contact_modulus: float) -> float:
+        """Return the share of the contact modulus over that of what has the free sides.
+
+        Args:
+            contact_modulus: E* of the contact [MPa].
+        """
+        return contact_modulus / self.material.contact_modulus
+
     def term(self, face: FaceCompliance, *, higher: float = 0.0) -> BodyModes:
         """Return the body correction.
 
@@ -117,9 +125,10 @@ class FaceTerms(ABC):
         half_space = half_space_modes(self.lengths, face.count)
         if self.side_term is not None:
             half_space = half_space + side_modes(self.side_term, face.count)
-        whole = face.normal + higher * face.growth
-        compliance = whole - half_space / self.material.contact_modulus
-        return BodyModes(self.lengths, compliance, (-self.margin, -self.margin))
+        without = half_space / self.material.contact_modulus - higher * face.growth
+        origin = -self.margin, -self.margin
+        rough = None if face.rough is None else face.rough - without
+        return BodyModes(self.lengths, face.normal - without, origin, rough)
 
     def stresses(self, face: FaceCompliance, surface: Surface) -> list[SurfaceStress]:
         """Return the stresses in the contact face beyond those of the half-space.

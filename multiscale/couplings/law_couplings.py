@@ -74,6 +74,20 @@ class EmbeddedCoupling:
         whole[face.on_both] = pressure
         return whole
 
+    def face_pressures(self) -> Array:
+        """Return places on the face and the pressures there at the latest load step.
+
+        Returns:
+            Columns x, y [mm] and p [MPa] of the quadrature points of all ranks, shape (n, 3).
+
+        Note:
+            Collective.
+        """
+        first: Any = getattr(self.face, "first", self.face)
+        first = first.quadrature
+        own = np.column_stack([first.x, first.y, self.point_pressures])
+        return np.concatenate(self.face.comm.allgather(own))
+
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
         try:
@@ -246,7 +260,12 @@ def beyond_law(
         table: The laws.
         falls: Whether closure falls somewhere in a law, where the mesh cannot follow.
     """
-    if table.made_by.get("coupling") != "consistent":
+    if table.made_by.get("coupling") == "representative":
+        remedy = (
+            "somewhere on the face the pressure is larger than the laws were made for: state "
+            "law.largest_pressure, ten times the mean one otherwise, or take a smaller load"
+        )
+    elif table.made_by.get("coupling") != "consistent":
         remedy = (
             "near full contact a patch taken alone has no pressure as a function of closure: take "
             "coupling.newton = 'condensed', which goes on, coupling.kind = 'consistent' or "

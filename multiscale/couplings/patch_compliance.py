@@ -64,7 +64,9 @@ def patch_compliance(setup: ProblemSetup, comm: Any) -> Array:
         Collective.
     """
     first, second = _of_first(setup, comm), setup.materials.second
-    if second is None or not setup.both_give_way:
+    # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
+    decomposed = setup.counter_face is not None and setup.scene.decomposed
+    if second is None or not (setup.both_give_way or decomposed):
         return first
     return np.asarray(first + influence_matrix(setup.patches) * second.surface_compliance / np.pi)
 

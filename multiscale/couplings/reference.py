@@ -20,7 +20,7 @@ from multiscale.setup.surface_and_block import block_material, block_section, lo
 from multiscale.storage import Arrays, packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import Block, MeshQuality, UnilateralContactProblem, UnilateralContactState
+    from macro import ElasticBody, MeshQuality, UnilateralContactProblem, UnilateralContactState
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class ReferenceCoupling:
         return self._problems[-1]
 
     @property
-    def blocks(self) -> list[Block]:
+    def blocks(self) -> list[ElasticBody]:
         """The rough blocks, the finest last."""
         return [problem.body for problem in self._problems]
 

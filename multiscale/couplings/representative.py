@@ -77,7 +77,7 @@ def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfS
         periodic=True,
         upper=setup.scene.micro.upper,
     )
-    if setup.scene.micro.finite_slopes is not True:
+    if not setup.finite_slopes:
         return model
     return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
 
@@ -159,10 +159,12 @@ def face_coupling(setup: ProblemSetup, table: LawTable, comm: Any) -> EmbeddedCo
     Note:
         Collective.
     """
-    from macro import LawContactProblem
+    from macro import FacePair, LawContactProblem
 
     face = embedding(setup, comm)
     problem = LawContactProblem(face, table.laws, mode="pointwise", crown=crown(setup))
+    if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
+        problem.start_from(np.ones(face.patches.count))
     return EmbeddedCoupling(problem, table, face)
 
 

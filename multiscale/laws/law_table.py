@@ -20,6 +20,7 @@ Array = NDArray[np.float64]
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""
 
+_SCATTER_AT = 0.02, 0.1, 0.5  # of the largest pressure of a law; faces carry less on average
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
 
 
@@ -114,11 +115,15 @@ def _scatter_note(region: str, law: PatchLaw) -> str | None:
     rows = law.rows
     if not rows.pressure_scatter.any():
         return None
-    half = int(np.searchsorted(rows.pressure, 0.5 * rows.pressure[-1]))
-    pressure, scatter = rows.pressure[half], rows.pressure_scatter[half]
-    stiffness = float(law.along(rows.approach[half]).stiffness)
+    found = []
+    for share in _SCATTER_AT:
+        row = int(np.searchsorted(rows.pressure, share * rows.pressure[-1]))
+        scatter, stiffness = rows.pressure_scatter[row], law.along(rows.approach[row]).stiffness
+        found.append(
+            f"{scatter / rows.pressure[row]:.1%} at {rows.pressure[row]:.3g} MPa "
+            f"({1e3 * scatter / float(stiffness):.2g} µm of closure)"
+        )
     return (
-        f"{region}: where the mean pressure is {pressure:.3g} MPa, that of single samples scatters "
-        f"by {scatter / pressure:.1%} (standard deviation), as by {1e3 * scatter / stiffness:.2g} "
-        "µm of closure; larger samples scatter less"
+        f"{region}: the pressure of single samples scatters about that of their mean by "
+        f"{', '.join(found)}; standard deviations, which are smaller for larger samples"
     )

@@ -30,7 +30,7 @@ _ROWS_TOGETHER = 2
 """Rows of a sample that one rank solves in sequence, each starting from the one before, so that
 results do not depend on the number of ranks."""
 
-_CLOSE = 0.01  # of the way to full contact: further than needed that the last row may lie
+_CLOSE = 0.01  # of its way: further than needed that the last row may lie
 _FULL_ROWS = 4  # of a law that goes on in full contact
 
 
@@ -95,7 +95,7 @@ class PeriodicSamples:
             tolerance: Interpolation error of the pressure.
             most_rows: Rows that are solved at most, for each sample.
         """
-        touch = self.reference - self.first_touch
+        touch = max(self.reference - self.first_touch, 0.0)
         area = sum(sample.area for sample in self.samples)
         if limit.closure <= touch:
             open_law = PatchLaw.of(SolvedRows.none(), touch, self.reference)
@@ -137,8 +137,9 @@ class PeriodicSamples:
         def excess(parameter: float) -> float:
             return float(self.rows(np.array([parameter]), 0.0).pressure[0, 0]) - pressure
 
-        if high - low > _CLOSE and excess(low) < 0.0 < excess(high):
-            high = min(high, float(bisect(excess, low, high, xtol=0.5 * _CLOSE)) + 0.5 * _CLOSE)
+        if high - low > _CLOSE * high and excess(low) < 0.0 < excess(high):
+            found = float(bisect(excess, low, high, xtol=1e-9 * high, rtol=_CLOSE))
+            high = min(high, (1.0 + _CLOSE) * found)
         return min(by_closure, high)
 
     def _parameter(self, separation: float) -> float:

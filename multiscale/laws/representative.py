@@ -139,4 +139,6 @@ def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
     model = make(sample)
     if not model.periodic:
         raise InputError("a representative law needs periodic models", value=model.name)
+    if np.isfinite(model.upper):  # full contact would have no bound to its closure
+        raise InputError("a representative law needs models without a bound", value=model.upper)
     return PeriodicSample(model)

@@ -14,12 +14,16 @@ from geometry.surface import Surface
 from multiscale.figures.block import block_figure
 from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, map_unit, new_figure
 from multiscale.laws.law_table import LawTable
+from multiscale.loading.load_step import LoadStep
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 
 MOST_NUMBERED_PATCHES = 100
 """A map of more patches shows colours alone; the numbers would cover each other."""
+
+MOST_POINTS = 40_000
+"""Points of a face that are drawn at most."""
 
 
 def surface_figure(surface: Surface, asperities: Asperities | None, patches: PatchGrid) -> Figure:
@@ -122,6 +126,28 @@ def draw_pressures(
             axes.text(x, y, text, ha="center", va="center", color=colour)
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")
     return image
+
+
+def face_figure(points: NDArray[np.float64], step: LoadStep) -> Figure:
+    """Draw the pressures on a contact face of any outline at a load step.
+
+    Args:
+        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+        step: The load step.
+    """
+    figure = new_figure(6.4, 4.8)
+    axes = figure.add_subplot()
+    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
+    scale, unit = map_unit((float(np.ptp(x)), float(np.ptp(y))))
+    size = max(1.0, 5e4 / len(x))
+    dots = axes.scatter(scale * x, scale * y, size, pressure, marker="s", lw=0, cmap="magma_r")
+    figure.colorbar(dots, ax=axes, label="pressure [MPa]")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")
+    axes.set_title(
+        f"approach {1e3 * step.approach_mm:.3g} µm, force {step.force_N:.4g} N, "
+        f"mean pressure {step.mean_pressure_MPa:.3g} MPa"
+    )
+    return figure
 
 
 def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:

@@ -7,7 +7,11 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.collective import on_root, shared
+from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.report import provenance, report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
@@ -31,6 +35,7 @@ FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "surface.png", "curves.png", "pressures.png", "contact.png",
     "laws.png", "block.png", "fields.xdmf", "fields.h5", "fields.bp",
+    "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp", "face.png",
 )  # fmt: skip
 """All files that a run may write."""
 
@@ -58,10 +63,14 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
         names = ["surface", "curves"] + ["pressures"] * (not run.setup.samples)
+        face = _face_pressures(run)
+        names += ["face"] * (face is not None)
         names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
         names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
         with run.phase("output"):
-            drawn = shared(run.comm, len(names), lambda index: png(_figure(run, names[index])))
+            drawn = shared(
+                run.comm, len(names), lambda index: png(_figure(run, names[index], face))
+            )
         pictures = dict(zip(names, drawn, strict=True))
     with run.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
@@ -153,7 +162,14 @@ def write_figure(path: Path, figure: Figure) -> Path:
     return write_bytes(path, png(figure))
 
 
-def _figure(run: Run, name: str) -> Figure:
+def _face_pressures(run: Run) -> NDArray[np.float64] | None:
+    """Return the pressures at the points of a face with laws of samples, where they are known."""
+    if run.setup.samples and isinstance(run.coupling, EmbeddedCoupling):
+        return run.coupling.face_pressures()
+    return None
+
+
+def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
     """Draw one figure; matplotlib is loaded only by ranks that draw."""
     from multiscale.output import figures
 
@@ -167,6 +183,8 @@ def _figure(run: Run, name: str) -> Figure:
         return figures.block_figure_of(setup, run.contacts[-1])
     if name == "contact":
         return run.contacts[-1].plot()
+    if name == "face" and face is not None:
+        return figures.face_figure(face, run.steps[-1])
     if name == "pressures":
         return figures.pressure_figure(run.history())
     assert run.table is not None

@@ -95,10 +95,10 @@ def _sample_warnings(setup: ProblemSetup, face: FaceFacts) -> Iterator[str]:
                 f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face about "
                 f"{quantity(side, 'mm')}: a sample stands for faces that are much larger"
             )
-        if region.measured:
+        if region.mirrored:
             yield (
-                f"the map of {region.name} is continued periodically as it is; where its borders "
-                "do not fit, they make a step"
+                f"the heights of {region.name} do not continue periodically: their sample is four "
+                "mirror images, twice as long and wide"
             )
     history, second = setup.scene.loading.load_history, setup.materials.second
     if setup.both_give_way and second is not None and history.quantity == "force":

@@ -17,10 +17,9 @@ from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
 from multiscale.planning.machine_speed import THIS_MACHINE, Machine
-from multiscale.setup.memory import memory_requests
+from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import (
-    BYTES_PER_UNKNOWN,
     ReferenceMeshes,
     mesh_unknowns,
     reference_requests,
@@ -250,13 +249,9 @@ def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
         setup: The problem.
     """
     meshes, scene = setup.meshes, setup.scene
+    steps = step_count(scene.loading.load_history)
     of_bodies = [
-        MemoryRequest(
-            key=f"{key}.mesh",
-            value=None,
-            purpose=f"the mesh of [{key}], its stiffness and multigrid,",
-            shared=float(face.unknowns) * BYTES_PER_UNKNOWN[face.degree],
-        )
+        body_request(key, face.element, face.unknowns, steps)
         for key, face in (("body", setup.face), ("counter_body", setup.counter_face))
         if face is not None and face.digest
     ]

@@ -33,8 +33,9 @@ from multiscale.planning.auto_keys import (
 from multiscale.planning.mesh_accuracy import MeshError, measured_mesh_error
 from multiscale.planning.representative_setup import representative_setup
 from multiscale.scene.scene import Scene
+from multiscale.setup.body_reader import scene_bodies
 from multiscale.setup.memory import check_memory
-from multiscale.setup.mesh_bodies import Faces, materials_in_contact, scene_bodies
+from multiscale.setup.mesh_bodies import Faces, materials_in_contact
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_meshes
 from multiscale.setup.surface_and_block import (

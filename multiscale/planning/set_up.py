@@ -14,7 +14,8 @@ from geometry.patches import PatchGrid
 from multiscale.machine import ClusterNodes, large_object_comm
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
-from multiscale.setup.mesh_bodies import SceneBodies, SceneBody, scene_bodies
+from multiscale.setup.body_reader import scene_bodies
+from multiscale.setup.mesh_bodies import SceneBodies, SceneBody
 from multiscale.setup.problem import ProblemSetup
 
 _COVERED = 1e-6

@@ -89,7 +89,7 @@ class CounterBodySection(Section):
                 "poisson_ratio; or, of a mesh, materials by volume)"
             )
         if self.mesh is None:
-            meshed = sorted(self.model_fields_set - {"young_modulus", "poisson_ratio"})
+            meshed = sorted(self.stated - {"young_modulus", "poisson_ratio"})
             if meshed:
                 raise ValueError(
                     f"'{meshed[0]}' needs a 'mesh' (allowed: a mesh; or young_modulus and "

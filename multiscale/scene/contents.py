@@ -218,14 +218,16 @@ class SceneSections(Section):
     def _problems_of_representative_laws(self) -> Iterator[Problem]:
         """Yield the keys that a law of a periodic sample has no use for."""
         law, out = "law.kind = 'representative'", "(allowed: leave it out)"
-        for key in sorted(self.coupling.model_fields_set - {"table_tolerance"}):
+        for key in sorted(self.coupling.stated - {"table_tolerance"}):
             yield f"coupling.{key}", f"does not go with {law}, which stands at points {out}"
-        if self.patches.model_fields_set:
+        if self.patches.grid != type(self.patches)().grid:
             yield "patches.grid", f"does not go with {law}, which has no patches {out}"
         if self.accuracy is not None:
             yield "accuracy", f"does not go with {law} (allowed: coupling.table_tolerance)"
         if self.micro.model != "half-space":
             yield "micro.model", f"does not go with {law} (allowed: 'half-space')"
+        if self.output.contact in ("last", "all"):
+            yield "output.contact", f"does not go with {law}, which has no spots {out}"
         if self.law.seeds and self.surface.spectrum is None:
             yield "law.seeds", "needs surface.spectrum (allowed: leave it out for a measured map)"
         if self.block is not None and self.law.regions:

@@ -30,6 +30,24 @@ class Section(BaseModel):
         extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
     )
 
+    @property
+    def stated(self) -> set[str]:
+        """The keys that were written; of a section that was dumped whole, those that say a thing.
+
+        A dump has every key, so that only values other than the default were written.
+        """
+        given, fields = self.model_fields_set, type(self).model_fields
+        whole = len(given) == len(fields) or given >= {
+            name for name in fields if getattr(self, name) is not None
+        }
+        if not whole:
+            return set(given)
+        return {
+            name
+            for name in given
+            if getattr(self, name) != fields[name].get_default(call_default_factory=True)
+        }
+
 
 Flag = Annotated[bool, Field(strict=True)]
 PositiveLength = Annotated[Length, Field(gt=0)]
@@ -270,7 +288,7 @@ class MicroSection(Section):
     """Whether a summit's curvature is taken at its top, or over the size of its contact."""
     finite_slopes: Flag | None = None
     """Whether the slopes of the roughness, where they are not small, count to second order. When
-    not given they do with half-space contacts, unless laws are isolated."""
+    not given they do with half-space contacts, unless laws are isolated or those of samples."""
     border: Literal["ignore", "include"] = "ignore"
     """Whether maxima on the surface's border carry load."""
     hardness: Annotated[Pressure, Field(gt=0)] | None = None

@@ -24,6 +24,16 @@ is made, while rows are inserted [B]."""
 BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 """Memory of a patch's results and of the other results of a load step [B]."""
 
+BYTES_PER_BODY_UNKNOWN = {"P1": 2400, "P2": 2500, "Q1": 4200, "Q2": 3500}
+"""Memory of a body on a mesh per unknown, over all ranks: mesh, stiffness, multigrid and solve [B].
+Brake pads took 2350 (2.5·10⁵ unknowns), 2290 (4.9·10⁶), 4000 (1.9·10⁵) and 3140 (1.8·10⁵); the
+stiffness alone takes 920, 1260, 1100 and 2380, multigrid 1070, 850, 2590 and 590."""
+BYTES_READ_PER_UNKNOWN = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}
+"""Memory that rank 0 takes besides, per unknown, while gmsh reads the mesh of a body [B]."""
+_BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 32, 32, 100
+"""Memory per unknown of an earlier state and its copy for initial guesses, the largest number of
+them, and the vectors of Newton's method [B]. Eight load steps took 360."""
+
 
 def check_memory(
     scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest] | None = None
@@ -90,3 +100,23 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
     steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
     size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
     yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
+
+
+def body_request(key: str, element: str, unknowns: int, steps: int) -> MemoryRequest:
+    """Return the memory that a body on a mesh takes.
+
+    Args:
+        key: Its section of the scene.
+        element: Its element, such as ``"P1"``.
+        unknowns: Degrees of freedom.
+        steps: Load steps.
+    """
+    states = min(steps, _MOST_STATES) * _BYTES_PER_EARLIER_STATE
+    each = BYTES_PER_BODY_UNKNOWN[element] + states + _WORK_VECTORS
+    return MemoryRequest(
+        key=f"{key}.mesh",
+        value=None,
+        purpose=f"the mesh of [{key}], its stiffness and multigrid,",
+        shared=float(unknowns) * each,
+        root_only=float(unknowns) * BYTES_READ_PER_UNKNOWN[element],
+    )

@@ -205,7 +205,7 @@ class ProblemSetup:
         """Whether the micro model takes finite slopes into account."""
         stated = self.scene.micro.finite_slopes
         able = self.scene.kind != "isolated" and isinstance(self.micro, HalfSpaceModel)
-        return able if stated is None else stated and able
+        return able and not self.samples if stated is None else stated and able
 
     @property
     def uses_summits(self) -> bool:

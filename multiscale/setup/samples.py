@@ -5,9 +5,9 @@ Theory: demos/theory.md, section 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-from geometry import Material, MaterialPair, Surface, facing
+from geometry import Material, MaterialPair, Surface, facing, mirrored
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SurfaceSection
 from multiscale.setup.surface_and_block import laid_counter_surface, located, sample_surface
@@ -24,13 +24,13 @@ class RegionSamples:
         name: Name of the region.
         surfaces: The samples, which continue periodically, with the heights of both sides.
         materials: The materials on both sides there.
-        measured: Whether it is a map, which need not continue periodically.
+        mirrored: Whether they do not continue periodically themselves, and are mirrored to do so.
     """
 
     name: str
     surfaces: tuple[Surface, ...]
     materials: MaterialPair
-    measured: bool = False
+    mirrored: bool = False
 
 
 def region_samples(
@@ -57,10 +57,14 @@ def region_samples(
             laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
             with located(scene, "counter_surface"):
                 surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
-        samples = tuple(replace(surface, periodic=True) for surface in surfaces)
+        samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
         pair = MaterialPair(first=material, second=second)
-        measured = section.spectrum is None and not section.periodic
-        region = RegionSamples(name=name, surfaces=samples, materials=pair, measured=measured)
+        region = RegionSamples(
+            name=name,
+            surfaces=samples,
+            materials=pair,
+            mirrored=not all(one.periodic for one in surfaces),
+        )
         found.append(region)
     return tuple(found)
 

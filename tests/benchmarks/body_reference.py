@@ -1,112 +1,187 @@
 """A foot that is no cuboid, pressed: its roughness meshed, in the contact problem, and in laws.
 
-Run by hand: `.venv/bin/python tests/benchmarks/body_reference.py [--seeds 191 192] [--edges 3]
-[--figure FILE]`; minutes a surface. The body is an L (`tests/l_shape.py`): its face sinks and turns
-with the arm that it stands on. The reference meshes the roughness, three times, and extrapolates
-to mesh size zero with an error bar; `concurrent` and the calibrated laws of 4 × 4 patches on a
-plain mesh know the flat body alone. The forces of a block as high as the foot, held at its bottom,
-say how much the arm matters.
+Run by hand: `.venv/bin/python tests/benchmarks/body_reference.py [--seeds 191 192] [--edges 4]
+[--figure FILE]`; some minutes a surface on one core. The body is an L (`tests/l_shape.py`): its
+face sinks and turns with the arm that it stands on. The reference meshes the roughness three times
+and extrapolates to mesh size zero, with an error bar. `concurrent` and `consistent`, with 4 × 4
+patches, are scenes whose mesh is flat. A block as high as the foot says how much its shape matters.
 """
 
 import os
 
 os.environ["OMP_NUM_THREADS"] = "1"
+os.environ["PATCHLAW_CACHE"] = "off"  # times are those of a first run
 
 import argparse
 import sys
+import tempfile
 import time
 from pathlib import Path
 
+import matplotlib
 import numpy as np
+from dolfinx import mesh as dmesh
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from l_shape import (
-    Reference,
-    added_by_arm,
-    embedded,
-    embedded_model,
-    flat_body,
-    laws_on_mesh,
-    moments,
-    reach,
-    rough,
-)
+from l_shape import Reference, reach, scene, write_foot
 
-APPROACHES = (2.5e-3, 5e-3, 7.5e-3, 10e-3)
+from geometry.face_frame import UPWARD
+from macro import compat, contact_facets, nodal_contact
+from multiscale import run
+from multiscale.planning.problem_setup import make_setup
+
+LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
+MAGNIFIED, ROUGH, RED = 30, 0.2, "#d1495b"  # the face lies above −0.2 mm
+SMALL = {"micro": {"model": "half-space", "finite_slopes": False}}
 
 
-def percent(forces, value):
-    """Return differences to a reference, in parts of its largest force."""
-    return " ".join(f"{part:+.2%}" for part in (np.array(forces) - value) / value.max())
+def timed(name, work):
+    """Print a result's forces and its time, and return it."""
+    start = time.perf_counter()
+    found = work()
+    forces = " ".join(f"{force:.4f}" for force in found.force_N)
+    print(f"  {name:34s} {forces} N, {time.perf_counter() - start:.0f} s", flush=True)
+    return found
 
 
 def pressed(reference):
-    """Press the meshed roughness; return its forces, its bars, and the finest problem."""
+    """Press the meshed roughness; return its forces with bars, and the finest body as a picture."""
     forces = []
     for shape in reference.shapes:
         start = time.perf_counter()
         problem, states = reference.solved(shape)
         forces.append([state.force for state in states])
-        print(
-            f"  reference, {1e3 * shape.fine:5.2f} µm, {problem.body.dofs:6d} unknowns: "
-            + " ".join(f"{force:.4f}" for force in forces[-1])
-            + f" N, {time.perf_counter() - start:.0f} s",
-            flush=True,
+        told = " ".join(f"{force:.4f}" for force in forces[-1])
+        name = f"reference, {1e3 * shape.fine:.1f} µm, {problem.body.dofs} unknowns"
+        print(f"  {name:34s} {told} N, {time.perf_counter() - start:.0f} s", flush=True)
+    return reference.extrapolated(forces), shown(problem, states[-1])
+
+
+def shown(problem, state):
+    """Return the outer triangles, how their corners move, and the nodes in contact."""
+    mesh, space = problem.body.mesh.mesh, problem.body.space
+    outer = dmesh.exterior_facet_indices(mesh.topology).astype(np.int32)
+    facets = contact_facets(mesh, outer, UPWARD)
+    _, at = compat.reference_facets("tetrahedron")
+    nodes = np.take_along_axis(compat.cell_nodes(space)[facets.cell], at[facets.side], axis=1)
+    contact = nodal_contact(problem, state)
+    touching = contact.region >= 0
+    return {
+        "corners": np.concatenate([facets.corners, -facets.depth[..., None]], axis=2),
+        "moved": problem.body.function(state.displacement).x.array.reshape(-1, 3)[nodes],
+        "spots": np.stack([contact.x, contact.y], axis=1)[touching],
+    }
+
+
+def draw(picture, path):
+    """Draw the deformed foot with its contact spots, the face from above, and the forces."""
+    figure = Figure(figsize=(15.0, 5.2), layout="constrained")
+    space = figure.add_subplot(1, 3, 1, projection="3d", computed_zorder=False)
+    corners, moved, spots = (picture[key] for key in ("corners", "moved", "spots"))
+    deformed = corners + MAGNIFIED * moved
+    sunk = -1e3 * moved[..., 2].mean(axis=1)
+    norm = Normalize(0.0, sunk.max())
+    colours = matplotlib.colormaps["viridis"](norm(sunk))
+    space.add_collection3d(Poly3DCollection(deformed, facecolors=colours, rasterized=True))
+    on_top = np.abs(corners[..., 2]).max(axis=1) < ROUGH
+    nearest = cKDTree(corners[on_top][..., :2].mean(axis=1)).query(spots)[1]
+    x, y, z = deformed[on_top][nearest].mean(axis=1).T
+    space.scatter(x, y, z, s=5, c=RED, depthshade=False, zorder=3)
+    space.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(0, 1.6), ylim=(-0.3, 1.3))
+    space.set(xticks=(0, 0.5, 1, 1.5), yticks=(0, 0.5, 1), zticks=(-1.5, -1, -0.5, 0))
+    space.set(zlim=(-1.8, 0.1), box_aspect=(1.6, 1.6, 1.9))
+    space.view_init(elev=38.0, azim=-62.0)
+    space.set_title(f"displacements × {MAGNIFIED}; contact in red")
+    figure.colorbar(ScalarMappable(norm, "viridis"), ax=space, label="sunk by [µm]", shrink=0.6)
+    face = figure.add_subplot(1, 3, 2)
+    image = face.tripcolor(
+        *corners[on_top][..., :2].reshape(-1, 2).T,
+        np.arange(3 * on_top.sum()).reshape(-1, 3),
+        -1e3 * moved[on_top][..., 2].ravel(),
+        shading="gouraud",
+        rasterized=True,
+    )
+    face.scatter(*spots.T, s=4, c=RED, label="contact")
+    face.set(xlabel="x [mm], the arm goes on to the right", ylabel="y [mm]", aspect="equal")
+    face.legend(loc="upper left")
+    figure.colorbar(image, ax=face, label="the face sinks by [µm]", shrink=0.8)
+    _draw_curves(figure.add_subplot(1, 3, 3), dict(picture["curves"]))
+    figure.savefig(path, dpi=110)
+
+
+def _draw_curves(axes, curves):
+    """Draw forces over the approach, and in a corner what they miss of the reference."""
+    approach, value, bar = curves.pop("reference")
+    axes.errorbar(1e3 * approach, value, bar, color="k", lw=2.5, capsize=4, label="reference")
+    apart = axes.inset_axes((0.1, 0.46, 0.36, 0.22))
+    band = [100 * side * bar / value.max() for side in (-1, 1)]
+    apart.fill_between(1e3 * approach, *band, color="0.7")
+    for (name, (at, force)), look in zip(curves.items(), ("--", "o", "x", ":"), strict=True):
+        (line,) = axes.plot(1e3 * at, force, look, ms=9, mfc="none", label=name)
+        if not name.startswith("a block"):
+            part = 100 * (force - value) / value.max()
+            apart.plot(1e3 * at, part, look, color=line.get_color(), ms=6, mfc="none")
+    apart.set_title("off the reference [%]", fontsize=9)
+    axes.set(xlabel="approach [µm]", ylabel="force [N]", ylim=(0.0, None))
+    axes.legend(frameon=False)
+    for each in (axes, apart):
+        each.grid(alpha=0.3)
+
+
+def compare(seed, edges, foot):
+    """Print the comparison of one surface; return what a figure of it shows."""
+    print(f"Set 1, seed {seed}, {STEPS} steps to {1e3 * LARGEST:g} µm", flush=True)
+
+    def go(kind, foot=foot, **sections):
+        content = {"coupling": {"kind": kind}, **sections}
+        return run(scene(seed, LARGEST, STEPS, foot=foot, **content))
+
+    histories = {
+        "a block as high": timed("a block as high, concurrent", lambda: go("concurrent", None)),
+        "concurrent": timed("concurrent", lambda: go("concurrent")),
+        "consistent": timed("consistent, 4 × 4 patches", lambda: go("consistent")),
+        "small slopes": timed("small slopes", lambda: go("concurrent", **SMALL)),
+    }
+    concurrent = histories["concurrent"]
+    surface = make_setup(scene(seed, LARGEST, STEPS)).surface
+    found, picture = pressed(
+        Reference(
+            surface=surface,
+            approaches=tuple(concurrent.approach_mm),
+            plane=reach(concurrent),
+            edges=edges,
         )
-    return reference.extrapolate(forces), problem, states[-1]
-
-
-def compare(seed, edges, added, flat):
-    """Print the comparison of one surface; return the finest reference at the largest load."""
-    surface = rough(seed)
-    none = np.zeros_like(added)
-    cuboid = embedded(embedded_model(surface, none), APPROACHES)
-    start = time.perf_counter()
-    model = embedded_model(surface, added)
-    concurrent = embedded(model, APPROACHES)
-    spent = time.perf_counter() - start
-    last = concurrent[-1]
-    print(
-        f"Set 1, seed {seed}: at {1e3 * last.approach:g} µm {last.force:.4f} N on the foot, "
-        f"{cuboid[-1].force:.4f} N on a block; moments about y {moments(last)[0]:.4f} "
-        f"and {moments(cuboid[-1])[0]:.4f} N mm; concurrent {spent:.1f} s",
-        flush=True,
     )
-    start = time.perf_counter()
-    laws = laws_on_mesh(model, APPROACHES, 4, flat)
-    print(f"  laws of 4 × 4 patches on {flat.dofs} unknowns: {time.perf_counter() - start:.1f} s")
-    reference = Reference(
-        surface=surface, approaches=APPROACHES, plane=reach(last, added), edges=edges
-    )
-    found, problem, state = pressed(reference)
-    bars = found.error / found.value.max()
-    print(
-        "  reference  " + " ".join(f"{value:.4f}" for value in found.value) + " N ± "
-        + " ".join(f"{bar:.2%}" for bar in bars)
-        + "\n  concurrent " + percent([s.force for s in concurrent], found.value)
-        + "\n  consistent " + percent([s.force for s in laws], found.value)
-        + "\n  small slopes "
-        + percent(
-            [s.force for s in embedded(embedded_model(surface, added, slopes=False), APPROACHES)],
-            found.value,
-        ),
-        flush=True,
-    )
-    return problem, state
+    value, bar = found.value, found.error / found.value.max()
+    forces = " ".join(f"{force:.4f}" for force in value)
+    print(f"  {'reference, mesh size zero':34s} {forces} N")
+    print(f"  {'its error bar':34s} " + " ".join(f"±{part:.2%}" for part in bar))
+    for name, history in histories.items():
+        parts = (history.force_N - value) / value.max()
+        print(f"  {name + ', difference':34s} " + " ".join(f"{part:+.2%}" for part in parts))
+    curves = {name: (history.approach_mm, history.force_N) for name, history in histories.items()}
+    curves["reference"] = concurrent.approach_mm, value, found.error
+    return {"seed": seed, "curves": curves, **picture}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--seeds", type=int, nargs="*", default=[191, 192])
-    parser.add_argument("--edges", type=float, default=3.0)
-    parser.add_argument("--figure")
+    parser.add_argument("--edges", type=float, default=4.0)
+    parser.add_argument("--figure", type=Path)
     choice = parser.parse_args()
-    start = time.perf_counter()
-    added, flat = added_by_arm(), flat_body()
-    print(f"what the arm adds: {time.perf_counter() - start:.1f} s", flush=True)
-    for seed in choice.seeds:
-        finest = compare(seed, choice.edges, added, flat)
+    with tempfile.TemporaryDirectory() as folder:
+        foot = write_foot(Path(folder) / "foot.msh", EDGE)
+        for seed in choice.seeds:
+            last = compare(seed, choice.edges, foot)
+    if choice.figure:
+        draw(last, choice.figure)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ Run by hand: `.venv/bin/python tests/benchmarks/body_solvers.py [PART …] [--sc
 mpirun; ``--scale 2`` halves the cells. Every part is written by gmsh, read, assembled and solved to
 1e-8 under a load of all frequencies. Iterations with the options of the body and with PETSc's
 smoothed aggregation; times are CPU seconds of the slowest rank; memory is that of all ranks, per
-unknown, beyond what they had before. ``--steps 8`` presses the part instead, under a plane and one
+unknown, beyond what they had before each phase, and in the whole (once with ``--file`` to make the
+mesh, once more to measure). ``--steps 8`` presses the part instead, under a plane and one
 pointwise law, and prints the time of every phase.
 """
 
@@ -14,28 +15,31 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
 import ctypes
-import tempfile
+import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from body_meshes import HEIGHTS, Part, write_part
 from mpi4py import MPI
 from petsc4py import PETSc
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from machine_parts import STEEL, Part, part_body, read_part
+
 from geometry import PatchGrid
-from geometry.collective import on_root
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, LoadedFace, Material, compat
 from macro.linear_solvers.options import PREFIX
+from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import planar_face
-from macro.meshed_body import MeshedBody, Support
 
 COMM = MPI.COMM_WORLD
-STEEL, LINING, SOFT, RUBBERY = (
+LINING, SOFT, RUBBERY = (
     Material(young_modulus=modulus, poisson_ratio=ratio)
-    for modulus, ratio in ((210e3, 0.3), (5e3, 0.3), (500.0, 0.3), (500.0, 0.45))
+    for modulus, ratio in ((5e3, 0.3), (500.0, 0.3), (500.0, 0.45))
 )
 PARTS = {
     # part, element degree, material of the second volume, whether on rollers
@@ -70,6 +74,10 @@ class Law:
         return 2e4 * np.maximum(closure, 0.0)
 
 
+PEAKS = []
+"""Memory of every rank before every phase of a part, and the largest during it [B]."""
+
+
 def memory(*, restart=False):
     """Return the largest memory of all ranks together, since a restart [B]."""
     if restart:
@@ -86,19 +94,14 @@ def timed(work):
     began = time.process_time(), time.perf_counter()
     found = work()
     spent = time.process_time() - began[0], time.perf_counter() - began[1]
-    return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), memory() - before
+    largest = memory()
+    PEAKS.append((before, largest))
+    return found, *(COMM.allreduce(part, op=MPI.MAX) for part in spent), largest - before
 
 
-def body_of(tagged, degree, second, rollers):
-    """Return a part's body, clamped, or on rollers on three planes."""
-    names = tagged.facet_names
-    materials = dict(zip(sorted(tagged.cell_names.values()), (STEEL, second), strict=False))
-    held = [Support(tag=names["support"], displacement=(None if rollers else 0.0,) * 2 + (0.0,))]
-    if rollers:
-        held.append(Support(tag=names["x"], displacement=(0.0, None, None)))
-        held.append(Support(tag=names["y"], displacement=(None, 0.0, None)))
-    only = next(iter(materials.values()))
-    return MeshedBody(tagged, materials if len(materials) > 1 else only, held, order=degree)
+def whole_memory():
+    """Return the largest memory since the first phase, beyond what was there, per rank [B]."""
+    return np.max([largest for _, largest in PEAKS], axis=0) - PEAKS[0][0]
 
 
 def iterations(body, solver):
@@ -112,12 +115,12 @@ def iterations(body, solver):
     return solver.its if solver.reason > 0 else -1
 
 
-def solve(name, tagged, body, *, aggregation):
+def solve(name, body, *, aggregation):
     """Print one line of the table."""
     assembly = timed(lambda: body.stiffness)
     setup = timed(lambda: body.solver)
     run = timed(lambda: iterations(body, body.solver))
-    other = ""
+    other, whole = "", whole_memory()
     if aggregation:
         vars(body).pop("solver")
         PETSc.Options(PREFIX)["pc_type"] = "gamg"
@@ -126,7 +129,8 @@ def solve(name, tagged, body, *, aggregation):
         other = f"{third[0]:7d} {second[1]:7.2f} {third[1]:7.2f}"
         PETSc.Options(PREFIX).delValue("pc_type")
     if COMM.rank == 0:
-        sizes = " ".join(f"{part[3].sum() / body.dofs:6.0f}" for part in (assembly, setup))
+        used = (assembly[3], setup[3], whole)
+        sizes = " ".join(f"{part.sum() / body.dofs:6.0f}" for part in used)
         print(
             f"{name:22s} {body.dofs:8d} {run[0]:6d} {setup[1]:7.2f} {run[1]:7.2f}   {sizes}{other}",
             flush=True,
@@ -135,7 +139,8 @@ def solve(name, tagged, body, *, aggregation):
 
 def press(name, tagged, body, steps):
     """Press the part step by step, and print the time and memory of every phase."""
-    face = planar_face(tagged, tagged.facet_names["contact"])
+    tag = tagged.facet_names["contact"]
+    face, facets = planar_face(tagged, tag), tagged.facet_tags.find(tag)
 
     def solved():
         for step in range(1, steps + 1):
@@ -145,18 +150,23 @@ def press(name, tagged, body, steps):
     patches = PatchGrid(grid=(1, 1), lengths=face.lengths)
     problem, *spent = timed(
         lambda: LawContactProblem(
-            LoadedFace(body, face.facets_of(body), face.frame, patches), [Law()], "pointwise"
+            LoadedFace(body, contact_facets(tagged.mesh, facets, face.frame), patches),
+            [Law()],
+            "pointwise",
         )
     )
     lines.append(("law on the face", (None, *spent)))
     states, *spent = timed(lambda: list(solved()))
     lines.append((f"{steps} load steps", (None, *spent)))
+    whole = whole_memory()
     if COMM.rank == 0:
         print(f"{name}, {body.dofs} unknowns")
         for phase, (_, cpu, wall, used) in lines:
             print(f"  {phase:16s} {cpu:7.2f} s CPU {wall:7.2f} s   {used / 1e9} GB")
-        print("  Newton", [s.newton_iterations for s in states],
-              "linear", [s.linear_iterations for s in states], "force", states[-1].force)  # fmt: skip
+        newton = [state.newton_iterations for state in states]
+        linear = [state.linear_iterations for state in states]
+        print(f"  whole {whole / 1e9} GB, {whole.sum() / body.dofs:.0f} B per unknown")
+        print(f"  Newton {newton}, linear {linear}, force {states[-1].force:.3f} N")
 
 
 def main():
@@ -165,24 +175,27 @@ def main():
     parser.add_argument("--scale", type=float, default=1.0)
     parser.add_argument("--steps", type=int, default=0)
     parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
+    parser.add_argument("--file", help="keep the mesh here, or take it: memory without gmsh's")
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
-        print("part                   unknowns  iter. set-up[s] solve[s]  matrix, set-up [B]   GAMG")
+        print(
+            "part                   unknowns  iter. set-up[s] solve[s]  "
+            "matrix, set-up, whole [B]   GAMG"
+        )
     for name in choice.parts or PARTS:
+        PEAKS.clear()
         part, *rest = PARTS[name]
-        part = Part(name=part.name, cells=part.cells, size=part.size / choice.scale, flat=part.flat)
-        with tempfile.TemporaryDirectory() as folder:
-            path = COMM.bcast(Path(folder) / "part.msh")
-            on_root(COMM, lambda part=part, path=path: write_part(part, path))
-            tagged, cpu, wall, used = timed(lambda path=path: read_mesh(path, COMM))
-            COMM.Barrier()
+        part = replace(part, size=part.size / choice.scale, fast=part.cells == "tet")
+        tagged, cpu, wall, used = read_part(
+            part, COMM, lambda path, comm: timed(lambda: read_mesh(path, comm)), choice.file
+        )
         if COMM.rank == 0:
-            print(f"# {name}: read in {wall:.1f} s, {used / 1e9} GB", flush=True)
-        body = body_of(tagged, *rest)
+            print(f"# {name}: read in {cpu:.1f} s CPU, {wall:.1f} s, {used / 1e9} GB", flush=True)
+        body = part_body(tagged, *rest)
         if choice.steps:
             press(name, tagged, body, choice.steps)
         else:
-            solve(name, tagged, body, aggregation=choice.aggregation)
+            solve(name, body, aggregation=choice.aggregation)
         compat.collect_garbage(PETSc.COMM_WORLD)
 
 

@@ -19,8 +19,8 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "geometry": [
-        "blocked_spline collective errors legendre_modes slope_search",
-        "checks interpolant materials missing regions",
+        "blocked_spline cores errors legendre_modes slope_search",
+        "checks collective interpolant materials missing regions",
         "face_frame filters spectrum surface",
         "facing mirroring patches statistics summits synthesis",
         "plausibility preparation rigid_plane",

@@ -1,9 +1,15 @@
 """Solve blocks on all ranks and print iterations and norms as JSON; for test_multigrid_ranks.py."""
 
 import json
+import sys
+from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from machine_parts import Part, part_body, read_part
 
 from geometry import BlockShape, RefinedShape
 from macro import Block, Material, block_mesh
@@ -24,6 +30,17 @@ CASES = {
     "refined": {"fine": 0.08, "element": "P2"},
     "refined, linear": {"fine": 0.05, "element": "P1"},
     "refined, incompressible": {"fine": 0.1, "element": "P2", "poisson_ratio": 0.4999},
+}
+
+
+SOFT = Material(young_modulus=500.0, poisson_ratio=0.3)
+PARTS = {
+    "part, linear": ({"name": "pad", "cells": "tet", "size": 5.0}, {"second": SOFT}),
+    "part, quadratic": ({"name": "pad", "cells": "tet", "size": 9.0}, {"degree": 2}),
+    "part, hexahedra": ({"name": "pad", "cells": "hex", "size": 6.0}, {"rollers": True}),
+    "part, quadratic hexahedra": ({"name": "pad", "cells": "hex", "size": 9.0}, {"degree": 2}),
+    # flat cells; few of them on every rank
+    "part, flat": ({"name": "ring", "cells": "layers", "size": 2.0, "flat": 8.0}, {}),
 }
 
 
@@ -54,6 +71,11 @@ def run(case):
     shape = RefinedShape(**CUBE, **CENTRE, **content) if refined else BlockShape(**CUBE, **content)
     material = Material(young_modulus=4000.0, poisson_ratio=ratio)
     block = Block(block_mesh(shape, COMM), material, "roller")
+    return solved(block) | {"missed": missed(block)}
+
+
+def solved(block):
+    """Return the displacements' norm under unit forces, iterations and preconditioner."""
     load = block.stiffness.createVecRight()
     load.set(1.0)
     load.pointwiseMult(load, block.free)
@@ -63,11 +85,12 @@ def run(case):
         "norm": found.norm(),
         "iterations": block.solver.its,
         "preconditioner": block.solver.pc.getType(),
-        "missed": missed(block),
     }
 
 
 if __name__ == "__main__":
     result = {name: run(case) for name, case in CASES.items()}
+    for name, (part, options) in PARTS.items():
+        result[name] = solved(part_body(read_part(Part(**part), COMM), **options))
     if COMM.rank == 0:
         print(json.dumps(result))

@@ -174,16 +174,26 @@ def test_a_moved_support_is_an_approach(folder):
     assert forces(found) == pytest.approx(forces(still), rel=1e-9)
 
 
-def test_a_crown_is_a_gap_of_the_face(folder, tmp_path):
+def test_a_crown_is_a_gap_of_the_face(folder):
     """The same parabola as a key, and as nodes of the mesh that lie lower."""
-    sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
-    load = {"approach": "6 um", "steps": 1}
-    crowned = {**sections, "law": {"kind": "representative", "crown": ["0.1 m", "inf"]}}
-    flat = done(**sections, body=body(folder), load=load)
-    found = done(**crowned, body=body(folder), load=load)
-    assert forces(found) < 0.95 * forces(flat)
-    half = 0.5 * np.array([step.approach_mm for step in found.steps])
-    assert found.coupling is not None and half > 0.0
+    ticks = np.linspace(0, 1, 21), *TICKS[1:]
+    write_box(folder / "fine.msh", ticks)
+    write_box(folder / "crowned.msh", ticks, crown=1e-2)
+    sections = {"surface": SAMPLE, "output": QUIET, "load": {"approach": "6 um", "steps": 1}}
+    law, crowned = {"kind": "representative"}, body(folder, "crowned")
+    flat = done(**sections, law=law, body=body(folder, "fine"))
+    key = done(
+        **sections,
+        law={**law, "crown": ["0.1 m", "inf"]},
+        body=body(folder, "fine"),
+        table=flat.table,
+    )
+    found = done(**sections, law=law, body=crowned, table=flat.table)
+    assert forces(found)[-1] < 0.95 * forces(flat)[-1]
+    assert forces(found) == pytest.approx(forces(key), rel=2e-3)  # chords of the parabola
+    assert "below its highest point" in found.setup.face.notes[0]
+    with pytest.raises(InputError, match=r"is not planar: its nodes are up to 0\.000625 mm off"):
+        Run(Scene.from_dict({**PATCHES, "body": crowned}))
 
 
 REFUSED = {
@@ -217,3 +227,40 @@ def test_faces_that_do_not_face_each_other_are_refused(folder):
     upside = body(folder, "above", contact="left", supports=[{"surface": "top"}])
     with pytest.raises(InputError, match=r"counter_body.contact: does not face the body"):
         Run(Scene.from_dict({**PATCHES, "body": body(folder), "counter_body": upside}))
+
+
+SMALL = BlockShape(interface=(1.0, 1.0), height=HEIGHT, cells=(4, 4, 3))
+CONTACT = {**PATCHES, "load": {"approach": "6 um", "steps": 1, "tilt": [1e-3, 2e-3]}}
+TABLE = {"table_tolerance": 5e-3}
+
+
+@pytest.fixture(scope="module")
+def small(folder):
+    """Folder with a cube of few cells, and its mirror image above it."""
+    x, y, z = SMALL.ticks
+    write_box(folder / "small.msh", SMALL.ticks)
+    write_box(folder / "small_above.msh", (x, y, -z[::-1]))
+    return folder
+
+
+@pytest.mark.long  # quadratic elements of the body, for every mode
+def test_contact_problems_know_the_mesh(small):
+    concurrent, sections = {"coupling": {"kind": "concurrent"}}, {"body": body(small, "small")}
+    expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
+    found = forces(done(**CONTACT, **concurrent, **sections))
+    assert found == pytest.approx(expected, rel=2e-3)  # four quadratic elements along a side
+    for way in WAYS.values():
+        coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
+        laws = forces(done(**CONTACT, **coupling, **sections))
+        assert laws == pytest.approx(found, rel=3e-3)  # between the rows of the laws
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", ["concurrent", "consistent"])
+def test_contact_problems_know_both_meshes(small, kind):
+    coupling = {"coupling": {"kind": kind, **(TABLE if kind == "consistent" else {})}}
+    one = done(**CONTACT, **coupling, body=body(small, "small", young_modulus=0.5 * E))
+    other = above(small)
+    other["mesh"] = str(small / "small_above.msh")
+    two = done(**CONTACT, **coupling, body=body(small, "small"), counter_body=other)
+    assert forces(two) == pytest.approx(forces(one), rel=1e-8)

@@ -1,5 +1,7 @@
 """Rough interfaces in problems that a user writes in dolfinx, against blocks and closed forms."""
 
+import tomllib
+
 import numpy as np
 import pytest
 import ufl
@@ -8,6 +10,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.optimize import brentq
+from small_scene import SMALL_SCENE
 from user_problems import (
     BOTTOM,
     HEXAHEDRA,
@@ -35,6 +38,7 @@ from macro import (
     block_mesh,
     compat,
 )
+from multiscale import Run, Scene, run
 
 EXACT = {"ksp_rtol": 1e-13, "snes_rtol": 1e-13}
 TILTED = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3), centre=(0.5, 0.5))
@@ -71,6 +75,29 @@ def test_the_papers_cube_as_user_code_is_the_block(element, mode):
         np.testing.assert_allclose(rough.plane.tilt, state.tilt, rtol=1e-7, atol=1e-12)
         np.testing.assert_allclose(rough.moment, state.moment, atol=1e-9)
         assert user.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
+
+
+def test_a_law_table_gives_the_force_of_its_scene():
+    """The small scene's block and patch laws, as user code that reads the table."""
+    scene = Scene.from_dict(tomllib.loads(SMALL_SCENE)).with_(
+        {
+            "coupling": {"kind": "isolated", "newton": "full"},
+            "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [4, 8, 3]},
+        }
+    )
+    table, history = Run(scene).make_laws(), run(scene)
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 8, 3))
+    mesh = block_mesh(shape, MPI.COMM_SELF)
+    space = compat.vector_space(mesh.mesh, 1)
+    u = fem.Function(space)
+    rough = Interface(space, mesh.facet_tags, 2, laws=table, indenter=RigidPlane(approach=4e-3))
+    support = clamped(space, mesh.facet_tags, tag=1)
+    problem = ContactProblem(elastic(u, degree=2), u, [support], rough)
+    for step in history:
+        rough.indenter = RigidPlane(approach=step.approach_mm)
+        problem.solve()
+        assert rough.force == pytest.approx(step.force_N, rel=1e-9)
+        assert rough.area == pytest.approx(step.contact_area_fraction, rel=1e-8)
 
 
 def turned(angles=(0.4, -1.1, 2.0)):

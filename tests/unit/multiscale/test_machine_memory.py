@@ -21,7 +21,7 @@ from multiscale.machine import (
     memory_of_this_node,
 )
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.setup.memory import check_memory, memory_requests
+from multiscale.setup.memory import body_request, check_memory, memory_requests
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB
@@ -255,3 +255,19 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     monkeypatch.setattr("multiscale.cli.describe.print_schema", hungry)
     assert main(["schema"]) == 5
     assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("element", "unknowns", "measured"),
+    # brake pads, tests/benchmarks/body_solvers.py, with what eight load steps took besides
+    [("P1", 250_920, 2347 + 362), ("P2", 4_906_221, 2292 + 362)],
+)
+def test_bodies_take_what_their_request_says(element, unknowns, measured):
+    said = body_request("body", element, unknowns, 8)
+    assert unknowns * measured <= said.total <= 1.5 * unknowns * measured
+    assert said.sentence.startswith("the mesh of [body], its stiffness and multigrid, needs about")
+
+
+def test_earlier_states_are_kept_up_to_a_number():
+    one, many, more = (body_request("body", "Q1", 1000, steps).total for steps in (1, 32, 500))
+    assert one < many == more

@@ -1,5 +1,7 @@
 """Interfaces in a user's problem: what they accept and refuse, tangents, options, failures."""
 
+import gc
+import weakref
 from dataclasses import dataclass
 from types import SimpleNamespace
 
@@ -279,6 +281,37 @@ def test_linear_bodies_keep_their_matrix(body, monkeypatch):
         problem.solve()
     assert made == []
     assert not PETSc.Options().getAll().keys() & {"patchlaw_pc_type"}
+
+
+@pytest.mark.parametrize("in_matrix", [False, True])
+def test_law_a_hundred_thousand_times_as_stiff_as_the_body(body, in_matrix):
+    """The preconditioner smooths with the body's matrix alone, and stays definite."""
+    space, u = body.space, fem.Function(body.space)
+    rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e8), indenter=RigidPlane(approach=8e-3))
+    problem = ContactProblem(
+        elastic(u),
+        u,
+        [clamped(space, body.tags)],
+        rough,
+        petsc_options={"pc_type": "gamg"},
+        in_matrix=in_matrix,
+    )
+    assert problem.solve() < 15
+    assert problem.reaction()[2] == pytest.approx(rough.force, rel=1e-8)
+    rough.indenter = Control(force=10.0, tilt=None)  # whose tangent cannot be assembled
+    problem.solve()
+    assert rough.force == pytest.approx(10.0, rel=1e-9)
+
+
+def test_problems_are_freed(body):
+    space, u = body.space, fem.Function(body.space)
+    rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
+    problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    problem.solve()
+    kept = weakref.ref(problem), weakref.ref(rough)
+    del problem, rough
+    gc.collect()
+    assert [each() for each in kept] == [None, None]
 
 
 def test_callables_are_what_the_package_of_external_operators_asks_for(body):

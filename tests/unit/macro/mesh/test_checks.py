@@ -110,7 +110,10 @@ def test_many_parts_are_shortened():
         ((0.1, 0.05, 0.015), '0.1 × 0.05 × 0.015 mm large; is its unit right? (mesh_unit = "m"?)'),
         ((1.0, 1.0, 1.0), None),
         ((120.0, 50.0, 15.0), None),
-        ((1e5, 5e4, 2e4), '1e+05 × 5e+04 × 2e+04 mm large; is its unit right? (mesh_unit = "um"?)'),
+        (
+            (1e5, 5e4, 2e4),
+            '1e+05 × 5e+04 × 2e+04 mm large; is its unit right? (mesh_unit = "mm" or "um"?)',
+        ),
     ],
 )
 def test_size_is_noted_where_the_unit_may_be_wrong(lengths, note):

@@ -8,7 +8,13 @@ from free_side_points import side_displacements
 
 from geometry import Surface, UnevenPartition
 from geometry.errors import InputError
-from micro import FreeSides, HalfSpaceModel
+from micro import (
+    FreeSides,
+    HalfSpaceModel,
+    side_modes,
+    side_stress_modes,
+    side_stresses,
+)
 from micro.compliance.grid_compliance import Compliance
 from micro.compliance.half_space_grid import Cells
 from micro.compliance.side_cells import side_cells
@@ -116,3 +122,29 @@ def test_sides_of_another_surface_are_refused():
     periodic = replace(surface, periodic=True)
     with pytest.raises(InputError, match="a periodic half-space has no free sides"):
         HalfSpaceModel(surface=periodic, contact_modulus=1.0, periodic=True, sides=SIDES)
+
+
+def test_sides_add_up():
+    """Each of the four alone, and all: displacements of cells, of patches, in modes; stresses."""
+    patches = UnevenPartition(ticks_x=(0.0, 0.3, 1.0), ticks_y=(0.0, 0.5, 1.5))
+    single = [replace(SIDES, present=tuple((np.arange(4) == k).tolist())) for k in range(4)]
+    pressure = random(8)
+    for evaluate in (
+        lambda sides: whole(side_cells(sides, SPACING), pressure),
+        lambda sides: side_stresses(sides, SPACING).stresses(pressure),
+        lambda sides: sides.patch_compliance(patches),
+        lambda sides: side_modes(sides, 3),
+        lambda sides: side_stress_modes(sides, 3),
+    ):
+        found = evaluate(SIDES)
+        scale = np.abs(found).max()
+        np.testing.assert_allclose(sum(map(evaluate, single)), found, atol=1e-11 * scale)
+
+
+def test_a_single_side_adds_nothing_far_from_it():
+    low = side_cells(replace(SIDES, present=(True, False, False, False)), SPACING)
+    pressure = np.zeros(GRID)
+    pressure[0] = 1.0
+    displaced = whole(low, pressure)
+    assert np.abs(displaced[-1]).max() < 0.1 * np.abs(displaced[0]).max()
+    np.testing.assert_allclose(whole(low, pressure[::-1])[0], displaced[-1], rtol=1e-8)

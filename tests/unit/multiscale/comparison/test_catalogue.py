@@ -212,3 +212,23 @@ def test_references_that_fit_no_memory_are_told(monkeypatch):
     assert "reference, 3 meshes, 7.37 µm" in refused
     assert all(name.startswith("reference") for name in refused)
     assert all("GB of memory" in text for text in refused.values())
+
+
+def test_two_bodies_are_compared_without_meshed_roughness():
+    surface = {
+        "spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3},
+        "grid": [16, 16],
+        "lengths": [1, 1],
+    }
+    elastic = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
+    scene = Scene.from_dict(
+        {
+            "surface": surface,
+            "counter_surface": surface,
+            "block": elastic,
+            "counter_body": elastic,
+            "load": {"approach": "4 um", "steps": 2},
+        }
+    )
+    kinds = {one.kind for one in configurations(scene)}
+    assert kinds == {"analytic", "concurrent", "consistent", "isolated"}

@@ -156,6 +156,14 @@ def test_a_law_that_ends_before_first_touch_is_open():
             {"make_model": lambda surface: HalfSpaceModel(surface, contact_modulus=MODULUS)},
             "a representative law needs periodic models",
         ),
+        (
+            {
+                "make_model": lambda surface: HalfSpaceModel(
+                    surface, contact_modulus=MODULUS, periodic=True, upper=100.0
+                )
+            },
+            "a representative law needs models without a bound",
+        ),
     ],
 )
 def test_bad_input_is_refused(change, message):
@@ -224,7 +232,8 @@ def test_regions_are_exported_by_name(table):
 
 def test_a_report_says_how_samples_scatter(table):
     (note,) = [one for one in table.notes(1e-3) if "scatters" in one]
-    assert note.startswith("outer ring: where the mean pressure is")
+    assert note.startswith("outer ring: the pressure of single samples scatters about that")
+    assert note.count(" MPa (") == 3
 
 
 @pytest.mark.parametrize("names", [(), ("a", "a"), ("a", "")])

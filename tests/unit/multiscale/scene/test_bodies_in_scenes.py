@@ -118,6 +118,14 @@ REFUSED = {
         {"body": {**BODY, "place": [0, 0]}, **REPRESENTATIVE},
         "body.place: does not go with law.kind = 'representative'",
     ),
+    "spots of a sample": (
+        {"body": BODY, "output": {"contact": "last"}, **REPRESENTATIVE},
+        "output.contact: does not go with law.kind = 'representative', which has no spots",
+    ),
+    "accuracy on a mesh": (
+        {"body": BODY, "accuracy": 0.02},
+        "accuracy: is not kept on [body], nor are surface.grid or coupling.kind chosen there",
+    ),
     "seeds of a file": (
         {
             "body": BODY,
@@ -145,3 +153,18 @@ REFUSED = {
 def test_what_makes_no_sense_is_refused(sections, text):
     with pytest.raises(InputError, match=re.escape(text)):
         scene(**sections)
+
+
+@pytest.mark.parametrize("exclude_none", [False, True])
+@pytest.mark.parametrize(
+    "sections",
+    [
+        {"counter_body": STEEL, "counter_surface": SURFACE},
+        {"body": BODY, "counter_body": BODY},
+        {"body": BODY, "law": {"kind": "representative", "seeds": [1]}},
+    ],
+)
+def test_scenes_are_read_back_as_they_are_written(sections, exclude_none):
+    given = scene(**sections)
+    dumped = given.model_dump(by_alias=True, mode="json", exclude_none=exclude_none)
+    assert Scene.from_dict(dumped) == given

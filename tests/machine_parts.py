@@ -1,4 +1,4 @@
-"""Meshes of machine parts in gmsh's files for `body_solvers.py`.
+"""Machine parts as bodies on meshes in gmsh's files, for tests and benchmarks of solvers.
 
 ``hex`` and ``layers`` are outlines that are extruded, layer by layer, into hexahedra or into
 tetrahedra, and layers can be flatter than they are wide; ``tet`` fills the volumes with tetrahedra
@@ -6,11 +6,18 @@ of one length. Volumes are named by numbers from the support up; surfaces are ``
 ``contact`` (the top) and, where the part has such planes, ``x`` and ``y`` (x = 0, y = 0).
 """
 
+import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from geometry.collective import on_root
 from geometry.meshes.gmsh_session import gmsh_session
+from macro import Material, MeshedBody, Support
+from macro.mesh.from_file import read_mesh
+
+STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 
 HEIGHTS = {"pad": (5.0, 12.0), "flange": (12.0,), "ring": (0.8,), "L": (20.0,)}
 """Heights of the volumes of a part [mm]."""
@@ -30,12 +37,42 @@ class Part:
         cells: ``"hex"``, ``"layers"`` or ``"tet"``.
         size: Length of the cells in the plane [mm].
         flat: Their length over their height; 1 for ``"tet"``.
+        fast: Whether gmsh's fastest algorithm makes them, not always the same ones.
     """
 
     name: str
     cells: str
     size: float
     flat: float = 1.0
+    fast: bool = False
+
+
+def read_part(part, comm, reading=read_mesh, file=None):
+    """Mesh a part on rank 0, and read its file on all ranks; a file that exists is taken."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = comm.bcast(Path(folder) / "part.msh" if file is None else Path(file))
+        on_root(comm, lambda: path.exists() or write_part(part, path))
+        found = reading(path, comm)
+        comm.Barrier()
+    return found
+
+
+def part_body(tagged, degree=1, second=STEEL, rollers=False):
+    """Return a part of steel, clamped on its support, or on rollers on three planes.
+
+    Args:
+        tagged: Its mesh.
+        degree: Degree of the displacements.
+        second: Material of the second volume, such as the lining of a pad.
+        rollers: Whether only normal displacements are held, on the support and where x, y = 0.
+    """
+    names = tagged.facet_names
+    materials = dict(zip(sorted(tagged.cell_names.values()), (STEEL, second), strict=False))
+    held = [Support(tag=names["support"], displacement=(None if rollers else 0.0,) * 2 + (0.0,))]
+    if rollers:
+        held.append(Support(tag=names["x"], displacement=(0.0, None, None)))
+        held.append(Support(tag=names["y"], displacement=(None, 0.0, None)))
+    return MeshedBody(tagged, materials if len(materials) > 1 else STEEL, held, order=degree)
 
 
 def write_part(part, path):
@@ -93,7 +130,8 @@ def _set_sizes(gmsh, part):
     for name, value in {
         "Mesh.MeshSizeMax": part.size,
         "Mesh.MeshSizeMin": part.size,
-        "Mesh.Algorithm3D": 10 if part.cells == "tet" else 1,
+        "Mesh.RecombinationAlgorithm": 3,  # no triangle is left
+        "Mesh.Algorithm3D": 10 if part.fast else 1,
     }.items():
         gmsh.option.setNumber(name, value)
     if part.cells == "hex":

@@ -1,0 +1,96 @@
+"""Preconditioner of bodies under contact laws: with the stiffness of the laws where that matters.
+
+The preconditioner of the body alone serves every tangent as long as the laws are softer than the
+elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of: iterations
+grow to ten times as many and more. Laws at points couple no other nodes
+than the elements do, so that their stiffness fits into the matrix, and multigrid is set up with it.
+
+Theory: section 11 of ``demos/theory.md``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from macro import compat
+from macro.contact.equilibrium import Equilibrium
+from macro.contact.loaded_face import LoadedFace
+from macro.meshed_body import MeshedBody
+
+Array = NDArray[np.float64]
+
+_STIFF = 1.0
+"""Stiffness of laws over that of the elements, at the node where it is largest, from which on the
+preconditioner has it."""
+_MOVED = 0.5
+"""Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
+"""
+
+
+class ContactPreconditioner:
+    """The preconditioner of a body's tangents.
+
+    Args:
+        equilibrium: The equations.
+        face: The contact face that laws stand on at points; None for other laws. Only those on the
+            face of one meshed body enter the matrix.
+        solver: Linear solver of the body alone.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(self, equilibrium: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
+        self._equilibrium, self._face, self._alone = equilibrium, face, solver
+        body = equilibrium.body
+        self._body: MeshedBody | None = None
+        if isinstance(face, LoadedFace) and isinstance(body, MeshedBody):
+            self._body = body
+        self._with_laws: PETSc.KSP | None = None
+        self._slope: Array | None = None
+
+    def update(self) -> None:
+        """Follow the tangent, where the laws are stiff."""
+        body, slope = self._body, self._equilibrium.forces.slope
+        if body is None:
+            return
+        comm = self._face.comm
+        if self._slope is not None:
+            both = (np.abs(slope - self._slope).max(initial=0.0), slope.max(initial=0.0))
+            change, largest = comm.allreduce(np.array(both), op=MPI.MAX)
+            if change <= _MOVED * largest:
+                return
+        springs = self._springs(slope)
+        ratio = springs.getDiagonal()
+        ratio.pointwiseDivide(ratio, body.stiffness.getDiagonal())
+        self._slope = slope.copy()
+        if self._with_laws is not None:
+            self._with_laws.destroy()
+            self._with_laws = None
+        if ratio.max()[1] > _STIFF:
+            matrix = body.stiffness.copy()
+            matrix.axpy(1.0, springs, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+            matrix.setNearNullSpace(body.stiffness.getNearNullSpace())
+            self._with_laws = body.solver_of(matrix)
+        springs.destroy()
+        compat.collect_garbage(body.stiffness.comm)
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write y for x; PETSc calls this."""
+        (self._with_laws or self._alone).pc.apply(x, y)
+
+    def _springs(self, slope: Array) -> PETSc.Mat:
+        """Return the stiffness B diag(p'/w) Bᵀ of the laws."""
+        points = self._face.points_by_dofs
+        scale = points.createVecLeft()
+        scale.array[:] = slope
+        scaled = points.copy()
+        scaled.diagonalScale(scale)
+        springs = points.transposeMatMult(scaled)
+        scaled.destroy()
+        return springs

@@ -1,0 +1,49 @@
+"""Forces of scenes on bodies from meshes, printed by rank 0; run under mpirun with a folder."""
+
+import json
+import sys
+from pathlib import Path
+
+from mpi4py import MPI
+
+from multiscale import Scene
+from multiscale.run import Run
+
+SURFACE = {
+    "spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3},
+    "grid": [16, 16],
+}
+CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
+QUIET = {"figures": False, "report": False, "check": "none", "contact": "none"}
+
+
+def sections(folder):
+    """Yield the sections of scenes by name."""
+    body = {"mesh": f"{folder}/cube.msh", "contact": "top", "supports": [{"surface": "bottom"}]}
+    above = {"mesh": f"{folder}/above.msh", "contact": "bottom", "supports": [{"surface": "top"}]}
+    body, above = body | CONSTANTS, above | CONSTANTS
+    whole = {"surface": {**SURFACE, "lengths": [1, 1]}, "patches": {"grid": [2, 2]}}
+    whole |= {"micro": {"finite_slopes": False}, "body": body, "output": QUIET}
+    whole |= {"load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]}}
+    for name, way in (("full", {"newton": "full"}), ("points", {"interface": "pointwise"})):
+        coupling = {"kind": "consistent", "table_tolerance": 5e-3, **way}
+        yield name, {**whole, "coupling": coupling}
+    sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
+    load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
+    yield "sample", {**sample, **load, "body": body, "output": QUIET}
+    yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": QUIET}
+
+
+def main(folder):
+    """Run all scenes and print their last forces and approaches."""
+    comm, found = MPI.COMM_WORLD, {}
+    for name, content in sections(folder):
+        run = Run(Scene.from_dict(content), comm)
+        list(run.load_steps())
+        found[name] = run.steps[-1].force_N, run.steps[-1].approach_mm
+        run.close()
+    if comm.rank == 0:
+        print(json.dumps(found))
+
+
+main(Path(sys.argv[1]))

@@ -1,0 +1,16 @@
+"""A foot that is meshed with its roughness gives the same contact on 1, 2 and 3 ranks."""
+
+import numpy as np
+import pytest
+from on_ranks import OnRanks
+
+
+@pytest.mark.long
+def test_contact_of_a_foot_does_not_depend_on_the_ranks(mpirun):
+    found = OnRanks(mpirun, "rough_face_script.py")
+    for ranks in (2, 3):
+        assert found[ranks]["nodes"] == found[1]["nodes"]
+        assert min(found[1]["nodes"]) > 0
+        for name in ("force", "moment", "area", "largest"):
+            np.testing.assert_allclose(found[ranks][name], found[1][name], rtol=1e-8, atol=1e-9)
+        assert np.abs(found[ranks]["balance"]).max() < 1e-8

@@ -1,0 +1,52 @@
+"""Laws much stiffer than the elements under them take no more linear iterations than soft ones."""
+
+import numpy as np
+import pytest
+from body_meshes import box, standing
+
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, Material
+
+WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
+
+
+class Square:
+    """A law p = k c²."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def pressure(self, closure):
+        return self.k * np.maximum(closure, 0.0) ** 2
+
+    def stiffness(self, closure):
+        return 2.0 * self.k * np.maximum(closure, 0.0)
+
+
+def pressed(cell, order, k):
+    """Return iterations per Newton step, and the state, under a crowned face."""
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (6, 6, 3), cell), SOFT, WHOLE, order)
+    crown = lambda x, y: 2e-3 * ((x - 0.5) ** 2 + (y - 0.5) ** 2)  # noqa: E731
+    problem = LawContactProblem(face, [Square(k)], "pointwise", crown=crown)
+    state = problem.solve(Control(approach=1e-3))
+    return state.linear_iterations / state.newton_iterations, state
+
+
+@pytest.mark.parametrize(
+    ("cell", "order"), [("tetrahedron", 1), ("hexahedron", 1), ("tetrahedron", 2)]
+)
+def test_stiff_laws_cost_no_more_iterations(cell, order):
+    soft, _ = pressed(cell, order, 1e5)
+    stiff, state = pressed(cell, order, 1e10)
+    assert stiff <= soft + 3.0
+    assert state.reaction == pytest.approx(state.force, rel=1e-7)
+
+
+def test_the_answer_does_not_depend_on_the_preconditioner(monkeypatch):
+    _, with_laws = pressed("tetrahedron", 1, 1e9)
+    monkeypatch.setattr("macro.contact.stiff_contact._STIFF", np.inf)
+    alone, without = pressed("tetrahedron", 1, 1e9)
+    assert with_laws.force == pytest.approx(without.force, rel=1e-8)
+    assert alone > 6.0

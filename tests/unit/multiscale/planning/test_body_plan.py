@@ -1,0 +1,66 @@
+"""What a plan says of bodies on meshes and of laws of samples."""
+
+import pytest
+from box_msh import write_box
+
+from geometry import BlockShape
+from multiscale import Scene
+from multiscale.planning.costs import predicted_cost, run_memory_requests
+from multiscale.planning.plan import statements, warnings
+from multiscale.planning.set_up import set_up
+
+TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
+SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
+SURFACE = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [0.5, 0.5]}
+HALF_SPACE = {"young_modulus": "100 GPa", "poisson_ratio": 0.3}
+SAMPLES = {"law": {"kind": "representative", "seeds": [1, 2]}}
+
+
+@pytest.fixture(scope="module")
+def mesh(tmp_path_factory):
+    """A cube as a file."""
+    return write_box(tmp_path_factory.mktemp("mesh") / "cube.msh", TICKS)
+
+
+def setup_of(mesh, **sections):
+    body = {"mesh": str(mesh), "contact": "top", "supports": [{"surface": "bottom"}]}
+    data = {
+        "surface": SURFACE,
+        "body": {**body, "young_modulus": "4 GPa", "poisson_ratio": 0.48},
+        "load": {"force": "2 N", "steps": 2},
+    }
+    return set_up(Scene.from_dict(data | sections), None)
+
+
+def test_a_plan_says_size_faces_and_body_term(mesh):
+    setup = setup_of(mesh, coupling={"kind": "consistent"})
+    cost = predicted_cost(setup)
+    said = dict(statements(setup, cost))
+    assert "18 hexahedra (linear), 144 unknowns, contact face of 1 mm²" in said["body"]
+    assert "the body lies below the plane of its contact face" in said["body term"]
+    assert "E = 4 GPa, ν = 0.48" in said["inputs"] and "body 1 mm high" in said["inputs"]
+    assert cost.total > 0.0
+    assert [one.key for one in run_memory_requests(setup)].count("body.mesh") == 1
+    assert any("linear elements lock" in warning for warning in warnings(setup))
+
+
+def test_a_plan_says_what_samples_there_are(mesh):
+    setup = setup_of(mesh, counter_body=HALF_SPACE, **SAMPLES)
+    said = dict(statements(setup))
+    assert "top: 2 periodic samples of 500 µm × 500 µm" in said["coupling"]
+    assert "laws of samples hold at the points of the mesh" in said["newton"]
+    assert "half-space with E = 100 GPa" in said["inputs"]
+    told = "; ".join(warnings(setup))
+    assert "a sample stands for faces that are much larger" in told
+    assert "the half-space of the counter-body gives way on the scale of the sample alone" in told
+    measured = {**SURFACE, "detrend": "plane"}
+    told = "; ".join(warnings(setup_of(mesh, surface=measured, **SAMPLES)))
+    assert "do not continue periodically: their sample is four mirror images" in told
+
+
+def test_surfaces_lie_in_the_middle_of_a_face_or_where_the_scene_says(mesh):
+    centred = setup_of(mesh).bodies.first.frame
+    assert centred.origin.tolist() == pytest.approx([0.25, 0.25, 0.0], abs=1e-12)
+    body = {"mesh": str(mesh), "contact": 1, "supports": [{"surface": 2}], "place": ["0.5 mm", 0]}
+    moved = setup_of(mesh, body={**body, **HALF_SPACE}).bodies.first.frame
+    assert moved.origin.tolist() == pytest.approx([0.5, 0.0, 0.0], abs=1e-12)

@@ -1,0 +1,51 @@
+"""Runs on bodies from meshes that go on: with the same results, and not with another mesh."""
+
+import pytest
+from box_msh import write_box
+
+from geometry import BlockShape, InputError
+from multiscale import Scene
+from multiscale.restart.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
+from multiscale.restart.results_folder import find_checkpoint, go_on
+from multiscale.run import Run
+
+TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
+
+
+def scene_on(mesh):
+    spectrum = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
+    return Scene.from_dict(
+        {
+            "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [0.1, 0.1]},
+            "law": {"kind": "representative"},
+            "body": {
+                "mesh": str(mesh),
+                "contact": "top",
+                "supports": [{"surface": "bottom"}],
+                "young_modulus": "4 GPa",
+                "poisson_ratio": 0.15,
+            },
+            "load": {"force": "2 N", "steps": 3},
+        }
+    )
+
+
+def test_a_run_goes_on_with_the_same_mesh_alone(tmp_path):
+    mesh, folder = write_box(tmp_path / "cube.msh", TICKS), tmp_path / "results"
+    folder.mkdir()
+    scene = scene_on(mesh)
+    first = Run(scene)
+    steps = first.load_steps()
+    next(steps)
+    write_checkpoint(folder / FILE_NAME, checkpoint_of(first, first.state()))
+    whole = [first.steps[0].approach_mm, *(step.approach_mm for step in steps)]
+
+    write_box(mesh, (*TICKS[:2], 1.1 * TICKS[2]))
+    with pytest.raises(InputError, match=r"body.mesh.*the meshes are not those that the run in"):
+        go_on(Run(scene), find_checkpoint(folder, scene), folder)
+    write_box(mesh, TICKS)
+    again = Run(scene)
+    go_on(again, find_checkpoint(folder, scene), folder)
+    list(again.load_steps())
+    found = [step.approach_mm for step in again.steps]
+    assert found == pytest.approx(whole, rel=1e-9)  # Newton's residual, 1e-9 of the load

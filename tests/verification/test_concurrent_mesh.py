@@ -1,0 +1,73 @@
+"""The contact problem on bodies from meshes, against blocks and against each other."""
+
+import numpy as np
+import pytest
+from box_msh import write_box
+
+from multiscale import Scene
+from multiscale.run import Run
+
+E, NU = 4000.0, 0.15
+CONSTANTS = {"young_modulus": E, "poisson_ratio": NU}
+SCENE = {
+    "surface": {
+        "spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": 1},
+        "grid": [64, 64],
+        "lengths": [1, 1],
+    },
+    "coupling": {"kind": "concurrent"},
+    "load": {"approach": "8 um", "steps": 2},
+    "output": {"figures": False, "report": False, "check": "none", "contact": "none"},
+}
+
+
+def forces(**sections):
+    whole = Run(Scene.from_dict(SCENE | sections))
+    return np.array([step.force_N for step in whole.load_steps()])
+
+
+def cube(folder, cells, *, margin=0.0, above=False):
+    """Return the section of a cube on a mesh, below its contact face or above it."""
+    path = folder / f"{cells}-{margin}-{above}.msh"
+    across = np.linspace(-margin, 1.0 + margin, cells + 1)
+    levels = np.linspace(0.0, 1.0, cells + 1) if above else np.linspace(-1.0, 0.0, cells + 1)
+    write_box(path, (across, across, levels))
+    faces = ("bottom", "top") if above else ("top", "bottom")
+    supports = [{"surface": faces[1]}]
+    return {"mesh": str(path), "contact": faces[0], "supports": supports, **CONSTANTS}
+
+
+SMALL = {"micro": {"finite_slopes": False}}
+
+
+@pytest.mark.parametrize("slopes", [False, pytest.param(True, marks=pytest.mark.long)])
+def test_a_cube_on_a_mesh_is_the_block(tmp_path, slopes):
+    """6³ quadratic hexahedra: the eight modes have 1.7 elements a half wave."""
+    micro = {"micro": {"finite_slopes": slopes}}
+    found = forces(body=cube(tmp_path, 6), **micro)
+    expected = forces(block=CONSTANTS, **micro)
+    np.testing.assert_allclose(found, expected, rtol=2e-3 if slopes else 1e-3)
+
+
+@pytest.mark.long
+def test_a_face_larger_than_the_surface(tmp_path):
+    """No side bounds the surface; 12 modes on 7 elements along it."""
+    found = forces(body=cube(tmp_path, 10, margin=0.2), **SMALL)
+    expected = forces(block=CONSTANTS | {"margin": 0.2}, **SMALL)
+    np.testing.assert_allclose(found, expected, rtol=2e-3)  # 2e-4 with 12³
+
+
+@pytest.mark.long
+def test_laws_on_a_mesh_find_the_contact_problem_again(tmp_path):
+    body = cube(tmp_path, 4)
+    laws = {"coupling": {"kind": "consistent"}, "patches": {"grid": [2, 2]}}
+    found, expected = forces(body=body, **SMALL, **laws), forces(body=body, **SMALL)
+    np.testing.assert_allclose(found, expected, rtol=1e-3)  # the default tolerance of tables
+
+
+@pytest.mark.long
+def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
+    body, counter = cube(tmp_path, 5), cube(tmp_path, 5, above=True)
+    found = forces(body=body, counter_body=counter, **SMALL)
+    softer = body | {"young_modulus": 0.5 * E}
+    np.testing.assert_allclose(found, forces(body=softer, **SMALL), rtol=1e-6)
