@@ -264,8 +264,9 @@ class Run:
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
         notes += self._recorder.notes
-        if not self.setup.samples:
-            notes += yielding_notes(self.steps, self.scene.micro.hardness)
+        hardness = self.scene.micro.hardness
+        if hardness is not None or not self.setup.samples:  # whose peaks are those of means
+            notes += yielding_notes(self.steps, hardness)
         notes += energy_notes(self.steps)
         if self.scene.conductance is not None:
             from multiscale.conductances import conductance_notes  # other scenes do without

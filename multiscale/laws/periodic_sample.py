@@ -89,6 +89,8 @@ class PeriodicSample:
         Args:
             pressure: The mean pressure [MPa].
         """
+        if pressure >= self.model.upper:
+            return 0.0
         state = self.model.solve_force(pressure * self.area)
         if not self.yields and state.pressure.min() > 0.0:  # what is left is rounding
             return 0.0
