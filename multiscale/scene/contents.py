@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -11,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from multiscale.scene.body_sections import BodySection, CounterBodySection, LawSection
 from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
+from multiscale.scene.read_off_rules import problems_of_conductance, problems_of_hardness
 from multiscale.scene.sections import (
     BlockSection,
     CounterSurfaceSection,
@@ -88,7 +90,7 @@ class SceneSections(Section):
         """Refuse sections that make no sense together, with the first reason."""
         of_all = (
             *(self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings),
-            *(self._problems_of_hardness, self._problems_of_conductance),
+            *(partial(problems_of_hardness, self), partial(problems_of_conductance, self)),
         )
         for problems in of_all:
             for key, text in problems():
@@ -163,57 +165,6 @@ class SceneSections(Section):
             )
         if self.law.representative:
             yield from self._problems_of_representative_laws()
-
-    def _problems_of_hardness(self) -> Iterator[Problem]:
-        """Yield what has no plastic depth, or forgets it."""
-        if self.micro.hardness is None:
-            return
-        if self.micro.model != "half-space":
-            yield (
-                "micro.hardness",
-                f"does not go with micro.model = '{self.micro.model}', which has no cells to yield "
-                "(allowed: micro.model = 'half-space')",
-            )
-        if self.kind in ("isolated", "reference"):
-            yield (
-                "micro.hardness",
-                f"does not go with coupling.kind = '{self.kind}', which is elastic (allowed: "
-                "coupling.kind = 'concurrent', 'consistent' or 'analytic')",
-            )
-        with_laws = self.kind in ("consistent", "representative", "auto")
-        if with_laws and self.loading.load_history.unloads:
-            yield (
-                "micro.hardness",
-                "does not go with a load that turns back where patch laws stand for the contact: "
-                "they are those of rising loads and have no plastic depth (allowed: "
-                "coupling.kind = 'concurrent')",
-            )
-
-    def _problems_of_conductance(self) -> Iterator[Problem]:
-        """Yield what does not know the stiffness of the interface alone."""
-        if self.conductance is None:
-            return
-        if self.kind == "reference":
-            yield (
-                "conductance",
-                "does not go with coupling.kind = 'reference', whose meshes do not tell the "
-                "stiffness of the interface from that of the block (allowed: coupling.kind = "
-                "'concurrent', 'consistent', 'isolated' or 'analytic')",
-            )
-        with_laws = self.kind not in ("concurrent", "analytic")
-        if self.micro.hardness is not None and with_laws:
-            yield (
-                "conductance",
-                "does not go with micro.hardness where patch laws stand for the contact: their "
-                "stiffness is that of contacts that yield, which conduct all the same (allowed: "
-                "coupling.kind = 'concurrent')",
-            )
-        if self.kind in ("concurrent", "analytic", "auto") and self.micro.model != "half-space":
-            yield (
-                "conductance",
-                f"does not go with micro.model = '{self.micro.model}' without laws (allowed: "
-                "micro.model = 'half-space'; or coupling.kind = 'consistent' or 'isolated')",
-            )
 
     def _problems_of_representative_laws(self) -> Iterator[Problem]:
         """Yield the keys that a law of a periodic sample has no use for."""
