@@ -62,7 +62,7 @@ class ContactPreconditioner:
         comm = self._face.comm
         if self._slope is not None:
             both = (np.abs(slope - self._slope).max(initial=0.0), slope.max(initial=0.0))
-            change, largest = comm.allreduce(np.array(both), op=MPI.MAX)
+            change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
             if change <= _MOVED * largest:
                 return
         springs = self._springs(slope)
