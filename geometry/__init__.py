@@ -7,7 +7,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.errors import InputError, NotConverged, PatchlawError
-from geometry.facing import facing, turned_over
+from geometry.facing import facing, laid_on, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
@@ -45,6 +45,7 @@ __all__ = [
     "characteristic_size",
     "facing",
     "find_asperities",
+    "laid_on",
     "mirrored",
     "misalignment",
     "overlaps",

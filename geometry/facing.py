@@ -25,6 +25,48 @@ def turned_over(surface: Surface) -> Surface:
     return replace(surface, heights=surface.heights[::-1])
 
 
+def laid_on(
+    first: Surface, second: Surface, *, shift: tuple[float, float] = (0.0, 0.0), angle: float = 0.0
+) -> Surface:
+    """Return a surface turned about its middle, then moved, on the cells of another one.
+
+    A quarter of a turn, and a shift of a periodic surface by whole cells, move the heights as they
+    are. Else they are those of the interpolant.
+
+    Args:
+        first: The surface below, middle on middle without a shift.
+        second: The surface that is moved, as it lies on the first, see `turned_over`.
+        shift: Way along x and y [mm].
+        angle: Turn from x to y, as seen from above [degrees].
+
+    Returns:
+        Heights on the grid and sides of ``first``; periodic where the turned surface has its sides
+        and is.
+
+    Raises:
+        InputError: When a surface that is not periodic does not cover the other one.
+    """
+    turns = round(angle / 90.0)
+    left = np.radians(angle - 90.0 * turns)
+    if turns % 4:
+        lengths = second.lengths if turns % 2 == 0 else second.lengths[::-1]
+        second = replace(second, heights=np.rot90(second.heights, turns), lengths=lengths)
+    fits = left == 0.0 and np.allclose(second.lengths, first.lengths, rtol=_ROUNDING, atol=0.0)
+    if fits and second.grid == first.grid:
+        cells = np.divide(shift, first.spacing)
+        whole = np.rint(cells)
+        if not whole.any() and not cells.any():
+            return second
+        if second.periodic and np.allclose(cells, whole, rtol=0.0, atol=_ROUNDING):
+            return second.shifted(int(whole[0]), int(whole[1]))
+    x = first.x[:, None] - 0.5 * first.lengths[0] - shift[0]
+    y = first.y - 0.5 * first.lengths[1] - shift[1]
+    along, across = np.cos(left) * x + np.sin(left) * y, np.cos(left) * y - np.sin(left) * x
+    heights = second.height_at(along + 0.5 * second.lengths[0], across + 0.5 * second.lengths[1])
+    periodic = second.periodic and fits
+    return replace(second, heights=heights, lengths=first.lengths, periodic=periodic)
+
+
 def facing(first: Surface, second: Surface) -> Surface:
     """Return the sum of the heights of two surfaces, which is what closes as they approach.
 

@@ -30,6 +30,8 @@ class ContactDetail:
         pressure: Contact pressures, shape (nx, ny) or (n,) [MPa].
         gap: Distances of the displaced surface from the plane, shape (nx, ny) or (n,) [mm]; in
             contact 0 up to the residual of the solution.
+        plastic_depth: Plastic depth that loads so far have left, shape (nx, ny) [mm]; none without
+            a hardness.
     """
 
     place: Array
@@ -40,6 +42,7 @@ class ContactDetail:
     y: Array | None = None
     pressure: Array | None = None
     gap: Array | None = None
+    plastic_depth: Array | None = None
 
 
 def peaks_of(group: NDArray[np.integer], values: Array, count: int) -> NDArray[np.intp]:

@@ -18,6 +18,7 @@ from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.fields import FieldRecord
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
+from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine import cluster_nodes
@@ -27,9 +28,17 @@ from multiscale.planning.set_up import set_up
 from multiscale.readable import Observer
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
+from multiscale.results.yielding_notes import energy_notes, yielding_notes
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import Arrays, digest
+
+_AFTER_UNLOADING = (
+    "errors of load steps after unloading are not measured: the plastic depth there is that of the "
+    "load steps before"
+)
+_BACK = 1.0 - 1e-6
+"""Share of the largest approach so far below which a load step counts as unloaded."""
 
 
 class Run:
@@ -129,6 +138,11 @@ class Run:
                 self.fields.keep(coupling, step)
                 with self.phase("contact"):
                     step = self._recorder.with_stiffness(step, coupling)
+                    step = with_work(step, self.steps[-1] if self.steps else None)
+                    if self.scene.conductance is not None:
+                        from multiscale.conductances import conducting  # others do without
+
+                        step = conducting(step, coupling, self.setup)
                 self.steps.append(self._checked(step))
                 self.make_contact(last=self.finished)
                 yield self.steps[-1]
@@ -161,6 +175,10 @@ class Run:
         """Return a load step with its errors, where they are to be measured."""
         check = self.scene.output.check
         wanted = check == "all" or (check == "last" and self.finished)
+        if wanted and self._has_unloaded(step):
+            if _AFTER_UNLOADING not in self._notes:
+                self._notes.append(_AFTER_UNLOADING)
+            return step
         if not wanted or (body := self.make_body()) is None:
             return step
         with self.phase("check"):
@@ -169,6 +187,11 @@ class Run:
             except NotConverged as error:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
+
+    def _has_unloaded(self, step: LoadStep) -> bool:
+        """Tell whether the plastic depth at a load step is not that of rising loads."""
+        before = max((each.approach_mm for each in self.steps), default=0.0)
+        return self.scene.micro.hardness is not None and step.approach_mm < _BACK * before
 
     @property
     def times(self) -> dict[str, float]:
@@ -241,6 +264,14 @@ class Run:
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
         notes += self._recorder.notes
+        hardness = self.scene.micro.hardness
+        if hardness is not None or not self.setup.samples:  # whose peaks are those of means
+            notes += yielding_notes(self.steps, hardness)
+        notes += energy_notes(self.steps)
+        if self.scene.conductance is not None:
+            from multiscale.conductances import conductance_notes  # other scenes do without
+
+            notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
         return History(
             steps=steps,
             patches=self.setup.regions or self.setup.patches,

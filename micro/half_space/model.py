@@ -47,7 +47,9 @@ class HalfSpaceModel:
         body: What a finite body adds to the half-space and its sides; a half-space when not given.
         slopes: What the finite slopes of the surface add; the theory of small slopes when not
             given.
-        upper: Upper bound of the pressures [MPa]; none when not given.
+        upper: Upper bound of the pressures, the hardness of the softer body [MPa]; none when not
+            given. Where cells bear it, what overlap is left is plastic depth: `press` starts from
+            the depth of its start, all else from the surface as it is.
 
     Raises:
         InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
@@ -228,14 +230,26 @@ class HalfSpaceModel:
     ) -> Pressed:
         """Solve one load step; see `MicroModel.press`."""
         patches, means = checked_patches(self.surface, patches, mean_heights)
-        state = self._contact.equilibrium(control, *(start or (None, None)))
+        pressure, plane, *depth = start or (None, None)
+        contact = replace(self._contact, depth=depth[0]) if depth else self._contact
+        state = contact.equilibrium(control, pressure, plane)
         rows = [state.row(patches, means)]
         response = Response.of(rows, self.name, self.contact_modulus, patches)
-        return Pressed(response, state.plane, (state.pressure, state.plane), state)
+        depth = [] if state.plastic_depth is None else [state.plastic_depth]
+        return Pressed(response, state.plane, (state.pressure, state.plane, *depth), state)
+
+    @staticmethod
+    def guess(start: Any) -> Any:
+        """Return what `press` starts from, without the plastic depth that loads before left."""
+        return start and start[:2]
 
     def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
         """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
         return self._contact.stiffness(state, turns=turns)
+
+    def interface_stiffness(self, state: HalfSpaceState) -> float:
+        """Return dF/dδ of a solution's contacts on half-spaces alone, for conductances [N/mm]."""
+        return self._contact.interface_stiffness(state)
 
     @cached_property
     def _contact(self) -> PlaneContact:

@@ -5,7 +5,7 @@ Theory: demos/theory.md, section 3.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -38,7 +38,9 @@ class PlaneContact:
         reference_height: Height z_M that the approach counts from [mm].
         compliance: The elastic body.
         tolerance: Largest residual.
-        upper: Upper bound of the pressures [MPa].
+        upper: Upper bound of the pressures, the hardness [MPa].
+        depth: Plastic depth that earlier loads left in the cells, by which the heights are lower,
+            shape (nx, ny) [mm]; None: none.
     """
 
     surface: Surface
@@ -46,6 +48,7 @@ class PlaneContact:
     compliance: Compliance
     tolerance: float
     upper: float
+    depth: Array | None = None
 
     def equilibrium(
         self, control: Control, start: Array | None = None, near: RigidPlane | None = None
@@ -67,7 +70,8 @@ class PlaneContact:
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(surface, motion))
         if self.compliance.periodic:
-            _check_periodic(control, float(interference.mean()))
+            bounded = self.upper < np.inf  # then cells give way, and no approach closes all gaps
+            _check_periodic(control, -np.inf if bounded else float(interference.mean()))
         problem = self._problem(interference, control.free, control.loads)
         found = solve_contact(problem, self._start(start, near))
         motion[control.free] = found.motion * self._units[control.free]
@@ -80,7 +84,7 @@ class PlaneContact:
         )
 
     def interference(self, plane: RigidPlane) -> Array:
-        """Return the overlap δ(x, y) − (z_M − z) of plane and undeformed surface [mm].
+        """Return the overlap δ(x, y) − (z_M − z) of the plane and the surface without load [mm].
 
         Args:
             plane: The plane.
@@ -90,6 +94,8 @@ class PlaneContact:
         """
         surface = self.surface
         below = self.reference_height - surface.heights
+        if self.depth is not None:
+            below += self.depth
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
     def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
@@ -100,9 +106,21 @@ class PlaneContact:
             turns: Whether the plane turns without moment; otherwise its slopes stay.
         """
         free, modulus = np.array([False, turns, turns]), self.compliance.modulus
-        problem = self._problem(state.interference, free, np.zeros(3))
+        problem = self._problem(self.interference(state.plane), free, np.zeros(3))
         rate, products = approach_stiffness(problem, state.pressure / modulus)
         return rate * modulus * float(np.prod(self.surface.spacing)), products
+
+    def interface_stiffness(self, state: HalfSpaceState) -> float:
+        """Return dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
+
+        Cells that yield conduct as the others: it is the elastic stiffness, that of unloading.
+
+        Args:
+            state: A solution.
+        """
+        alone = replace(self.compliance, sides=None, body=None, slopes=None)
+        elastic = replace(self, compliance=alone, upper=np.inf)
+        return elastic.stiffness(state, turns=False)[0]
 
     @property
     def _units(self) -> Array:
@@ -199,7 +217,40 @@ class HalfSpaceState:
             y=surface.y,
             pressure=self.pressure,
             gap=self.gap,
+            plastic_depth=self.plastic_depth,
         )
+
+    @property
+    def yielding(self) -> NDArray[np.bool_]:
+        """Which cells bear the hardness, shape (nx, ny)."""
+        return self.pressure >= self.contact.upper
+
+    @cached_property
+    def plastic_depth(self) -> Array | None:
+        """Plastic depth of the cells, that of earlier loads included, shape (nx, ny) [mm].
+
+        It is what overlap is left where the pressure is the hardness; None without a hardness.
+        """
+        contact = self.contact
+        if contact.upper == np.inf:
+            return None
+        overlap = self.contact.interference(self.plane) - self.displacement
+        more = np.where(self.yielding, np.maximum(overlap, 0.0), 0.0)
+        return more if contact.depth is None else contact.depth + more
+
+    @property
+    def elastic_energy(self) -> float:
+        """Energy ½ ∫ p u dA of the elastic deformation [N mm]."""
+        cell = self.spacing[0] * self.spacing[1]
+        return 0.5 * float(np.vdot(self.pressure, self.displacement)) * cell
+
+    @property
+    def plastic_work(self) -> float:
+        """Work of the hardness on the plastic depth, that of earlier loads included [N mm]."""
+        depth = self.plastic_depth
+        if depth is None:
+            return 0.0
+        return self.contact.upper * float(depth.sum()) * self.spacing[0] * self.spacing[1]
 
     @property
     def in_contact(self) -> NDArray[np.bool_]:
@@ -237,8 +288,11 @@ class HalfSpaceState:
 
     @property
     def interference(self) -> Array:
-        """Overlap of plane and undeformed surface, negative where they are apart, (nx, ny) [mm]."""
-        return self.contact.interference(self.plane)
+        """Overlap of the plane and the surface without load, shape (nx, ny) [mm].
+
+        It is negative where they are apart. The surface has its plastic depth.
+        """
+        return replace(self.contact, depth=self.plastic_depth).interference(self.plane)
 
     @property
     def gap(self) -> Array:
@@ -261,6 +315,9 @@ class HalfSpaceState:
         displacement = patch_means(displaced, patches)
         below = self.contact.reference_height - plane.means(patches)
         separation = below - mean_heights + displacement
+        if self.plastic_depth is not None:
+            flattened = Surface(heights=self.plastic_depth, lengths=surface.lengths)
+            separation += patch_means(flattened, patches)
         borders = patches.borders_x, patches.borders_y
         x, y = map(overlaps, borders, surface.lengths, surface.grid)
         forces = self.pressure * (self.spacing[0] * self.spacing[1])

@@ -75,11 +75,13 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             table = run.make_laws()
 
         def write() -> list[Path]:
+            from multiscale.conductances import conducts_of
             from multiscale.output.figures import law_figure
 
+            conducts = conducts_of(run.setup)
             exports: dict[str, str] = {}
             for name in choice.export:
-                exports |= export_texts(table, name)
+                exports |= export_texts(table, name, conducts=conducts)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
             files = [laws, write_figure(folder / "laws.png", law_figure(table))]
             remove_exports(folder)

@@ -69,6 +69,7 @@ class CondensedCoupling:
             area_fraction=state.point.contact_area_fraction,
             separation=state.point.separation,
             contacts=state.point.contacts,
+            stiffness=state.point.stiffness,
             newton_iterations=state.iterations,
         )
 

@@ -12,9 +12,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, PatchGrid, overlaps
+from geometry import Control, InputError, PatchGrid, overlaps
 from geometry.collective import on_root, on_root_alone
-from micro import START_KINDS, FiniteSlopes, HalfSpaceModel, MicroModel, SlopesOfBodies
+from micro import (
+    START_KINDS,
+    FiniteSlopes,
+    HalfSpaceModel,
+    HalfSpaceState,
+    MicroModel,
+    SlopesOfBodies,
+)
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact
 from multiscale.couplings.body import has_body_term, scene_body
@@ -83,9 +90,33 @@ class ContactCoupling:
                 newton_iterations=int(response.iterations[0]),
                 warnings=response.warnings,
                 peak_pressure_MPa=self.latest.peak_pressure,
+                **self._of_cells(),
             )
 
         return on_root_alone(self._comm, solve)
+
+    def _of_cells(self) -> dict[str, Any]:
+        """Return the energies at the latest load step, and what has yielded, where known."""
+        state = self.latest
+        if not isinstance(state, HalfSpaceState):
+            return {}
+        found = {
+            "elastic_energy_mJ": state.elastic_energy,
+            "plastic_work_mJ": state.plastic_work,
+        }
+        if state.plastic_depth is not None:
+            found["yielding_area_fraction"] = float(np.mean(state.yielding))
+            found["plastic_depth_mm"] = float(state.plastic_depth.max())
+        return found
+
+    @property
+    def past(self) -> Any:
+        """What the next load step starts from; under a hardness it depends on it."""
+        return self._start, self.latest
+
+    @past.setter
+    def past(self, value: Any) -> None:
+        self._start, self.latest = value
 
     def pressures_on(self, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -106,7 +137,7 @@ class ContactCoupling:
         def pressures() -> Array:
             assert self.latest is not None
             if isinstance(self._model, HalfSpaceModel):
-                (pressure, _), surface = self._start, self._model.surface
+                pressure, surface = self._start[0], self._model.surface
                 borders = parts.borders_x, parts.borders_y
                 x, y = map(overlaps, borders, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
@@ -121,6 +152,25 @@ class ContactCoupling:
         return on_root_alone(
             self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
         )
+
+    def interface_stiffness(self) -> float:
+        """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].
+
+        Raises:
+            InputError: When the micro model has no cells.
+
+        Note:
+            Collective.
+        """
+
+        def found() -> float:
+            if not (
+                isinstance(self._model, HalfSpaceModel) and isinstance(self.latest, HalfSpaceState)
+            ):
+                raise InputError("contacts without cells have no conductance")
+            return self._model.interface_stiffness(self.latest)
+
+        return on_root_alone(self._comm, found)
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""

@@ -87,10 +87,23 @@ class FieldRecord:
             Collective.
         """
         wanted = self._setup.scene.output.wants_fields
-        for step in steps:
-            if step.step not in self.kept and wanted(step.step, last=step is steps[-1]):
-                coupling.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        missing = [
+            step.step
+            for step in steps
+            if step.step not in self.kept and wanted(step.step, last=step is steps[-1])
+        ]
+        again = [step for step in steps if step.step in missing]
+        past = None
+        if self._setup.scene.micro.hardness is not None and isinstance(coupling, ContactCoupling):
+            # what earlier load steps left behind is found by all of them, from the first
+            past, coupling.past = coupling.past, (None, None)
+            again = [step for step in steps if step.step <= max(missing, default=0)]
+        for step in again:
+            coupling.press(Control(approach=step.approach_mm, tilt=step.tilt))
+            if step.step in missing:
                 self.keep(coupling, step)
+        if past is not None and isinstance(coupling, ContactCoupling):
+            coupling.past = past
 
     def write(self, path: Path, coupling: Coupling | None, steps: Sequence[LoadStep]) -> None:
         """Write the fields as XDMF and VTX, see `macro.write_fields`.

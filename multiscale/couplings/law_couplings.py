@@ -127,6 +127,7 @@ class EmbeddedCoupling:
 
         try:
             area_fraction, separation = means("contact_area_fraction"), means("separation")
+            stiffness = means("stiffness")
         except InputError as error:
             falls = not all(law.is_function for law in laws)
             raise beyond_law(control, str(error), self._table, falls=falls) from error
@@ -138,6 +139,7 @@ class EmbeddedCoupling:
             pressure=state.pressure,
             area_fraction=area_fraction,
             separation=separation,
+            stiffness=stiffness,
             **self._of_contacts(state),
             newton_iterations=state.newton_iterations,
             linear_iterations=state.linear_iterations,
@@ -229,6 +231,7 @@ class FreePlaneCoupling:
             area_fraction=point.contact_area_fraction,
             separation=point.separation,
             contacts=point.contacts,
+            stiffness=point.stiffness,
             newton_iterations=evaluations,
         )
 

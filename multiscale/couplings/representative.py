@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,9 @@ _CONCENTRATION = 10.0
 """Largest local pressure that laws are made for, over the mean one on the face."""
 _CROWNED = 2.0
 """The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
+_YIELDED = 0.95
+"""Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
+then, and at it the pressure is no function of closure."""
 _RESERVE = 0.15
 """Closure that laws are made for beyond the largest approach on the face, relative to it."""
 
@@ -47,6 +51,7 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
         Collective.
     """
     pressure, closure = largest_loads(setup, comm)
+    pressure = min(pressure, _YIELDED * setup.scene.micro.upper)
     models = {
         id(one): _model(setup, region, one) for region in setup.samples for one in region.surfaces
     }
@@ -66,13 +71,15 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
 def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
     """Return the periodic model of a sample, with the slopes of its body where they count."""
     pair = region.materials
-    model = HalfSpaceModel(sample, contact_modulus=pair.contact_modulus, periodic=True)
+    model = HalfSpaceModel(
+        sample,
+        contact_modulus=pair.contact_modulus,
+        periodic=True,
+        upper=setup.scene.micro.upper,
+    )
     if not setup.finite_slopes:
         return model
-    slopes = FiniteSlopes(sample, pair.first, periodic=True)
-    return HalfSpaceModel(
-        sample, contact_modulus=pair.contact_modulus, periodic=True, slopes=slopes
-    )
+    return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
 
 
 def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:

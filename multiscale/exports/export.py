@@ -8,6 +8,7 @@ from geometry import InputError
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import abaqus_text, calculix_text
 from multiscale.exports.law_module import law_modules
+from multiscale.exports.sampling import Conducts
 from multiscale.exports.tables import csv_text
 from multiscale.laws.law_table import LawTable
 from multiscale.storage import remove, write_text, written
@@ -24,7 +25,12 @@ _MODULES = "laws_4c"
 
 
 def export_laws(
-    table: LawTable, folder: str | Path, format: str, *, tolerance: float = TOLERANCE
+    table: LawTable,
+    folder: str | Path,
+    format: str,
+    *,
+    tolerance: float = TOLERANCE,
+    conducts: Conducts | None = None,
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
 
@@ -38,6 +44,9 @@ def export_laws(
         format: One of `multiscale.exports.FORMATS`.
         tolerance: Error of straight lines between the rows of tables, relative to the pressure, or
             to 1 % of the largest of the law where that is more.
+        conducts: Conductances per area at stiffnesses of the laws, see
+            `Conductances.per_area`; they are columns of the csv file, and the thermal one a
+            gap conductance of Abaqus and CalculiX.
 
     Returns:
         The files written.
@@ -47,18 +56,25 @@ def export_laws(
             closure nowhere, which a csv file alone can say.
         NotWritten: When the system refuses.
     """
-    texts = export_texts(table, format, tolerance=tolerance)
+    texts = export_texts(table, format, tolerance=tolerance, conducts=conducts)
     remove_exports(Path(folder), (format,))
     return [write_text(Path(folder) / name, text) for name, text in texts.items()]
 
 
-def export_texts(table: LawTable, format: str, *, tolerance: float = TOLERANCE) -> dict[str, str]:
+def export_texts(
+    table: LawTable,
+    format: str,
+    *,
+    tolerance: float = TOLERANCE,
+    conducts: Conducts | None = None,
+) -> dict[str, str]:
     """Return the names and contents of the files of an export, see `export_laws`.
 
     Args:
         table: The laws.
         format: One of `multiscale.exports.FORMATS`.
         tolerance: Error of straight lines between the rows of tables.
+        conducts: As for `export_laws`.
 
     Raises:
         InputError: As `export_laws`.
@@ -69,7 +85,7 @@ def export_texts(table: LawTable, format: str, *, tolerance: float = TOLERANCE) 
     if format == "4c":
         return {f"{_MODULES}/{name}": text for name, text in law_modules(table).items()}
     name, text_of = _TABLES[format]
-    return {name: text_of(table, tolerance)}
+    return {name: text_of(table, tolerance, conducts)}
 
 
 def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:

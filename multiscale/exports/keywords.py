@@ -4,20 +4,31 @@ Both programs take rows of pressure and overclosure, the first without pressure,
 linearly. Beyond the last row Abaqus continues the last line. CalculiX (2.20) keeps the last
 pressure, so that a last row continues the tangent there; it stores 200 rows at most.
 
-A table of gap conductance belongs to the same surface interaction, under a keyword of its own: see
-`_interaction`.
+Conductance per area over pressure is a further table of the same surface interaction, for Abaqus
+with the parameter PRESSURE; it continues the first and last values. CalculiX (2.20) finds the
+pressure behind a conductance from linear and exponential overclosures alone: of a tabular one it
+takes the first row, without heat. Its table is therefore a comment, from which the user takes a
+value. Units are those of mm, N, s and K: 1 W/m²K is 0.001 N/(mm s K).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
 
 from multiscale.exports.places import made_by, places
-from multiscale.exports.sampling import LEAST_PRESSURE, LawSample, sample_patch
+from multiscale.exports.sampling import LEAST_PRESSURE, Conducts, LawSample, sample_patch
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
 _CALCULIX_ROWS = 200
+_HEAT, _PER_W_PER_M2K = "thermal_conductance_W_per_m2K", 1e-3
+_HEAT_UNITS = "Conductance of the contacts [N/(mm s K) = mW/(mm2 K)] over pressure [MPa]:"
+_BY_HAND = """
+CalculiX does not know the pressure of such a law in its heat conduction, and would take the first
+row, without heat. Write *GAP CONDUCTANCE with the value at your pressure below it."""
 
 _HEAD = f"""\
 Contact laws of a rough surface, written by patchlaw.
@@ -35,33 +46,68 @@ With the other types CalculiX 2.20 finds no pressure in such a table, and says n
 _OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
-def abaqus_text(table: LawTable, tolerance: float) -> str:
+class Heat(NamedTuple):
+    """Gap conductance of surface interactions.
+
+    Attributes:
+        remark: What is said before its table, as a comment.
+        mark: What every line of the table begins with.
+        conducts: Conductances per area at stiffnesses; None writes no table.
+    """
+
+    remark: str
+    mark: str
+    conducts: Conducts | None
+
+    def lines(self, law: PatchLaw, sample: LawSample) -> Iterator[str]:
+        """Yield the lines of a law: conductance [N/(mm s K)] over pressure [MPa], from zero on.
+
+        Args:
+            law: The law.
+            sample: Its rows.
+        """
+        if self.conducts is None:
+            return
+        found = self.conducts(law.along(sample.approach).stiffness).get(_HEAT)
+        if found is None:
+            return
+        yield from _comments(f"{_HEAT_UNITS}{self.remark}")
+        yield f"{self.mark}*GAP CONDUCTANCE, PRESSURE"
+        rows = zip(
+            np.maximum(_PER_W_PER_M2K * found, 0.0).tolist(), sample.pressure.tolist(), strict=True
+        )
+        yield from (f"{self.mark}{heat:.12e}, {pressure:.12e}" for heat, pressure in rows)
+
+
+def abaqus_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
     """Return the surface interactions of all laws for Abaqus.
 
     Args:
         table: The laws.
         tolerance: Largest error of straight lines between rows, as in `LawSample`.
+        conducts: Conductances per area at stiffnesses; none are written when not given.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    return _text(table, tolerance, _ABAQUS, most=None)
+    return _text(table, tolerance, _ABAQUS, None, Heat("", "", conducts))
 
 
-def calculix_text(table: LawTable, tolerance: float) -> str:
+def calculix_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
     """Return the surface interactions of all laws for CalculiX.
 
     Args:
         table: The laws.
         tolerance: Error of straight lines between rows; larger where 199 rows do not suffice.
+        conducts: Conductances per area at stiffnesses; none are written when not given.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    return _text(table, tolerance, _CALCULIX, most=_CALCULIX_ROWS - 1)
+    return _text(table, tolerance, _CALCULIX, _CALCULIX_ROWS - 1, Heat(_BY_HAND, "** ", conducts))
 
 
-def _text(table: LawTable, tolerance: float, remarks: str, *, most: int | None) -> str:
+def _text(table: LawTable, tolerance: float, remarks: str, most: int | None, heat: Heat) -> str:
     lines = _comments(f"{_HEAD}\n{remarks}\nMade by: {made_by(table)}")
     for place, law in zip(places(table), table.laws, strict=True):
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
@@ -72,6 +118,7 @@ def _text(table: LawTable, tolerance: float, remarks: str, *, most: int | None) 
             continue
         name = f"{place.kind}_{place.label}".upper()
         lines += _interaction(name, law, sample, extended=most is not None)
+        lines += heat.lines(law, sample)
     return "".join(f"{line}\n" for line in lines)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 
 Array = NDArray[np.float64]
+Conducts = Callable[[Array], dict[str, Array]]
+"""From stiffnesses dp/dc [MPa/mm] to conductances per area by the name of their column."""
 
 LEAST_PRESSURE = 0.01
 """Pressures below this part of the law's largest count as that much in relative errors."""

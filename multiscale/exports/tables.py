@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import InputError, Regions
-from multiscale.exports.sampling import sample_law
+from multiscale.exports.sampling import Conducts, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
@@ -20,11 +20,13 @@ CSV_COLUMNS = (
 )  # fmt: skip
 """Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
 
+Conductances per area follow where they are asked for.
 Laws of regions have the scatter of pressures between their samples as a last column.
 """
+_STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
 
 
-def csv_text(table: LawTable, tolerance: float) -> str:
+def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
     """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
     Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
@@ -33,17 +35,20 @@ def csv_text(table: LawTable, tolerance: float) -> str:
     Args:
         table: The laws.
         tolerance: Largest error of straight lines between rows, as in `LawSample`.
+        conducts: Conductances per area at stiffnesses; further columns where given.
     """
     text = StringIO()
     writer = csv.writer(text)
     regions = isinstance(table.patches, Regions)
     where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
-    writer.writerow((*where, *CSV_COLUMNS, *scatter))
+    names = () if conducts is None else tuple(conducts(np.zeros(1)))
+    writer.writerow((*where, *CSV_COLUMNS, *names, *scatter))
     for index, law in enumerate(table.laws):
         place = _place(table, index)
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
-            writer.writerow((*place, *row, *more))
+            conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
+            writer.writerow((*place, *row, *map(float, conductances), *more))
     return text.getvalue()
 
 

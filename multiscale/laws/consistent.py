@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
 from geometry.collective import on_root, shared
-from micro import MicroModel, Pressed, Response, RigidPlane, influence_matrix
+from micro import HalfSpaceModel, MicroModel, Pressed, Response, RigidPlane, influence_matrix
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -250,6 +250,8 @@ class WholeSurface:
         return [row for rows in found for row in rows]
 
     def _press(self, control: Control, start: Any) -> Pressed:
+        if isinstance(self.model, HalfSpaceModel):
+            start = self.model.guess(start)  # rows are those of rising loads, in whatever order
         return self.model.press(
             control, patches=self.patches, mean_heights=self.mean_heights, start=start
         )

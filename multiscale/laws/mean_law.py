@@ -106,7 +106,7 @@ class PeriodicSamples:
 
         def make(rows: SolvedRows) -> list[PatchLaw]:
             rising, change = rows[:, 0].rising()
-            if end == 1.0:
+            if end == 1.0 and not any(sample.yields for sample in self.samples):
                 rising = self._in_full_contact(rising, limit, compliance)
             return [replace(PatchLaw.of(rising, touch, self.reference), repaired=change)]
 

@@ -61,13 +61,20 @@ class PeriodicSample:
         """Separation at first touch of a cell [mm]."""
         return self.reference - self.model.first_touch
 
+    @property
+    def yields(self) -> bool:
+        """Whether its pressures are bounded by a hardness; then no load closes all gaps."""
+        return self.model.upper < np.inf
+
     def full_contact_pressure(self) -> float:
         """Return the mean pressure that just closes the sample [MPa].
 
         In full contact pressures differ from their mean by what flattens the sample, whatever the
-        mean.
+        mean. Under a hardness it is the mean pressure at a separation of 0.
         """
         surface = self.model.surface
+        if self.yields:
+            return self.model.solve(self.reference).force / self.area
         slopes = np.gradient(surface.heights, *surface.spacing)
         pressure = self.model.contact_modulus * float(np.sqrt(np.mean(np.square(slopes))))
         while True:
@@ -82,8 +89,10 @@ class PeriodicSample:
         Args:
             pressure: The mean pressure [MPa].
         """
+        if pressure >= self.model.upper:
+            return 0.0
         state = self.model.solve_force(pressure * self.area)
-        if state.pressure.min() > 0.0:  # what is left is rounding
+        if not self.yields and state.pressure.min() > 0.0:  # what is left is rounding
             return 0.0
         return max(self.reference - state.approach, 0.0)
 
@@ -96,14 +105,14 @@ class PeriodicSample:
         """
         rows, start = [], None
         for separation in separations:
-            if separation == 0.0:
+            if separation == 0.0 and not self.yields:
                 rows.append(SampleRow(full, 1.0, 1))
             elif separation >= self.first_touch:
                 rows.append(SampleRow())
             else:
                 approach = float(self.reference - separation)
                 pressed = self.model.press(Control(approach=approach), start=start)
-                start, response = pressed.start, pressed.response
+                start, response = self.model.guess(pressed.start), pressed.response
                 rows.append(
                     SampleRow(
                         pressure=float(response.mean_pressure[0]),

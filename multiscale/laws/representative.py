@@ -61,7 +61,8 @@ def representative_law(
         The law, on every rank, parametrised by s = c + Λ p with its mean compliance Λ: the plane's
         approach where a layer of that compliance lies under the interface. The contacts are those
         of all samples together, on `sample_area`. In full contact, where the interface has no
-        compliance left, the law goes on with a hundredth of its mean one.
+        compliance left, the law goes on with a hundredth of its mean one. Under a hardness the law
+        is that of rising loads, and ends where the plane is at the mean plane at the latest.
 
     Raises:
         InputError: When there is no sample, one is not periodic or flat, or no largest load is
@@ -139,6 +140,4 @@ def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
     model = make(sample)
     if not model.periodic:
         raise InputError("a representative law needs periodic models", value=model.name)
-    if np.isfinite(model.upper):  # full contact would have no bound to its closure
-        raise InputError("a representative law needs models without a bound", value=model.upper)
     return PeriodicSample(model)

@@ -22,11 +22,14 @@ class PatchState:
         closure_mm: Mean closure of each patch, shape (N,) [mm].
         pressure_MPa: Mean pressure on each patch, shape (N,) [MPa].
         contact_area_fraction: Real over nominal contact area of each patch, shape (N,).
+        stiffness_MPa_per_mm: Derivative dp/dc of each patch's law at its closure, or its mean over
+            the points of the patch, shape (N,) [MPa/mm]; None without laws.
     """
 
     closure_mm: Array
     pressure_MPa: Array
     contact_area_fraction: Array
+    stiffness_MPa_per_mm: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,6 +67,21 @@ class LoadStep:
         stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
             approach, under fixed slopes or, where the plane turns, without moment [N/mm]; None
             where it was not found.
+        elastic_energy_mJ: Energy of the elastic deformation of all bodies; None where it is not
+            known [mJ].
+        plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
+            it is not known.
+        yielding_area_fraction: Area that bears the hardness over nominal contact area; None without
+            a hardness.
+        plastic_depth_mm: Largest plastic depth that the loads so far have left [mm]; None without a
+            hardness.
+        work_mJ: Work of the forces on the plane, since the start [mJ]; None where no energy is
+            known.
+        thermal_conductance_W_per_K: Conductance of contacts and gaps [W/K]; None where the scene
+            asks for none.
+        gap_conductance_W_per_K: What of it passes through gas and radiation [W/K].
+        electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
+            none.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -89,6 +107,14 @@ class LoadStep:
     approach_error_mm: float | None = None
     peak_pressure_MPa: float | None = None
     stiffness_N_per_mm: float | None = None
+    elastic_energy_mJ: float | None = None
+    plastic_work_mJ: float | None = None
+    work_mJ: float | None = None
+    yielding_area_fraction: float | None = None
+    plastic_depth_mm: float | None = None
+    thermal_conductance_W_per_K: float | None = None
+    gap_conductance_W_per_K: float | None = None
+    electrical_conductance_S: float | None = None
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -103,6 +129,7 @@ class LoadStep:
         area_fraction: Array,
         separation: Array | float,
         contacts: ArrayLike,
+        stiffness: Array | None = None,
         areas: Array | None = None,
         **other: Any,
     ) -> LoadStep:
@@ -117,6 +144,7 @@ class LoadStep:
             area_fraction: Real over nominal contact areas of the patches, shape (N,).
             separation: Mean gaps of the patches, or their mean [mm].
             contacts: Numbers of contacts in the patches, or their sum.
+            stiffness: Stiffnesses dp/dc of the patches' laws, shape (N,) [MPa/mm]; none without.
             areas: Areas of the patches, shape (N,) [mm²]; needed of regions.
             **other: Other fields of the load step.
         """
@@ -136,7 +164,10 @@ class LoadStep:
             ),
             contacts=int(np.sum(contacts)),
             patches=PatchState(
-                closure_mm=closure, pressure_MPa=pressure, contact_area_fraction=area_fraction
+                closure_mm=closure,
+                pressure_MPa=pressure,
+                contact_area_fraction=area_fraction,
+                stiffness_MPa_per_mm=stiffness,
             ),
             tilt=(tx, ty),
             moment_N_mm=(mx, my),
@@ -151,8 +182,16 @@ class LoadStep:
                 proportional to it.
         """
         mx, my = self.moment_N_mm
-        patches = replace(self.patches, pressure_MPa=ratio * self.patches.pressure_MPa)
-        names = "force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"
+        rates = self.patches.stiffness_MPa_per_mm
+        patches = replace(
+            self.patches,
+            pressure_MPa=ratio * self.patches.pressure_MPa,
+            stiffness_MPa_per_mm=None if rates is None else ratio * rates,
+        )
+        names = (
+            *("force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"),
+            *("elastic_energy_mJ", "plastic_work_mJ", "work_mJ"),
+        )
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
         return replace(
             self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
@@ -94,6 +95,18 @@ class HasContact(Protocol):
         """
 
 
+@runtime_checkable
+class PathDependent(Protocol):
+    """A coupling whose next load step depends on those before it, beyond initial guesses."""
+
+    @property
+    def past(self) -> Any:
+        """What the load steps so far left behind; set it to take load steps back."""
+
+    @past.setter
+    def past(self, value: Any) -> None: ...
+
+
 class BeyondLaws(NotConverged):
     """A patch is outside the range of its law, where smaller load steps do not help."""
 
@@ -134,6 +147,11 @@ class LoadHistory:
     def largest(self) -> float:
         """Largest value of the prescribed quantity."""
         return max(self.points)
+
+    @property
+    def unloads(self) -> bool:
+        """Whether the load falls anywhere."""
+        return any(later < earlier for earlier, later in pairwise(self.points))
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""
@@ -232,8 +250,13 @@ class LoadStepper:
         by_force = self._load_history.quantity == "force"
         if divisible and by_force and self._exceeds_limit(target):
             return None
+        past = self._coupling.past if isinstance(self._coupling, PathDependent) else None
         step = self._reached(target)
-        return None if divisible and self._exceeds_limit(step.force_N) else step
+        if divisible and self._exceeds_limit(step.force_N):
+            if past is not None and isinstance(self._coupling, PathDependent):
+                self._coupling.past = past
+            return None
+        return step
 
     def _exceeds_limit(self, force: float) -> bool:
         limit = self._load_history.force_change

@@ -136,7 +136,8 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
             group = file.create_group(f"step_{record.step}")
             group.attrs.update(approach_mm=record.approach_mm, force_N=record.force_N)
             for name in FIELDS:
-                group.create_dataset(name, data=getattr(record, name), compression=_COMPRESSION)
+                if (data := getattr(record, name)) is not None:
+                    group.create_dataset(name, data=data, compression=_COMPRESSION)
 
     if contacts[0].pressure_MPa is not None:
         files.append(write_bytes(folder / "contact.h5", checksummed(fill)))

@@ -158,6 +158,8 @@ class _Search(MeshSearch):
     @property
     def _may_be_meshed(self) -> bool:
         """Whether the scene leaves it open that its roughness be meshed."""
+        if self.given.micro.hardness is not None or self.given.conductance is not None:
+            return False  # meshes are elastic, and do not know the stiffness of the interface alone
         stated = self.given.coupling.model_fields_set - {"kind"}
         return {"coupling.kind", "micro.model"} <= auto_keys(self.given) and not stated
 

@@ -29,6 +29,8 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     yield "inputs", inputs_statement(setup)
     yield "surface", surface_statement(setup)
     yield "contact", _contact(setup)
+    if setup.counter_surface is not None or setup.scene.counter_surface is not None:
+        yield "two rough sides", _two_sides(setup)
     yield "micro model", _model(setup)
     yield "coupling", _coupling(setup)
     if setup.has_block:
@@ -147,6 +149,22 @@ def _contact(setup: ProblemSetup) -> str:
         return f"{len(setup.asperities)} summits, {within}; the others cost nothing"
     within = f"{int((setup.cell_interference > 0.0).sum())} within the largest approach"
     return f"{setup.surface.heights.size} cells, {within}"
+
+
+def _two_sides(setup: ProblemSetup) -> str:
+    """Say how the sides lie on each other, and whose slopes count."""
+    section = setup.scene.counter_surface
+    text = "[counter_surface], turned over, lies on [surface]"
+    if section is not None and section.rotation:
+        text += f", turned by {section.rotation:g}°"
+    if section is not None and any(section.shift):
+        text += f", moved by {1e3 * section.shift[0]:.4g} and {1e3 * section.shift[1]:.4g} µm"
+    if not setup.finite_slopes or setup.samples:
+        return f"{text}; the heights of both add"
+    if setup.materials.second is None:
+        rigid = "the slopes of [surface] alone count: the other side is rigid"
+        return f"{text}; the heights of both add, {rigid}"
+    return f"{text}; the heights of both add, and the slopes of each count on its own body"
 
 
 def _model(setup: ProblemSetup) -> str:

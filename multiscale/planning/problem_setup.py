@@ -192,8 +192,8 @@ def stated_model(scene: Scene, surface: Surface, contact_modulus: float) -> Micr
         curvature=scene.micro.curvature,
         border=scene.micro.border,
     )
-    if scene.surface.periodic and isinstance(model, HalfSpaceModel):
-        return replace(model, periodic=True)
+    if isinstance(model, HalfSpaceModel):
+        return replace(model, periodic=scene.surface.periodic, upper=scene.micro.upper)
     return model
 
 
@@ -227,7 +227,9 @@ def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> R
     """
     x, y = surface.grid
     periodic = scene.surface.periodic
-    fine = HalfSpaceModel(surface, contact_modulus=contact_modulus, periodic=periodic)
+    fine = HalfSpaceModel(
+        surface, contact_modulus=contact_modulus, periodic=periodic, upper=scene.micro.upper
+    )
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))

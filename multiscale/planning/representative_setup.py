@@ -50,7 +50,12 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
     samples = region_samples(scene, face.materials, second_material(scene, counter))
     surface, materials = samples[0].surfaces[0], samples[0].materials
     check_load(scene, surface, Bulk(face.area, face.depth, materials.first.young_modulus))
-    model = HalfSpaceModel(surface, contact_modulus=materials.contact_modulus, periodic=True)
+    model = HalfSpaceModel(
+        surface,
+        contact_modulus=materials.contact_modulus,
+        periodic=True,
+        upper=scene.micro.upper,
+    )
     made = time.perf_counter()
     plane = _sample_plane(scene, model, face.area)
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)

@@ -30,7 +30,7 @@ from multiscale.storage import (
     write_bytes,
 )
 
-FORMAT = "patchlaw checkpoint 5"
+FORMAT = "patchlaw checkpoint 6"
 FILE_NAME = "checkpoint.h5"
 
 LEAST_INTERVAL = 1.0
@@ -105,7 +105,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
     record = (
         json.dumps(facts, default=np.generic.item),
         np.frombuffer(checkpoint.laws, np.uint8),
-        [np.array([getattr(step.patches, name) for step in steps]) for name in _PATCH_COLUMNS],
+        [_stacked([getattr(step.patches, name) for step in steps]) for name in _PATCH_COLUMNS],
         checkpoint.position,
         checkpoint.contacts,
     )
@@ -153,12 +153,14 @@ def _read(path: Path) -> Checkpoint:
         )
     text, laws, patches, position, contacts = unpacked(run, (LoadPosition, ContactRecord))
     facts = json.loads(text)
+    columns = zip(_PATCH_COLUMNS, patches, strict=True)
+    known = {name: column for name, column in columns if column is not None}
     steps = [
         LoadStep(
             **dict(zip(_COLUMNS, map(_tuples, row), strict=True)),
-            patches=PatchState(**dict(zip(_PATCH_COLUMNS, columns, strict=True))),
+            patches=PatchState(**{name: column[k] for name, column in known.items()}),
         )
-        for row, *columns in zip(facts.pop("steps"), *patches, strict=True)
+        for k, row in enumerate(facts.pop("steps"))
     ]
     return Checkpoint(
         **facts,
@@ -168,6 +170,11 @@ def _read(path: Path) -> Checkpoint:
         state=state,
         contacts=contacts,
     )
+
+
+def _stacked(columns: list[Any]) -> Any:
+    """Return the arrays of load steps as one; None where they have none."""
+    return None if any(column is None for column in columns) else np.array(columns)
 
 
 def _tuples(value: Any) -> Any:

@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""
 
-FIELDS = ("x_mm", "y_mm", "pressure_MPa", "gap_mm")
-"""Datasets of a load step in ``contact.h5``."""
+FIELDS = ("x_mm", "y_mm", "pressure_MPa", "gap_mm", "plastic_depth_mm")
+"""Datasets of a load step in ``contact.h5``; the last one under a hardness alone."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -37,6 +37,8 @@ class ContactRecord:
         y_mm: Their ordinates, shape (ny,) or (n,) [mm].
         pressure_MPa: Contact pressures, shape (nx, ny) or (n,) [MPa].
         gap_mm: Gaps between the plane and the deformed surface, shape (nx, ny) or (n,) [mm].
+        plastic_depth_mm: Plastic depth that the loads so far left, by which the heights are lower,
+            shape (nx, ny) [mm]; None without a hardness.
     """
 
     step: int
@@ -48,6 +50,7 @@ class ContactRecord:
     y_mm: Array | None = None
     pressure_MPa: Array | None = None
     gap_mm: Array | None = None
+    plastic_depth_mm: Array | None = None
 
     @classmethod
     def of(
@@ -73,6 +76,7 @@ class ContactRecord:
             y_mm=detail.y,
             pressure_MPa=detail.pressure,
             gap_mm=detail.gap,
+            plastic_depth_mm=detail.plastic_depth,
         )
 
     @property

@@ -21,7 +21,9 @@ from multiscale.results.reference_record import ReferenceRecord
 Array = NDArray[np.float64]
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
-"""Columns of ``patches.csv``."""
+"""Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
+PATCH_STIFFNESS = "stiffness_MPa_per_mm"
+"""Column of the derivative dp/dc of a patch's law."""
 
 
 @dataclass(eq=False)
@@ -127,6 +129,14 @@ class History:
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
     peak_pressure_MPa = Column("Largest contact pressure", "MPa")
     stiffness_N_per_mm = Column("Interfacial stiffness dF/dδ, force over approach", "N/mm")
+    elastic_energy_mJ = Column("Energy of the elastic deformation", "mJ")
+    plastic_work_mJ = Column("Work of the hardness on the plastic depth", "mJ")
+    work_mJ = Column("Work of the forces on the plane", "mJ")
+    yielding_area_fraction = Column("Area that bears the hardness over nominal contact area")
+    plastic_depth_mm = Column("Largest plastic depth that the loads so far have left", "mm")
+    thermal_conductance_W_per_K = Column("Thermal conductance of contacts and gaps", "W/K")
+    gap_conductance_W_per_K = Column("What of it passes through gas and radiation", "W/K")
+    electrical_conductance_S = Column("Electrical conductance of the contacts", "S")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
@@ -168,14 +178,21 @@ class History:
         """Yield the rows of ``patches.csv``."""
         for step in self.steps:
             for index in range(self.patches.count):
-                values = (getattr(step.patches, name)[index] for name in PATCH_COLUMNS[3:])
+                values = (getattr(step.patches, name)[index] for name in self._patch_values)
                 yield (step.step, *self._place(index), *values)
 
     @property
     def patch_columns(self) -> tuple[str, ...]:
         """Columns of ``patches.csv``: of regions their names instead of places on a grid."""
         places = PATCH_COLUMNS[1:3] if isinstance(self.patches, PatchGrid) else ("region",)
-        return (PATCH_COLUMNS[0], *places, *PATCH_COLUMNS[3:])
+        return (PATCH_COLUMNS[0], *places, *self._patch_values)
+
+    @property
+    def _patch_values(self) -> tuple[str, ...]:
+        """Columns of ``patches.csv`` behind the place; with laws their stiffness is among them."""
+        with_laws = all(step.patches.stiffness_MPa_per_mm is not None for step in self.steps)
+        more = (PATCH_STIFFNESS,) if with_laws and self.steps else ()
+        return (*PATCH_COLUMNS[3:], *more)
 
     def _place(self, index: int) -> tuple[int | str, ...]:
         """Return a patch's place on the grid, or the name of a region."""

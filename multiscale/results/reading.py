@@ -14,7 +14,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.results.history import PATCH_COLUMNS, History
+from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
 
 _TEXT = "reason"
 _COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations"}
@@ -82,7 +82,11 @@ def _number(name: str, text: str) -> float | int | None:
 
 def _patch_states(rows: list[dict[str, str]], count: int) -> list[PatchState]:
     """Return the states of all patches, at one load step after another."""
-    columns = {name: np.array([float(row[name]) for row in rows]) for name in PATCH_COLUMNS[3:]}
+    names = [
+        *PATCH_COLUMNS[3:],
+        *([PATCH_STIFFNESS] if rows and PATCH_STIFFNESS in rows[0] else []),
+    ]
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in names}
     tables = {name: column.reshape(-1, count) for name, column in columns.items()}
     steps = len(rows) // count
     return [PatchState(**{name: tables[name][k] for name in tables}) for k in range(steps)]

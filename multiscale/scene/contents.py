@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from multiscale.scene.body_sections import BodySection, CounterBodySection, LawSection
+from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.scene.coupling_sections import CouplingSection, LoadSection, ReferenceSection
+from multiscale.scene.read_off_rules import problems_of_conductance, problems_of_hardness
 from multiscale.scene.sections import (
     BlockSection,
+    CounterSurfaceSection,
     MicroSection,
     Number,
     OutputSection,
@@ -37,7 +41,7 @@ class SceneSections(Section):
     Without it, ``auto`` means 2 %."""
     surface: SurfaceSection
     """The rough surface."""
-    counter_surface: SurfaceSection | None = None
+    counter_surface: CounterSurfaceSection | None = None
     """Roughness of the other side, which is smooth without this section: heights as measured on it,
     facing up, on the grid of ``[surface]``. It is laid on the surface turned about the y axis, so
     that at x and Lx − x the two heights add."""
@@ -59,6 +63,8 @@ class SceneSections(Section):
     """The meshes of ``coupling.kind = "reference"``."""
     loading: Annotated[LoadSection, Field(alias="load")]
     """The motion of the rigid plane, or the force on it."""
+    conductance: ConductanceSection | None = None
+    """Thermal and electrical conductance of the interface, which are not found without it."""
     output: OutputSection = OutputSection()
     """What is written beside the tables of results."""
 
@@ -82,7 +88,10 @@ class SceneSections(Section):
     @model_validator(mode="after")
     def _fit_together(self) -> Self:
         """Refuse sections that make no sense together, with the first reason."""
-        of_all = self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings
+        of_all = (
+            *(self._problems_of_bodies, self._problems_of_surfaces, self._problems_of_couplings),
+            *(partial(problems_of_hardness, self), partial(problems_of_conductance, self)),
+        )
         for problems in of_all:
             for key, text in problems():
                 raise PydanticCustomError("sections", "{text}", {"key": key, "text": text})

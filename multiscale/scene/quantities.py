@@ -26,6 +26,10 @@ _UNITS = {
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
     "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3}),
+    "W/m/K": _Unit('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
+    "ohm*m": _Unit('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
+    "K": _Unit('"300 K"', (1e-9, 1e9), {"K": 1.0}),
+    "deg": _Unit('"90 deg"', (1e-9, 1e6), {"deg": 1.0}),
     "s": _Unit('"55 min"', (1e-3, 1e12), {"s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}),
 }
 """Target units in pint's notation; an empty one is a ratio.
@@ -38,7 +42,7 @@ _UNIT = r"\(?(?:[^\W\d]+|%)(?:\s*(?:\^|\*\*)\s*[+-]?[0-9]{1,2}(?![0-9])|[²³⁴
 _QUANTITY = re.compile(rf"\s*{_NUMBER}\s*(?:\*?\s*{_UNIT}(?:\s*[*/·]\s*{_UNIT}|\s+{_UNIT})*)?\s*")
 _LONGEST = 100  # characters
 
-_COMMON = re.compile(rf"\s*({_NUMBER})\s*([^\W\d]+(?:/mm)?)\s*")
+_COMMON = re.compile(rf"\s*({_NUMBER})\s*([^\W\d]+(?:[/ ][^\W\d]+)*)\s*")
 
 
 @cache
@@ -151,6 +155,30 @@ def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
     return points
 
 
+def parse_pair(value: Any, unit: str) -> tuple[float, ...]:
+    """Turn one positive quantity, or a list of one or two, into numbers: one for each body.
+
+    Args:
+        value: A quantity, or a list of quantities.
+        unit: Target unit in pint's notation.
+
+    Returns:
+        The magnitudes in ``unit``.
+
+    Raises:
+        ValueError: When a value is no quantity of that dimension or not positive, or there are more
+            than two.
+    """
+    listed = isinstance(value, list | tuple)
+    pair = tuple(parse_quantity(one, unit) for one in (value if listed else [value]))
+    allowed = f"(allowed: one or two quantities > 0 such as {_UNITS[unit].example})"
+    if len(pair) not in (1, 2):
+        raise ValueError(f"needs a value for one body or for both {allowed}")
+    if not min(pair) > 0.0:
+        raise ValueError(f"must be greater than 0 {allowed}")
+    return pair
+
+
 def _named(unit: str) -> str:
     return unit or "a ratio"
 
@@ -180,5 +208,14 @@ Approaches = Annotated[
 ]
 Forces = Annotated[
     tuple[float, ...], _parser("N", parse_turning_points), _schema("N", several=True)
+]
+Angle = Annotated[float, _parser("deg"), _schema("deg")]
+ThermalConductivity = Annotated[float, _parser("W/m/K"), _schema("W/m/K")]
+Temperature = Annotated[float, _parser("K"), _schema("K")]
+OneOrTwoConductivities = Annotated[
+    tuple[float, ...], _parser("W/m/K", parse_pair), _schema("W/m/K", several=True)
+]
+OneOrTwoResistivities = Annotated[
+    tuple[float, ...], _parser("ohm*m", parse_pair), _schema("ohm*m", several=True)
 ]
 Tilt = tuple[Slope, Slope] | Literal["free"]

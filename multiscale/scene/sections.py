@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -12,7 +13,7 @@ from geometry.files.content import LENGTH_UNITS, length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scene.height_map import HeightsOfArray
-from multiscale.scene.quantities import Length, Pressure, Slope, SpectralAmplitude
+from multiscale.scene.quantities import Angle, Length, Pressure, Slope, SpectralAmplitude
 
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
@@ -198,6 +199,25 @@ class SurfaceSection(Section):
         )
 
 
+class CounterSurfaceSection(SurfaceSection):
+    """Roughness of the other side, and how it lies on the surface.
+
+    Its other keys are those of ``[surface]``.
+    """
+
+    shift: tuple[Length, Length] = (0.0, 0.0)
+    """Way along x and y that it is moved, once it lies on the surface: over the borders of a
+    periodic map, or over a map that is larger than the surface."""
+    rotation: Angle = 0.0
+    """Angle that it is turned by about its middle, from x to y as seen from above, before it is
+    moved. Quarters of a turn are exact; others interpolate, on a periodic or larger map."""
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether it is shifted or turned."""
+        return any(self.shift) or self.rotation != 0.0
+
+
 class BlockSection(Section):
     """The elastic block below the surface, pressed by a rigid plane.
 
@@ -271,6 +291,15 @@ class MicroSection(Section):
     not given they do with half-space contacts, unless laws are isolated or those of samples."""
     border: Literal["ignore", "include"] = "ignore"
     """Whether maxima on the surface's border carry load."""
+    hardness: Annotated[Pressure, Field(gt=0)] | None = None
+    """Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951): no contact
+    pressure exceeds it, and what it leaves of the overlap stays as plastic depth. Contacts are
+    elastic when not given. It needs half-space contacts."""
+
+    @property
+    def upper(self) -> float:
+        """Largest contact pressure [MPa]; infinite without a hardness."""
+        return math.inf if self.hardness is None else self.hardness
 
     @model_validator(mode="after")
     def _chooses_or_states(self) -> Self:

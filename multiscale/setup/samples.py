@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from geometry import Material, MaterialPair, Surface, facing, mirrored, turned_over
+from geometry import Material, MaterialPair, Surface, facing, mirrored
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SurfaceSection
-from multiscale.setup.surface_and_block import located, sample_surface
+from multiscale.setup.surface_and_block import laid_counter_surface, located, sample_surface
 
 WHOLE = "face"
 """Name of the contact face where the mesh gives it none."""
@@ -49,15 +49,14 @@ def region_samples(
     whole = str(scene.body.contact) if scene.body else WHOLE
     parts: list[tuple[str, SurfaceSection, str]] = [(whole, scene.surface, "surface")]
     parts += [(str(one.surface), one, "law.regions") for one in scene.law.regions]
-    counter = None
-    if scene.counter_surface is not None:
-        counter = turned_over(sample_surface(scene, scene.counter_surface, "counter_surface"))
+    above = scene.counter_surface
     found = []
     for (name, section, key), material in zip(parts, materials, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
-        if counter is not None:
+        if above is not None:
+            laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
             with located(scene, "counter_surface"):
-                surfaces = [facing(surface, counter) for surface in surfaces]
+                surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
         samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
         pair = MaterialPair(first=material, second=second)
         region = RegionSamples(

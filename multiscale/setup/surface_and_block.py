@@ -16,6 +16,7 @@ from geometry import (
     Material,
     Surface,
     facing,
+    laid_on,
     read_surface,
     synthesise,
     turned_over,
@@ -23,7 +24,7 @@ from geometry import (
 from geometry.files.reading import surface_of
 from geometry.preparation import prepared
 from multiscale.scene.scene import Scene
-from multiscale.scene.sections import BlockSection, SurfaceSection
+from multiscale.scene.sections import BlockSection, CounterSurfaceSection, SurfaceSection
 
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, or contacts, and of
@@ -55,9 +56,41 @@ def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
     own = sample_surface(scene, scene.surface, "surface")
     if scene.counter_surface is None:
         return own, None
-    counter = turned_over(sample_surface(scene, scene.counter_surface, "counter_surface"))
+    counter = laid_counter_surface(scene, scene.counter_surface, own)
     with located(scene, "counter_surface"):
         return facing(own, counter), counter
+
+
+def laid_counter_surface(scene: Scene, section: CounterSurfaceSection, own: Surface) -> Surface:
+    """Return the counter-body's surface as it lies on the first one: turned over, turned and moved.
+
+    Args:
+        scene: The scene.
+        section: Its section on the counter-body's surface.
+        own: The first surface.
+
+    Raises:
+        InputError: When it cannot be made or read, or does not cover the first one; names file and
+            key.
+    """
+    counter = turned_over(sample_surface(scene, section, "counter_surface"))
+    if not section.is_moved:
+        return counter
+    key = "rotation" if section.rotation else "shift"
+    value: Any = section.rotation if section.rotation else list(section.shift)
+    allowed = "a map that continues periodically, or one that is larger by as much"
+    try:
+        laid = laid_on(own, counter, shift=section.shift, angle=section.rotation)
+    except InputError:
+        problem = "takes the counter-surface off the surface, which it must cover"
+    else:
+        if laid.periodic or not section.periodic:
+            return laid
+        problem = "leaves no counter-surface that continues periodically over these sides"
+        allowed = "multiples of 90 deg, of 180 deg on sides that differ"
+    raise InputError(
+        problem, key=f"counter_surface.{key}", value=value, allowed=allowed, file=scene.file
+    )
 
 
 def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
@@ -219,6 +252,7 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"at least {resolved:.3g} mm, for heights of this size",
             file=scene.file,
         )
+    _check_hardness(scene, body.area)
     if scene.kind == "analytic":
         return
     if loading.force is not None:
@@ -235,6 +269,21 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"at most {named}, {most:.6g} {unit}",
             file=scene.file,
         )
+
+
+def _check_hardness(scene: Scene, area: float) -> None:
+    """Refuse forces whose mean pressure the hardness does not bear anywhere."""
+    force, hardness = scene.loading.force, scene.micro.hardness
+    if force is None or hardness is None or hardness > (mean := max(force) / area):
+        return
+    raise InputError(
+        "leaves no equilibrium: even where all of the face touches, the force of "
+        f"{max(force):.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa",
+        key="micro.hardness",
+        value=f"{hardness:.6g} MPa",
+        allowed=f"> {mean:.6g} MPa, or a smaller load.force",
+        file=scene.file,
+    )
 
 
 @contextmanager

@@ -122,8 +122,8 @@ def grouped(cases: Sequence[Case]) -> list[list[Case]]:
     """Group the cases whose load steps differ by a factor alone.
 
     The body is linearly elastic: at given approaches, pressures and forces are proportional to its
-    Young's modulus, if nothing else is elastic. At given forces they are not, as the contact area
-    grows less than the force.
+    Young's modulus, if nothing else is elastic and no hardness bounds them. At given forces they
+    are not, as the contact area grows less than the force.
 
     Args:
         cases: The cases of a sweep.
@@ -134,7 +134,9 @@ def grouped(cases: Sequence[Case]) -> list[list[Case]]:
     groups: dict[str, list[Case]] = {}
     for case in cases:
         others = {key: value for key, value in case.values.items() if key != _LINEAR}
-        by_approach = case.scene.loading.approach is not None and case.scene.counter_body is None
-        key = json.dumps(others if by_approach else case.values, sort_keys=True, default=str)
+        scene = case.scene
+        elastic = scene.counter_body is None and scene.micro.hardness is None
+        linear = elastic and scene.loading.approach is not None
+        key = json.dumps(others if linear else case.values, sort_keys=True, default=str)
         groups.setdefault(key, []).append(case)
     return list(groups.values())

@@ -9,7 +9,7 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 
-QUICK = {"four_models", "kappa", "own_problem", "paper_block", "paper_figures", "tilt"}
+QUICK = {"four_models", "heat", "kappa", "own_problem", "paper_block", "paper_figures", "tilt"}
 """Demos that take seconds; the others are among the long tests."""
 
 

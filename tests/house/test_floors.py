@@ -28,7 +28,7 @@ FLOORS = {
         "asperities meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms contact_detail",
+        "closed_forms conductance contact_detail",
         "compliance model",
         "contact interaction",
         "half_space islands",
@@ -52,7 +52,7 @@ FLOORS = {
         "compiled_forms exports results scene",
         "setup",
         "couplings",
-        "contact_recorder measured_errors",
+        "conductances contact_recorder measured_errors",
         "planning",
         "run",
         "output restart",

@@ -46,6 +46,13 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=half-space", "micro.finite_slopes=true",
         "block.height=0.3 mm", "load={force='1 N', steps=2, tilt='free'}",
     ],
+    "concurrent, with a hardness, conducting": [
+        "coupling.kind=concurrent", "micro.model=half-space", "micro.hardness='300 MPa'",
+        "load.approach=['8 um', '4 um']", "conductance.conductivity=['50 W/m/K']",
+    ],
+    "laws that conduct": [
+        "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
+    ],
     "concurrent, islands": ["coupling.kind=concurrent", "micro.model=islands"],
     "concurrent, asperities": [
         "coupling.kind=concurrent", "micro.model=elliptic", "load.tilt=free",

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import InputError, Surface, facing, turned_over
+from geometry import InputError, Surface, facing, laid_on, turned_over
 
 
 def surface(heights, lengths=(2.0, 1.0), **kwargs):
@@ -11,6 +11,7 @@ def surface(heights, lengths=(2.0, 1.0), **kwargs):
 
 
 RANDOM = np.random.default_rng(1).normal(size=(8, 4))
+SQUARE = np.random.default_rng(2).normal(size=(8, 8))
 
 
 def test_a_surface_turned_over_has_its_heights_at_the_mirrored_place():
@@ -38,3 +39,42 @@ def test_a_mirror_image_doubles_the_heights():
 def test_surfaces_that_do_not_fit_are_refused(other, text):
     with pytest.raises(InputError, match=text):
         facing(surface(RANDOM), other)
+
+
+def test_quarters_of_a_turn_and_whole_cells_are_exact():
+    one = surface(SQUARE[:6, :6], periodic=True, lengths=(1.0, 1.0))
+    for turns in range(-4, 5):
+        turned = laid_on(one, one, angle=90.0 * turns)
+        np.testing.assert_array_equal(turned.heights, np.rot90(one.heights, turns))
+        assert turned.periodic
+    moved = laid_on(one, one, shift=(2 / 6, -1 / 6))
+    np.testing.assert_array_equal(moved.heights, np.roll(one.heights, (2, -1), axis=(0, 1)))
+    # a point at (x, y) from the middle comes to (−y, x)
+    turned = laid_on(one, one, angle=90.0)
+    at = np.array([0.13, -0.21])
+    assert turned.height_at(0.5 - at[1], 0.5 + at[0]) == pytest.approx(
+        float(one.height_at(*(0.5 + at))), abs=1e-12
+    )
+
+
+def test_other_turns_and_shifts_are_those_of_the_interpolant():
+    """A plane wave in closed form, turned by 30 degrees and moved by parts of a cell."""
+    x = (np.arange(96) + 0.5) / 96
+    wave = surface(np.cos(2 * np.pi * x)[:, None] * np.ones(96), periodic=True, lengths=(1.0, 1.0))
+    small = surface(np.zeros((8, 8)), lengths=(0.4, 0.4))
+    angle, shift = np.radians(30.0), (0.031, -0.017)
+    found = laid_on(small, wave, shift=shift, angle=30.0)
+    dx, dy = small.x[:, None] - 0.2 - shift[0], small.y - 0.2 - shift[1]
+    along = np.cos(angle) * dx + np.sin(angle) * dy
+    np.testing.assert_allclose(found.heights, np.cos(2 * np.pi * (along + 0.5)), atol=1e-6)
+    assert found.lengths == small.lengths
+    assert not found.periodic
+
+
+def test_a_larger_map_is_cut_where_it_lies():
+    large = surface(SQUARE, lengths=(1.0, 1.0))
+    small = surface(np.zeros((4, 4)), lengths=(0.5, 0.5))
+    found = laid_on(small, large, shift=(1 / 8, -2 / 8))
+    np.testing.assert_allclose(found.heights, large.heights[1:5, 4:8], atol=1e-12)
+    with pytest.raises(InputError):
+        laid_on(small, large, shift=(3 / 8, 0.0))

@@ -186,3 +186,18 @@ def test_ratios_of_a_machine_are_measured_only_where_they_are_needed():
     assert vars(machine) == {}
     predicted_cost(make_setup(Scene.from_dict(data("concurrent"))), machine)
     assert set(vars(machine)) == {"arrays"}  # no mesh, no sparse products
+
+
+def test_hardness_and_conductance_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
+    """No plastic depth, no second stiffness, and none of the modules that make them."""
+    path, asked = tmp_path / "asked", tmp_path / "not"
+    path.mkdir(), asked.mkdir()
+    modules = {"multiscale.conductances", "micro.conductance"}
+    heat = {"conductance": {"conductivity": ["50 W/m/K"]}}
+    assert modules <= loaded(path, "run", data(**heat))
+    assert not modules & loaded(asked, "run", data())
+    monkeypatch.setattr(HalfSpaceModel, "interface_stiffness", None)
+    products = [sum(step.newton_iterations for step in Run(one).load_steps()) for one in (
+        Scene.from_dict(data()), Scene.from_dict(data(micro={"hardness": 1e9})),
+    )]  # fmt: skip
+    assert products[0] == products[1]  # which a hardness that nothing bears does not change

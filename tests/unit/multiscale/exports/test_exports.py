@@ -261,3 +261,32 @@ def test_exports_of_earlier_laws_go(tmp_path):
     assert not (tmp_path / "laws_4c" / "law_1_0.py").exists()
     remove_exports(tmp_path)
     assert [path.name for path in tmp_path.rglob("*.*")] == ["mine.py"]
+
+
+def conducts(stiffness):
+    """What `Conductances.per_area` gives, of a pair with h = 5 dp/dc."""
+    return {"thermal_conductance_W_per_m2K": 5.0 * stiffness}
+
+
+def test_conductance_per_area_is_exported(tmp_path):
+    """Conductance over pressure: of Hertz' law dp/dc = 1.5 · 4000^(2/3) p^(1/3)."""
+    table = table_of(hertzian())
+    for format, mark in (("abaqus", ""), ("calculix", "** ")):
+        (path,) = export_laws(table, tmp_path, format, conducts=conducts)
+        before, after = path.read_text().split(f"{mark}*GAP CONDUCTANCE, PRESSURE\n")
+        (name,) = tables_in(before)
+        lines = [line.removeprefix(mark) for line in after.splitlines()]
+        rows = np.array([[float(word) for word in line.split(",")] for line in lines])
+        conductance, pressure = rows.T
+        assert name == "PATCH_0_0"
+        assert pressure[0] == 0.0
+        expected = 5.0e-3 * 1.5 * 4e3 ** (2 / 3) * np.cbrt(pressure)
+        np.testing.assert_allclose(conductance, expected, rtol=1e-9, atol=1e-9)
+    (path,) = export_laws(table, tmp_path, "csv", conducts=conducts)
+    rows = list(csv.DictReader(path.open()))
+    for row in rows:
+        found = float(row["thermal_conductance_W_per_m2K"])
+        assert found == 5.0 * float(row["stiffness_MPa_per_mm"])
+    for format in FORMATS:
+        for path in export_laws(table, tmp_path, format):
+            assert "onductance" not in path.read_text().replace("gap conductance", "")

@@ -156,14 +156,6 @@ def test_a_law_that_ends_before_first_touch_is_open():
             {"make_model": lambda surface: HalfSpaceModel(surface, contact_modulus=MODULUS)},
             "a representative law needs periodic models",
         ),
-        (
-            {
-                "make_model": lambda surface: HalfSpaceModel(
-                    surface, contact_modulus=MODULUS, periodic=True, upper=100.0
-                )
-            },
-            "a representative law needs models without a bound",
-        ),
     ],
 )
 def test_bad_input_is_refused(change, message):

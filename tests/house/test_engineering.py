@@ -1,0 +1,37 @@
+"""The page on what engineers read off is true: its scene gives the numbers it prints."""
+
+from pathlib import Path
+
+import pytest
+
+from multiscale import Scene, run
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "demos" / "engineering.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.long
+def test_numbers_of_the_page():
+    scene = Scene.load(ROOT / "demos" / "scenes" / "pressed_steel.toml", ["output.check=none"])
+    history = run(scene)
+    first, relieved, last = (history.steps[k] for k in (3, 7, 11))
+    for step in (first, relieved):
+        area, stiffness = 100 * step.contact_area_fraction, 1e-3 * step.stiffness_N_per_mm
+        assert f"| {1e3 * step.approach_mm:.3f} µm (" in PAGE
+        assert f"| {area:.4g} % (" in PAGE
+        assert f"| {stiffness:.1f} kN/mm (" in PAGE
+    energies = last.elastic_energy_mJ, last.plastic_work_mJ, last.work_mJ
+    assert "{:.3f}, {:.3f} and {:.3f} mJ".format(*energies) in PAGE
+    assert f"volume, {last.plastic_work_mJ / 2000.0:.3e}".replace("e-04", "e-4") in PAGE
+    assert f"`thermal_conductance_W_per_K` {last.thermal_conductance_W_per_K:.4f}" in PAGE
+    assert f"`gap_conductance_W_per_K` {last.gap_conductance_W_per_K:.4f}" in PAGE
+    assert f"`electrical_conductance_S` {last.electrical_conductance_S:.0f}" in PAGE
+    data = {key: part for key, part in scene.written.items() if key != "micro"}
+    elastic = run(Scene.from_dict(data))
+    assert "pressures up to 19.5 GPa, 7.13 GPa in the mean" in PAGE
+    (note,) = (note for note in elastic.notes if note.startswith("elastic contacts"))
+    assert "up to 19.5 GPa, in the mean of the real contact area 7.13 GPa" in note
+    for step, k in ((elastic.steps[3], 3), (elastic.steps[7], 7)):
+        assert f"({1e3 * step.approach_mm:.3f})" in PAGE.replace("elastic ", ""), k
+    conducted = elastic.thermal_conductance_W_per_K[-1]
+    assert f"Elastic contacts would conduct {conducted:.4f} W/K" in PAGE

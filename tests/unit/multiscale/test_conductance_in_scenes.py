@@ -1,0 +1,159 @@
+"""Scenes that ask for the conductance of their interface: columns, laws, notes, refusals."""
+
+import csv
+from functools import cache
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from micro import HalfSpaceModel
+from micro.conductance import STEFAN_BOLTZMANN
+from multiscale import Run, Scene, make_setup, run
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.results.reading import read_history
+
+HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}
+PAIR = 1.0 / (1.0 / 50.0 + 1.0 / 0.2)
+GAPS = {"gas": "0.026 W/m/K", "temperature": "350 K", "emissivity": 0.4}
+
+
+def scene(kind="analytic", conductance=HEAT, **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "patches": {"grid": [2, 2]},
+        "coupling": {"kind": kind},
+        "load": {"approach": 0.008, "steps": 2},
+        "output": {"check": "none", "figures": False, "report": False, "contact": "none"},
+    }
+    return Scene.from_dict(
+        data | ({} if conductance is None else {"conductance": conductance}) | sections
+    )
+
+
+@cache
+def ran(kind):
+    return run(scene(kind))
+
+
+def test_contacts_on_half_spaces_conduct_by_their_stiffness():
+    asked = scene(micro={"finite_slopes": False})
+    model, setup = None, make_setup(asked)
+    model = HalfSpaceModel(setup.surface, contact_modulus=setup.materials.contact_modulus)
+    history, step = run(asked), 1e-7
+    for approach, conductance in zip(
+        history.approach_mm, history.thermal_conductance_W_per_K, strict=True
+    ):
+        ahead, behind = (model.solve(approach + way).force for way in (step, -step))
+        rate = (ahead - behind) / (2 * step)
+        expected = 2.0 * PAIR / model.contact_modulus * rate * 1e-3  # N/mm / MPa = mm
+        assert conductance == pytest.approx(expected, rel=1e-4)
+    assert (history.gap_conductance_W_per_K == 0.0).all()
+    assert np.isnan(history.electrical_conductance_S).all()
+
+
+def test_heat_and_current_pass_alike():
+    both = scene(conductance={"conductivity": "80 W/m/K", "resistivity": "1.7e-8 ohm m"})
+    history = run(both)
+    ratio = history.electrical_conductance_S / history.thermal_conductance_W_per_K
+    np.testing.assert_allclose(ratio, 1.0 / 1.7e-8 / 80.0, rtol=1e-12)
+
+
+def test_a_block_does_not_change_what_its_contacts_conduct_between_half_spaces():
+    """At the first load step the same cells touch; the body is no part of their conductance."""
+    alone, block = ran("analytic"), ran("concurrent")
+    assert block.force_N[0] < 0.999 * alone.force_N[0]
+    assert block.thermal_conductance_W_per_K[0] == pytest.approx(
+        alone.thermal_conductance_W_per_K[0], rel=1e-9
+    )
+
+
+@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
+    done = Run(scene(kind))
+    for step in done.load_steps():
+        laws = done.table.laws
+        ahead, behind = (
+            [
+                float(law.pressure(c + way))
+                for law, c in zip(laws, step.patches.closure_mm, strict=True)
+            ]
+            for way in (1e-8, -1e-8)
+        )
+        rate = np.subtract(ahead, behind) / 2e-8
+        np.testing.assert_allclose(step.patches.stiffness_MPa_per_mm, rate, rtol=1e-5, atol=1e-3)
+        modulus = done.setup.materials.contact_modulus
+        # MPa/mm over MPa on mm² is a length in mm
+        expected = 2.0 * PAIR * (rate.sum() * 0.25 / modulus) * 1e-3
+        assert step.thermal_conductance_W_per_K == pytest.approx(expected, rel=1e-5)
+    done.close()
+
+
+def test_gas_and_radiation_pass_through_the_mean_gap():
+    history = run(scene(conductance=HEAT | GAPS))
+    gas = 0.026 / (1e-3 * history.mean_separation_mm)
+    radiation = 4.0 * 0.4 * STEFAN_BOLTZMANN * 350.0**3
+    np.testing.assert_allclose(history.gap_conductance_W_per_K, (gas + radiation) * 1e-6)
+    contacts = history.thermal_conductance_W_per_K - history.gap_conductance_W_per_K
+    np.testing.assert_allclose(contacts, ran("analytic").thermal_conductance_W_per_K, rtol=1e-9)
+    assert any("of it through the gaps" in note for note in history.notes)
+
+
+def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
+    done = Run(scene("consistent"))
+    for step in done.load_steps():
+        if step.step == 1:
+            write_checkpoint(tmp_path / "checkpoint.h5", checkpoint_of(done, done.state()))
+    kept = read_checkpoint(tmp_path / "checkpoint.h5")
+    np.testing.assert_array_equal(
+        kept.steps[0].patches.stiffness_MPa_per_mm, done.steps[0].patches.stiffness_MPa_per_mm
+    )
+    write_results(tmp_path, done, options=[])
+    again, before = read_history(tmp_path), done.history()
+    for name in ("thermal_conductance_W_per_K", "gap_conductance_W_per_K"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(before, name))
+    for one, other in zip(again, before, strict=True):
+        np.testing.assert_array_equal(
+            one.patches.stiffness_MPa_per_mm, other.patches.stiffness_MPa_per_mm
+        )
+    with (tmp_path / "patches.csv").open() as file:
+        assert next(csv.reader(file))[-1] == "stiffness_MPa_per_mm"
+    assert any("side by side" in note for note in before.notes)
+
+
+def test_scenes_that_do_not_ask_have_no_conductance():
+    history = run(scene(conductance=None))
+    assert np.isnan(history.thermal_conductance_W_per_K).all()
+    assert not any("conductance" in note for note in history.notes)
+    assert history.patch_columns[-1] == "contact_area_fraction"  # no law, no stiffness of one
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({}, "conductance: needs conductivities"),
+        ({"conductivity": ["0 W/m/K"]}, "conductance.conductivity.* must be greater than 0"),
+        ({"conductivity": ["50 W/m/K", "-1 W/m/K"]}, "must be greater than 0"),
+        ({"conductivity": ["50 W/m/K", "6e7 S/m"]}, "has the wrong unit .*in units of W/m/K"),
+        ({"resistivity": ["50 W/m/K"]}, "conductance.resistivity.* has the wrong unit"),
+        ({"conductivity": [1.0, 2.0, 3.0]}, "for one body or for both"),
+        ({"resistivity": "1 ohm m", "gas": 0.026}, "'gas' is about heat"),
+        ({"conductivity": 1.0, "temperature": 300.0}, "both 'temperature' and 'emissivity'"),
+        ({"conductivity": 1.0, "temperature": 300.0, "emissivity": 1.2}, "less than or equal to 1"),
+    ],
+)
+def test_bad_input(given, text):
+    with pytest.raises(InputError, match=text):
+        scene(conductance=given)
+
+
+def test_couplings_without_a_stiffness_of_the_interface_are_refused():
+    with pytest.raises(InputError, match=r"does not go with coupling.kind = 'reference'"):
+        scene("reference")
+    with pytest.raises(InputError, match=r"with micro.model = 'elliptic' without laws"):
+        scene("concurrent", micro={"model": "elliptic"})
+    with pytest.raises(InputError, match="stiffness is that of contacts that yield"):
+        scene("consistent", micro={"hardness": "1 GPa"})

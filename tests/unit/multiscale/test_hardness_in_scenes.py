@@ -1,0 +1,213 @@
+"""Scenes with a hardness: what is solved, kept, written, said and refused."""
+
+from functools import cache
+
+import h5py
+import numpy as np
+import pytest
+
+from geometry.errors import InputError
+from micro import HalfSpaceModel
+from multiscale import Run, Scene, make_setup, run, sweep
+from multiscale.couplings.fields import FieldRecord
+from multiscale.loading.energy import BALANCE, missing_energy
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.results.reading import read_history
+from multiscale.storage import verified
+
+HARDNESS = 300.0
+UP_AND_DOWN = {"approach": [0.008, 0.004], "steps": 2}
+
+
+def scene(kind="analytic", *, hardness=HARDNESS, load=UP_AND_DOWN, periodic=False, **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    grid = {"grid": [24, 24], "lengths": [1.0, 1.0], "periodic": periodic}
+    data = {
+        "surface": {"spectrum": spectrum, **grid},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "patches": {"grid": [2, 2]},
+        "micro": {} if hardness is None else {"hardness": hardness},
+        "coupling": {"kind": kind},
+        "load": load,
+        "output": {"check": "none", "figures": False, "report": False},
+    }
+    return Scene.from_dict(data | sections)
+
+
+@cache
+def ran(kind, periodic=False):
+    return run(scene(kind, periodic=periodic))
+
+
+@pytest.mark.parametrize(
+    ("kind", "periodic"), [("analytic", False), ("analytic", True), ("concurrent", False)]
+)
+def test_load_steps_bear_the_hardness_and_leave_a_plastic_depth(kind, periodic):
+    history = ran(kind, periodic)
+    assert history.peak_pressure_MPa.max() <= HARDNESS * (1.0 + 1e-10)
+    assert history.yielding_area_fraction[1] > 0.0
+    assert history.yielding_area_fraction[-1] == 0.0
+    depth = history.contact.plastic_depth_mm
+    assert depth.max() == history.plastic_depth_mm[-1] == history.plastic_depth_mm[1] > 0.0
+    assert history.plastic_work_mJ[-1] == pytest.approx(
+        HARDNESS * depth.sum() / depth.size, rel=1e-10
+    )
+    elastic = run(scene(kind, hardness=None, periodic=periodic))
+    # flattened summits bear less on the way back, and yielding ones on the way there
+    assert (history.force_N[1:] < elastic.force_N[1:]).all()
+
+
+def test_the_scene_is_the_model_under_a_bound():
+    setup = make_setup(scene(load={"approach": 0.008, "steps": 1}, micro={
+        "hardness": "300 MPa", "finite_slopes": False,
+    }))  # fmt: skip
+    model = HalfSpaceModel(
+        setup.surface, contact_modulus=setup.materials.contact_modulus, upper=HARDNESS
+    )
+    (step,) = run(setup.scene)
+    assert step.force_N == pytest.approx(model.solve(0.008).force, rel=1e-7)
+
+
+def test_laws_of_rising_loads_meet_the_contact_problem():
+    load = {"approach": 0.008, "steps": 2}
+    laws, solved = (run(scene(kind, load=load)) for kind in ("consistent", "concurrent"))
+    np.testing.assert_allclose(laws.force_N, solved.force_N, rtol=2e-3)  # the table's tolerance
+    assert any("laws are those of rising loads" in note for note in laws.notes)
+
+
+def test_representative_laws_end_below_the_hardness():
+    from multiscale.laws.representative import representative_law
+
+    surface = make_setup(scene(periodic=True)).surface
+    given = {"contact_modulus": 4000.0, "periodic": True, "upper": HARDNESS}
+    law = representative_law(
+        [surface], 4000.0, largest_pressure=0.9 * HARDNESS, tolerance=1e-2,
+        make_model=lambda sample: HalfSpaceModel(sample, **given),
+    )  # fmt: skip
+    # the last row has the plane at the height of the mean plane
+    end = HalfSpaceModel(surface, **given).solve(law.initial_separation)
+    assert law.rows.pressure[-1] == pytest.approx(end.force / surface.area, rel=1e-6)
+    state = HalfSpaceModel(surface, **given).solve_force(0.2 * HARDNESS * surface.area)
+    # closure and approach both count from the highest point
+    assert law.pressure(state.approach) == pytest.approx(0.2 * HARDNESS, rel=2e-2)
+
+
+def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
+    whole, first = Run(scene()), Run(scene())
+    steps = list(whole.load_steps())
+    for step in first.load_steps():
+        if step.step == 2:
+            break
+    path = tmp_path / "checkpoint.h5"
+    write_checkpoint(path, checkpoint_of(first, first.state()))
+    kept, again = read_checkpoint(path), Run(scene())
+    again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    after = list(again.load_steps())
+    for name in ("force_N", "plastic_depth_mm", "plastic_work_mJ", "work_mJ"):
+        assert [getattr(one, name) for one in after] == [getattr(one, name) for one in steps[2:]]
+    np.testing.assert_array_equal(
+        again.contacts[-1].plastic_depth_mm, whole.contacts[-1].plastic_depth_mm
+    )
+
+
+def test_fields_of_a_resumed_run_are_those_of_the_whole_path():
+    """Load steps whose fields were not kept are found by all those before them."""
+    asked = scene("concurrent", output={"fields": "all", "check": "none", "figures": False})
+    whole = Run(asked)
+    steps = list(whole.load_steps())
+    kept, whole.fields = whole.fields.kept, FieldRecord(whole.setup, None)
+    coupling = whole.make_coupling()
+    start, latest = coupling.past
+    whole.fields.complete(coupling, steps)
+    assert coupling.past[0] is start
+    assert coupling.past[1] is latest
+    assert whole.fields.kept.keys() == kept.keys()
+    for step, pressures in whole.fields.kept.items():
+        np.testing.assert_allclose(pressures, kept[step], atol=1e-6 * HARDNESS)
+
+
+def test_plastic_depth_is_written_and_read(tmp_path):
+    done = Run(scene())
+    list(done.load_steps())
+    write_results(tmp_path, done, options=[])
+    with h5py.File(verified(tmp_path / "contact.h5"), "r") as file:
+        depth = file["step_4/plastic_depth_mm"][()]
+    np.testing.assert_array_equal(depth, done.contacts[-1].plastic_depth_mm)
+    again = read_history(tmp_path)
+    np.testing.assert_array_equal(again.plastic_depth_mm, done.history().plastic_depth_mm)
+    elastic = Run(scene(hardness=None))
+    list(elastic.load_steps())
+    write_results(tmp_path, elastic, options=[])
+    with h5py.File(verified(tmp_path / "contact.h5"), "r") as file:
+        assert "plastic_depth_mm" not in file["step_4"]
+    assert np.isnan(read_history(tmp_path).plastic_depth_mm).all()
+
+
+def test_errors_are_not_measured_after_unloading():
+    history = run(scene(output={"check": "all", "figures": False}))
+    assert [bool(step.errors) for step in history] == [True, True, False, False]
+    assert sum("after unloading are not measured" in note for note in history.notes) == 1
+
+
+def test_notes_say_what_yielded_and_what_would_bear_elastic_contacts():
+    (hard,) = (note for note in ran("analytic").notes if note.startswith("hardness 300 MPa"))
+    assert "after load step 4 a plastic volume of" in hard
+    history = run(scene(hardness=None))
+    (soft,) = (note for note in history.notes if note.startswith("elastic contacts: pressures"))
+    peak = history.peak_pressure_MPa.max()
+    assert f"up to {peak / 1e3:.3g} GPa" in soft or f"up to {peak:.3g} MPa" in soft
+    assert "state micro.hardness" in soft
+
+
+def test_energies_are_in_balance_in_every_run():
+    for kind in ("analytic", "concurrent"):
+        history = ran(kind)
+        assert missing_energy(history.steps) < BALANCE
+        assert any(note.startswith("energies at load step 4: elastic") for note in history.notes)
+        assert not any("not balanced" in note for note in history.notes)
+    fine = run(scene(load={"approach": 0.008, "steps": 12}))
+    stored = fine.elastic_energy_mJ + fine.plastic_work_mJ
+    np.testing.assert_allclose(fine.work_mJ[3:], stored[3:], rtol=0.02)  # between load steps
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"micro": {"hardness": 0}}, r"micro.hardness = 0: must be greater than 0"),
+        ({"micro": {"hardness": "2 mm"}}, "micro.hardness = '2 mm': has the wrong unit"),
+        (
+            {"micro": {"hardness": "2 GPa", "model": "islands"}},
+            "does not go with micro.model = 'is",
+        ),
+        ({"micro": {"hardness": "2 GPa", "model": "auto"}}, r"allowed: micro.model = 'half-space'"),
+        ({"coupling": {"kind": "isolated"}}, "does not go with coupling.kind = 'isolated'"),
+        ({"coupling": {"kind": "reference"}}, "does not go with coupling.kind = 'reference'"),
+        (
+            {"coupling": {"kind": "consistent"}},
+            r"turns back .* \(allowed: coupling.kind = 'concurr",
+        ),
+    ],
+)
+def test_bad_input(changes, text):
+    with pytest.raises(InputError, match=text):
+        scene(**changes)
+
+
+def test_hardness_below_the_mean_pressure_has_no_equilibrium():
+    load = {"force": "20 N", "steps": 1}
+    text = r"micro.hardness = '20 MPa': leaves no equilibrium: .*mean pressure of 20 MPa"
+    for kind in ("analytic", "concurrent", "consistent"):
+        with pytest.raises(InputError, match=text):
+            make_setup(scene(kind, hardness="20 MPa", load=load))
+    (step,) = run(scene("analytic", hardness="21 MPa", load=load))
+    assert step.force_N == pytest.approx(20.0, rel=1e-12)
+    assert step.yielding_area_fraction > 0.9
+
+
+def test_forces_under_a_hardness_are_not_scaled_with_the_modulus():
+    one = scene(load={"approach": 0.008, "steps": 1})
+    found = sweep(one, {"block.young_modulus": ["4 GPa", "8 GPa"]}).force_N.ravel()
+    (alone,) = run(one.with_({"block.young_modulus": "8 GPa"}))
+    assert found[1] == pytest.approx(alone.force_N, rel=1e-12)
+    assert found[1] < 1.95 * found[0]
