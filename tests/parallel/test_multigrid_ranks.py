@@ -3,6 +3,8 @@
 import pytest
 from on_ranks import RANKS, OnRanks
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def found(mpirun):

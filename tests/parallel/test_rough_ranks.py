@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from on_ranks import RANKS, OnRanks
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def found(mpirun):

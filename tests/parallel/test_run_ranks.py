@@ -116,6 +116,9 @@ LONG = {
     "concurrent, asperities",
     "concurrent, islands",
     "consistent, decomposed, free to turn",
+    "free to turn, on the mesh",
+    "laws of the half-space, contact on request",
+    "wide block, tilted",
 }
 
 
@@ -152,7 +155,7 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
         "from mpi4py import MPI; from multiscale import Run, Scene;"
         f"scene = Scene.load('{PAPER}', {SMALL + SCENES['wide block, tilted']});"
         "run = Run(scene, MPI.COMM_WORLD); list(run.load_steps());"
-        "counts = MPI.COMM_WORLD.gather(len(run.coupling.interface.quadrature.x));"
+        "counts = MPI.COMM_WORLD.gather(len(run.coupling.face.quadrature.x));"
         "print('facet points', counts) if counts else None"
     )
     done = mpirun(3, "-c", code)
@@ -257,6 +260,7 @@ def sorted_fields(folder):
     return {name: values[order[len(values)]] for name, values in functions.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
 def test_fields_of_any_number_of_ranks(mpirun, tmp_path, ranks):
     scene = (

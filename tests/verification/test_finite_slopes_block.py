@@ -54,6 +54,7 @@ def meshed(surface):
     return forces[0] / forces[1] - 1.0
 
 
+@pytest.mark.long
 def test_slopes_soften_a_low_block_as_its_mesh():
     expected = meshed(setup(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
     steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))

@@ -41,10 +41,13 @@ def pressed(folder, heights, kind, model, turned=False):
     return step.force_N, step.contact_area_fraction, pressure
 
 
+LONG = [("isolated", "islands"), ("consistent", "islands"), ("consistent", "half-space")]
+
+
 @pytest.mark.parametrize(
     ("kind", "model"),
     [
-        pytest.param(*pair, marks=[pytest.mark.long] * (pair == ("isolated", "islands")))
+        pytest.param(*pair, marks=[pytest.mark.long] * (pair in LONG))
         for pair in product(KINDS, MODELS)
     ],
 )

@@ -71,7 +71,7 @@ def test_a_block_does_not_change_what_its_contacts_conduct_between_half_spaces()
     )
 
 
-@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("kind", ["consistent", pytest.param("isolated", marks=pytest.mark.long)])
 def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
     done = Run(scene(kind))
     for step in done.load_steps():

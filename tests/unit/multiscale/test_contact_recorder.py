@@ -44,7 +44,7 @@ def ran(*given):
         ("analytic", "elliptic", False),
         ("concurrent", "half-space", True),
         ("concurrent", "islands", False),
-        ("reference", "half-space", True),
+        pytest.param("reference", "half-space", True, marks=pytest.mark.long),
     ],
 )
 def test_last_contact_is_recorded(kind, model, fields):
@@ -93,7 +93,7 @@ def test_contact_behind_laws_is_solved_on_request_alone():
     assert any("contact problem behind the laws" in note for note in asked.notes)
 
 
-@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("kind", ["consistent", pytest.param("isolated", marks=pytest.mark.long)])
 @pytest.mark.parametrize("tilt", [(0.001, 0.0), "free"])
 def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     load = {"approach": 0.008, "steps": 1, "tilt": tilt}
