@@ -172,7 +172,7 @@ def main() -> None:
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
     coupling = run.make_coupling()
-    finest = coupling.finest if isinstance(coupling, ReferenceCoupling) else coupling.interface
+    finest = coupling.finest if isinstance(coupling, ReferenceCoupling) else coupling.face
     work = Work(finest.body.solver)
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())
     say(f"{work.unknowns} unknowns on {COMM.size} ranks, {work.grids} grids; memory gives {rates}")

@@ -14,11 +14,12 @@ from geometry.errors import NotConverged
 from multiscale.cli import main
 from multiscale.couplings import assembly
 from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.planning import set_up
 
 command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
-    "surface": (run, "on_root"),
+    "surface": (set_up, "on_root"),
     "plan": (command.terminal, "show_plan"),
     "laws": (assembly, "make_table"),
     "block": (assembly, "assemble"),

