@@ -62,6 +62,7 @@ def test_last_contact_is_recorded(kind, model, fields):
         assert contact.pressure_MPa.mean() == pytest.approx(last.mean_pressure_MPa, rel=1e-9)
 
 
+@pytest.mark.long
 def test_reference_has_the_peak_and_the_gap_of_the_contact_problem():
     meshed, solved = (ran(kind, "half-space") for kind in ("reference", "concurrent"))
     # a coarse mesh of one contact: the force itself differs by 3 %

@@ -46,7 +46,13 @@ def written(tmp_path, *more):
     return run, fields(tmp_path / "fields.xdmf")
 
 
-@pytest.mark.parametrize("coupling", COUPLINGS.values(), ids=COUPLINGS)
+@pytest.mark.parametrize(
+    "coupling",
+    [
+        pytest.param(words, id=name, marks=[pytest.mark.long] * (name == "free plane"))
+        for name, words in COUPLINGS.items()
+    ],
+)
 def test_every_coupling_with_a_body_has_fields_of_every_step(tmp_path, coupling):
     run, found = written(tmp_path, *coupling, "output.fields=all")
     names = "displacement", "stress", "von_Mises", "pressure"

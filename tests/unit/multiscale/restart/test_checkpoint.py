@@ -421,6 +421,7 @@ def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, cap
     assert kept.exists()
 
 
+@pytest.mark.long
 def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, monkeypatch):
     left_open = scene({
         "block": {"cells": "auto"},
