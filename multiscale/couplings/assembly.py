@@ -38,6 +38,8 @@ MOST_CYCLES_PER_STEP = 12
 """Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
 steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
 patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
+CYCLES_AT_POINTS = 30
+"""Those of a load step of laws of samples, which stand at points: 10 to 60 on three parts."""
 
 CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
@@ -65,6 +67,8 @@ def full_cycles(setup: ProblemSetup, steps: int) -> int:
         setup: The problem set up from the scene.
         steps: Load steps.
     """
+    if setup.samples:
+        return steps * CYCLES_AT_POINTS
     return steps * min(max(setup.interfering_patches, 1), MOST_CYCLES_PER_STEP)
 
 
