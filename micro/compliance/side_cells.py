@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from micro.compliance.free_sides import FreeSides, distance_nodes, means_over
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Waves = NDArray[np.complex128]
-Means = Array | csr_array
+Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
 _NEAREST = 1.0 / 16.0
 """First node of the distance from a side, in cells."""
@@ -126,6 +126,7 @@ class _SidePair:
 
 
 def _transposed(means: Means) -> Means:
+    """Return the transpose of a full or sparse matrix, of the same kind."""
     return csr_array(means.T) if isinstance(means, csr_array) else means.T
 
 

@@ -15,9 +15,15 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import write_figure
+from multiscale.planning.auto_keys import auto_keys
+from multiscale.planning.costs import predicted_cost, step_count
+from multiscale.planning.problem_setup import make_setup
+from multiscale.readable import duration
 from multiscale.restart.results_folder import locked
+from multiscale.scene.scene import Scene
 from multiscale.storage import remove, write_csv
-from multiscale.sweeps.cases import Case, values_from_text
+from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
+from multiscale.sweeps.forecast import SweepForecast
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, sweep
 from multiscale.sweeps.sweep_results import SweepResults
@@ -43,6 +49,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
+        terminal.say(comm, on_root(comm, lambda: _forecast(scene, vary, comm, parts)))
         with terminal.following(comm) as (begun, ended):
 
             def observe(case: Case, result: CaseResult) -> None:
@@ -75,6 +82,26 @@ def slurm_part() -> tuple[int, int]:
     task, first, count = (int(os.environ[name]) for name in names)
     step = int(os.environ.get("SLURM_ARRAY_TASK_STEP", 1))
     return (task - first) // step + 1, count
+
+
+def _forecast(scene: Scene, vary: dict[str, list[Any]], comm: Any, parts: int) -> str:
+    """Say what the sweep is predicted to take, from the plan of its first case."""
+    cases, ranks = sweep_cases(scene, vary), parts * (1 if comm is None else comm.size)
+    start = f"{len(cases)} cases on {ranks} rank{'s' * (ranks > 1)}"
+    first = cases[0].scene
+    if auto_keys(first) or first.body is not None:  # whose problems are not set up in an instant
+        return start
+    setup = make_setup(first.with_({"output.figures": False, "output.report": False}))
+    cost = predicted_cost(setup)
+    forecast = SweepForecast(
+        cases=len(cases),
+        ranks=ranks,
+        steps=step_count(first.loading.load_history),
+        case_seconds=cost.total,
+        run_bytes=cost.memory,
+    )
+    time, memory = duration(forecast.seconds), f"{forecast.rank_bytes / 1e6:.0f} MB"
+    return f"{start}: about {time}, and {memory} on each"
 
 
 def _remove_results(folder: Path) -> None:
@@ -135,9 +162,7 @@ def _summary(found: SweepResults) -> Iterator[str]:
     pairs = zip(chosen["force_N"], chosen["approach_mm"], strict=True)
     for force, approach in itertools.islice(pairs, MOST_LINES):
         values = "".join(f"{key} = {force[key]}, " for key in found.keys if key in force)
-        yield (
-            f"{values}at last: force {_spread(force)} N, approach {_spread(approach, 1e3)} µm"
-        )
+        yield (f"{values}at last: force {_spread(force)} N, approach {_spread(approach, 1e3)} µm")
 
 
 def _spread(record: dict[str, Any], scale: float = 1.0) -> str:

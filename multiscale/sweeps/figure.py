@@ -1,6 +1,4 @@
-"""The figure of a sweep: the curves of all cases, with mean, median and band of every
-ensemble.
-"""
+"""The figure of a sweep: curves of cases, with mean, median and band of every ensemble."""
 
 from __future__ import annotations
 
@@ -27,7 +25,7 @@ class Ensemble(NamedTuple):
 
     Attributes:
         label: What the cases have in common; empty for nothing.
-        count: Number of all cases.
+        total: Number of all cases.
         statistics: Of all cases that ended well.
         approach: Approaches of some cases, shape (cases, steps) [mm].
         pressure: Their mean pressures [MPa].
@@ -35,7 +33,7 @@ class Ensemble(NamedTuple):
     """
 
     label: str
-    count: int
+    total: int
     statistics: Statistics
     approach: NDArray[np.float64]
     pressure: NDArray[np.float64]
@@ -63,9 +61,9 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
         for row in range(len(x)):
             force.plot(x[row], y[row], color=colour, lw=0.5, alpha=0.4)
             area.plot(y[row], a[row], color=colour, lw=0.5, alpha=0.4)
-        of, many = ensemble.statistics.of, ensemble.count > 1
+        of, many = ensemble.statistics.of, ensemble.total > 1
         approach, pressure, fraction = (of(name, "mean") for name in CURVES)
-        label = ", ".join(filter(None, (ensemble.label, f"mean of {ensemble.count}" * many)))
+        label = ", ".join(filter(None, (ensemble.label, f"mean of {ensemble.total}" * many)))
         force.plot(1e3 * approach, pressure, color=colour, lw=2.0, label=label)
         area.plot(pressure, 100 * fraction, color=colour, lw=2.0)
         low, high = of(CURVES[0], "smallest"), of(CURVES[0], "largest")

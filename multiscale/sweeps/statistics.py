@@ -85,7 +85,7 @@ def column_statistics(
     Note:
         Collective. A rank sends and gets 8 bytes for each of its numbers.
     """
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    size = 1 if comm is None else comm.size
     steps = max((len(rows) for rows in mine.values()), default=0)
     steps = steps if size == 1 else max(comm.allgather(steps))
     count = steps * len(NUMBERS)

@@ -118,9 +118,10 @@ def _read(journal: Journal, cases: SweepCases, comm: Any) -> tuple[dict[int, Cas
     mine = together(comm, read)
     if size == 1:
         return mine, set(mine)
-    held = comm.allgather(sorted(mine))
+    held: list[list[int]] = comm.allgather(sorted(mine))
     before = {number for numbers in held[:rank] for number in numbers}
-    return {n: one for n, one in mine.items() if n not in before}, {n for some in held for n in some}
+    first = {number: one for number, one in mine.items() if number not in before}
+    return first, set().union(*held)
 
 
 def _of_all(comm: Any, mine: Mapping[int, CaseResult]) -> set[int]:

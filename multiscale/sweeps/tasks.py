@@ -25,8 +25,10 @@ class TaskCounter:
     """
 
     def __init__(self, comm: Any, count: int) -> None:
-        self._comm, self._count, self._window = comm, count, None
-        self._rank, self._size = (0, 1) if comm is None else (comm.rank, comm.size)
+        self._comm, self._count = comm, count
+        self._rank: int = 0 if comm is None else comm.rank
+        self._size: int = 1 if comm is None else comm.size
+        self._window: Any = None
         if self._size > 1:
             from mpi4py import MPI
 
@@ -45,7 +47,6 @@ class TaskCounter:
 
     def _next(self) -> int:
         one, found = np.ones(1, np.int64), np.zeros(1, np.int64)
-        assert self._window is not None
         self._window.Lock(0, self._shared)
         self._window.Fetch_and_op(one, found, 0, 0, self._sum)
         self._window.Unlock(0)
