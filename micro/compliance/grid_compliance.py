@@ -35,7 +35,7 @@ _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
 _FEW_CELLS = 2**14
 """Cells up to which half-spaces are cached for other surfaces too, with 2 MB then."""
-_small_half_space = lru_cache(maxsize=2 * _MOST_GRIDS)(HalfSpaceGrid)
+_small_half_space = lru_cache(maxsize=_MOST_GRIDS + 8)(HalfSpaceGrid)
 _DIFFERENCE = 1e-6
 """Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
 slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
