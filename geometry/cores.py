@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
+
+Result = TypeVar("Result")
 
 _RANKS_HERE = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "SLURM_NTASKS_PER_NODE")
 """Variables that MPI and Slurm set to the number of ranks on this node."""
@@ -63,20 +65,44 @@ def lent(count: int) -> Iterator[None]:
         _borrowed = before
 
 
-def in_threads(work: Callable[[Any], Any], tasks: Iterable[Any]) -> None:
+def blocks(count: int, size: int) -> list[slice]:
+    """Return ranges that divide a number of rows; work on them does not depend on the threads.
+
+    Args:
+        count: Number of rows.
+        size: Rows in a range, the last one may have fewer; at least one.
+    """
+    size = max(1, size)
+    return [slice(first, min(first + size, count)) for first in range(0, count, size)]
+
+
+def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Result]:
     """Do work on every task, on all cores; it gains where the work leaves Python for long.
 
     Args:
-        work: Called with each task; its result is dropped, its error raised.
+        work: Called with each task; its error is raised.
         tasks: The tasks.
+
+    Returns:
+        The results, in the order of the tasks.
     """
     global _pool
     count, listed = cores(), list(tasks)
-    if count == 1 or len(listed) < 2:
-        for task in listed:
-            work(task)
-        return
-    if _pool is None or _pool[0] != count:
+    results: dict[int, Result] = {}
+    todo = iter(range(len(listed)))
+
+    def share() -> None:
+        for task in todo:  # whoever is free takes the next
+            results[task] = work(listed[task])
+
+    others = min(count, len(listed)) - 1
+    if others > 0 and (_pool is None or _pool[0] != count):
         _pool = count, ThreadPoolExecutor(count)
-    for _ in _pool[1].map(work, listed):
-        pass
+    helping = [_pool[1].submit(share) for _ in range(others)] if _pool is not None else []
+    try:
+        share()
+    finally:
+        wait(helping)
+    for helper in helping:
+        helper.result()
+    return [results[task] for task in range(len(listed))]
