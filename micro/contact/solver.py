@@ -15,7 +15,6 @@ Theory: demos/theory.md, section 3.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray

@@ -53,10 +53,11 @@ def test_shared_tasks_are_counted_over_all_ranks():
     assert told == [1, 2, 3, 4]
     del told[:]
     # of three ranks this one does the tasks 0, 3, 6
+    done = SimpleNamespace(Test=lambda: True)
     gathered = SimpleNamespace(
-        rank=0, size=3, allgather=lambda mine: [None] * 3 if mine is None else [[0] * 3] * 3
+        rank=0, size=3, allgather=lambda mine: [mine] * 3, Ibarrier=lambda: done
     )
-    shared(gathered, 7, lambda index: index, observe=told.append)
+    assert shared(gathered, 7, lambda index: index, observe=told.append) == [0, 0, 0, 3, 3, 3, 6]
     assert told == [3, 6, 7]
 
 
