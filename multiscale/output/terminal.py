@@ -212,14 +212,10 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    header, rows = history.table()
-    rows = list(rows)
+    header, rows = history.table(MOST_ROWS)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")
-    half = MOST_ROWS // 2
-    if len(rows) > MOST_ROWS:
-        rows[half:-half] = [("…", f"{len(rows) - MOST_ROWS} more", *[""] * (len(header) - 2))]
     for row in rows:
         table.add_row(*row)
     # A reference has one more column.
