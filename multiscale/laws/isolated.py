@@ -169,7 +169,7 @@ def isolated_laws(
     count = patches.count
     touch = shared(comm, count, lambda index: model.of_patch(patches, index)[0].first_touch)
     # a patch takes the longer the further it is closed, and one that stays open takes nothing
-    costs = np.maximum(closure_ends - touch, 0.0)
+    costs = np.maximum(closure_ends - touch, 0.0).tolist()
 
     def make(index: int) -> PatchLaw:
         alone, patch = model.of_patch(patches, index)

@@ -1,10 +1,10 @@
-"""Laws on 1 and 2 ranks: seconds of their parts, and what of two ranks is gained.
+"""Laws and load steps on 1 and 2 ranks: seconds of their parts, and what of two ranks is gained.
 
 Run by hand on an idle machine: ``.venv/bin/python tests/benchmarks/rows_over_ranks.py [--cells N]
-[--pairs N] [--kind consistent|isolated] [--approach µm]``. 33 rows of consistent laws on the
-paper's cube, or isolated laws of 16 patches, one thread a rank. Runs on 1 and on 2 ranks take
-turns; medians. Two processes that make the same laws at once, each for itself, tell what the
-memory allows: the efficiency that no sharing of rows can exceed.
+[--pairs N] [--kind consistent|isolated|concurrent] [--approach µm]``. 33 rows of consistent laws on
+the paper's cube, isolated laws of 16 patches, or 4 load steps that rank 0 solves with the cores of
+both; one thread a rank. Runs on 1 and on 2 ranks take turns; medians. Two processes that do the
+same at once, each for itself, tell what the memory allows: no sharing of rows can exceed that.
 """
 
 import argparse
@@ -39,7 +39,8 @@ def scene(choice: argparse.Namespace) -> dict:
         },
         "block": {"height": 1.0, "young_modulus": 4000.0, "poisson_ratio": 0.15},
         "coupling": {"kind": choice.kind},
-        "load": {"approach": 1e-3 * choice.approach},
+        "load": {"approach": 1e-3 * choice.approach, "steps": 4},
+        "output": {"check": "none"},
     }
 
 
@@ -66,6 +67,13 @@ def measure(choice: argparse.Namespace) -> None:
 
     run = timed("set-up", lambda: Run(Scene.from_dict(scene(choice)), comm))
     model, setup = timed("body", run.make_model), run.setup
+    if choice.kind == "concurrent":
+        timed("coupling", run.make_coupling)
+        steps = timed("load steps", lambda: list(run.load_steps()))
+        if MPI.COMM_WORLD.rank == 0:
+            forces = sum(step.force_N for step in steps)
+            print(json.dumps({"seconds": times, "rows": len(steps), "pressure": forces}))
+        return
     if choice.kind == "isolated":
         table = timed("laws", lambda: make_table(setup, model, comm))
     else:
@@ -106,7 +114,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--cells", type=int, default=1024, help="heights along a side")
     parser.add_argument("--pairs", type=int, default=3, help="runs on 1 and 2 ranks in turn")
-    parser.add_argument("--kind", choices=("consistent", "isolated"), default="consistent")
+    parser.add_argument(
+        "--kind", choices=("consistent", "isolated", "concurrent"), default="consistent"
+    )
     parser.add_argument("--approach", type=float, default=8.0, help="largest approach [µm]")
     parser.add_argument("--no-ceiling", action="store_true", help="no two processes at once")
     parser.add_argument("--rank", action="store_true", help=argparse.SUPPRESS)
@@ -123,7 +133,7 @@ def main() -> None:
             both = [facts(one) for one in [started(1, words), started(1, words)]]
             found["two at once"] += both
     names = found["1"][0]["seconds"]
-    print(f"{choice.kind} laws on {choice.cells}², {found['1'][0]['rows']} rows; seconds")
+    print(f"{choice.kind} on {choice.cells}², {found['1'][0]['rows']} rows or steps; seconds")
     print(
         f"{'':14}" + "".join(f"{key:>14}" for key in found) + f"{'efficiency':>14}{'ceiling':>10}"
     )
@@ -141,7 +151,7 @@ def main() -> None:
         numbers = "".join(f"{medians.get(key, float('nan')):14.2f}" for key in found)
         print(f"{name:14}{numbers}{efficiency:12.0f} %{ceiling:8.0f} %")
     sums = {one["pressure"] for each in found.values() for one in each}
-    print(f"pressures of the last rows differ by {max(sums) / min(sums) - 1.0:.1e}")
+    print(f"pressures or forces differ by {max(sums) / min(sums) - 1.0:.1e}")
 
 
 if __name__ == "__main__":
