@@ -2,11 +2,11 @@
 
 With N cases of S load steps on P ranks, a case of c seconds and a set-up of s seconds on each rank:
 
-    time = s + c (N / P + ½) + b N S / P + t N S,
+    time = s + c (N / P + ½) + d S / P + w N S,
 
-where half a case is what ranks wait for the last one, b is a number's way to the rank that has its
-column, and t what rank 0 takes to write a load step into ``history.csv``. Every rank holds the load
-steps of its N / P cases and, while statistics are made, as many numbers of columns.
+where half a case is what ranks wait for the last one, d the time of the statistics of all columns
+at a load step, and w what rank 0 takes to write a load step into ``history.csv``. Every rank holds
+the load steps of its N / P cases and, while statistics are made, copies of as many numbers.
 
 Measured figures: demos/hpc/scaling.md, section on sweeps.
 """
@@ -17,14 +17,14 @@ from dataclasses import dataclass
 
 from multiscale.sweeps.statistics import NUMBERS
 
-_ROW, _TABLE = 2300.0, 3 * 8.0 * len(NUMBERS)
-"""Memory of a load step as it is held, and of its numbers while statistics are made [B]."""
-_DESCRIBED = 0.35e-3
-"""Time of the statistics of a column at one load step, of some hundred cases [s]."""
-_WRITTEN = 55e-6
-"""Time of a load step in the tables [s]."""
-_CASE = 150.0
-"""Memory of a case that another rank holds [B]."""
+_ROW, _TABLE = 940.0, 630.0
+"""Memory of a load step as it is held, and more of it while statistics are made [B]."""
+_COLUMN, _COLUMN_CASE = 0.1e-3, 25e-9
+"""Time of the statistics of a column at one load step, and of it for each case [s]."""
+_WRITTEN = 19e-6
+"""Time of a load step in the table of all [s]."""
+_CASE = 190.0
+"""Memory of the number of a case, which every rank knows [B]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -53,7 +53,8 @@ class SweepForecast:
         each = self.cases / self.ranks
         waiting = 0.5 if self.ranks > 1 and each > 1.0 else 0.0
         alone = self.case_seconds * max(each + waiting, 1.0)
-        described = _DESCRIBED * self.steps * len(NUMBERS) / self.ranks
+        column = _COLUMN + _COLUMN_CASE * self.cases
+        described = column * self.steps * len(NUMBERS) / self.ranks
         return self.set_up_seconds + alone + described + _WRITTEN * self.cases * self.steps
 
     @property
