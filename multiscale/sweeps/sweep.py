@@ -80,8 +80,10 @@ def sweep(
 
     try:
         together(comm, work)
-    finally:
+    except Exception:  # on all ranks alike; a signal ends one of them, and `close` would wait
         counter.close()
+        raise
+    counter.close()
     if parts > 1:
         known = done | _of_all(comm, mine)
         others, _ = _read(journal, cases, comm)
