@@ -9,6 +9,9 @@ from matplotlib.figure import Figure
 
 from multiscale.figures.style import BLUE, COLOURS, FULL_WIDTH, add_legend, new_figure, styled
 
+MOST_MARKED = 500
+"""Load steps that have a symbol each; more of them are drawn as lines alone."""
+
 
 @styled()
 def history_figure(history: Any, kind: str) -> Figure:
@@ -21,7 +24,9 @@ def history_figure(history: Any, kind: str) -> Figure:
     figure = new_figure(FULL_WIDTH, 2.4)
     force, area, gap = figure.subplots(1, 3)
     colour = COLOURS.get(kind, BLUE)
-    look: dict[str, Any] = {"marker": "o", "ms": 3.0, "color": colour, "label": kind}
+    look: dict[str, Any] = {"color": colour, "label": kind}
+    if len(history) <= MOST_MARKED:
+        look |= {"marker": "o", "ms": 3.0}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at zero approach of the middle.
     level = not any(any(step.tilt) for step in history.steps)
