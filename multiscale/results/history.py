@@ -13,7 +13,7 @@ from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import SCALED_UNITS, usual_unit, with_error
+from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -348,7 +348,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
                 )
     if outside:
         first = min(outside)
-        yield (
+        yield Caution(
             f"load steps outside the micro model's range of validity: {len(outside)} of "
             f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
             "no such range"
