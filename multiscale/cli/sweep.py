@@ -14,7 +14,7 @@ from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
-from multiscale.output.results import write_figure
+from multiscale.output.results import pictures_of, write_pictures
 from multiscale.planning.auto_keys import auto_keys
 from multiscale.planning.costs import predicted_cost, step_count
 from multiscale.planning.problem_setup import make_setup
@@ -31,7 +31,7 @@ from multiscale.sweeps.sweep_results import SweepResults
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""
 
-FILES = ("cases.csv", "history.csv", "statistics.csv", "sweep.png")
+FILES = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 """Files of the results of a sweep."""
 
 
@@ -121,8 +121,8 @@ def _write(folder: Path, found: SweepResults, comm: Any, *, figures: bool) -> li
     statistics = _statistics_records(found)
     files += _write_table(folder / "statistics.csv", iter(statistics), comm)
     if figures and statistics:
-        figure = found.plot()
-        files += on_root(comm, lambda: [write_figure(folder / "sweep.png", figure)])
+        pictures = pictures_of("sweep", found.plot())
+        files += on_root(comm, lambda: write_pictures(folder, pictures))
     return files
 
 

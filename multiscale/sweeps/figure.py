@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+from multiscale.figures.style import FULL_WIDTH, PALETTE, add_legend, new_figure, styled
 from multiscale.sweeps.statistics import Statistics
 
 MOST_CURVES = 200
@@ -44,6 +44,7 @@ CURVES = "approach_mm", "mean_pressure_MPa", "contact_area_fraction"
 """Columns of the curves of an `Ensemble`."""
 
 
+@styled()
 def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
@@ -54,9 +55,9 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     Args:
         ensembles: The curves; those beyond `MOST_ENSEMBLES` are left out.
     """
-    figure = new_figure(9.0, 4.0)
+    figure = new_figure(FULL_WIDTH, 3.0)
     force, area = figure.subplots(1, 2)
-    for colour, ensemble in zip(cycle(COLOURS.values()), ensembles[:MOST_ENSEMBLES], strict=False):
+    for colour, ensemble in zip(cycle(PALETTE), ensembles[:MOST_ENSEMBLES], strict=False):
         x, y, a = 1e3 * ensemble.approach, ensemble.pressure, 100 * ensemble.area_fraction
         for row in range(len(x)):
             force.plot(x[row], y[row], color=colour, lw=0.5, alpha=0.4)
@@ -74,5 +75,5 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
             force.fill_between(1e3 * approach, *band, color=colour, alpha=0.2)
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
-    add_grid_and_legend(figure)
+    add_legend(figure)
     return figure
