@@ -6,7 +6,7 @@ Theory: section 11 of ``demos/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -147,11 +147,12 @@ class MeshedBody(ElasticBody):
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         return self.solver_of(self.stiffness)
 
-    def solver_of(self, matrix: PETSc.Mat) -> PETSc.KSP:
+    def solver_of(self, matrix: PETSc.Mat, springs: PETSc.Mat | None = None) -> PETSc.KSP:
         """Return a linear solver for the stiffness and what else holds the body.
 
         Args:
             matrix: A matrix with the entries of the stiffness, its near-nullspace attached.
+            springs: What it has beyond the stiffness; None: nothing.
         """
         return body_solver(
             matrix,
@@ -159,7 +160,14 @@ class MeshedBody(ElasticBody):
             degree=self.degree,
             poisson_ratio=self.poisson_ratio,
             free=self.free,
+            linear=lambda: self.linear,
+            springs=springs,
         )
+
+    @cached_property
+    def linear(self) -> MeshedBody:
+        """The same body with linear displacements."""
+        return replace(self, order=1)
 
     def reaction(self, displacement: PETSc.Vec) -> float:
         """Return the force that the supports bear against contact pressures, from nodal residuals.

@@ -76,7 +76,7 @@ class ContactPreconditioner:
             matrix = body.stiffness.copy()
             matrix.axpy(1.0, springs, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
             matrix.setNearNullSpace(body.stiffness.getNearNullSpace())
-            self._with_laws = body.solver_of(matrix)
+            self._with_laws = body.solver_of(matrix, springs)
         springs.destroy()
         compat.collect_garbage(body.stiffness.comm)
 
