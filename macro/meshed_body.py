@@ -24,6 +24,7 @@ from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
 from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import body_solver
+from macro.linear_solvers.stiffened import Stiffened
 from macro.mesh.tagged import TaggedMesh
 
 Array = NDArray[np.float64]
@@ -145,23 +146,24 @@ class MeshedBody(ElasticBody):
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
-        return self.solver_of(self.stiffness)
+        _ = self._held_row  # needs 70 bytes an unknown for a moment, which are free as yet
+        return self.solver_of()
 
-    def solver_of(self, matrix: PETSc.Mat, springs: PETSc.Mat | None = None) -> PETSc.KSP:
-        """Return a linear solver for the stiffness and what else holds the body.
+    def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
+        """Return a linear solver for the stiffness, and for what else holds the body.
 
         Args:
-            matrix: A matrix with the entries of the stiffness, its near-nullspace attached.
-            springs: What it has beyond the stiffness; None: nothing.
+            stiffened: The stiffness with springs, which the preconditioner then knows; keep it as
+                long as the solver. None: no springs.
         """
         return body_solver(
-            matrix,
+            self.stiffness,
             self.space,
             degree=self.degree,
             poisson_ratio=self.poisson_ratio,
             free=self.free,
             linear=lambda: self.linear,
-            springs=springs,
+            stiffened=stiffened,
         )
 
     @cached_property

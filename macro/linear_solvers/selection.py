@@ -31,6 +31,7 @@ from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
 from macro.linear_solvers.multigrid_degrees import Linear, quadratic_options, vertex_grid
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
+from macro.linear_solvers.stiffened import Stiffened
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -103,7 +104,7 @@ def body_solver(
     poisson_ratio: float,
     free: PETSc.Vec,
     linear: Callable[[], Linear],
-    springs: PETSc.Mat | None = None,
+    stiffened: Stiffened | None = None,
 ) -> PETSc.KSP:
     """Return a solver for the stiffness of a body whose mesh is no lattice.
 
@@ -114,19 +115,24 @@ def body_solver(
         poisson_ratio: Largest Poisson's ratio of the body.
         free: 1 for unknowns that are free, 0 for constrained ones.
         linear: Gives the same body with linear displacements; used for degree 2.
-        springs: What the matrix has beyond the body's stiffness, if anything.
+        stiffened: The matrix with springs, which the preconditioner is to know; None: no springs.
 
     Note:
         Collective.
     """
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
-    if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
-        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    if degree == 2 and requested in ("", "mg"):
+    direct = not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED
+    if degree == 2 and not direct and requested in ("", "mg"):
+        springs, finest = None, None
+        if stiffened is not None:
+            springs = stiffened.springs
+            finest = stiffened.product, stiffened.diagonal_blocks()
         grid = vertex_grid(space, linear(), free, springs)
-        return linear_solver(matrix, grid, quadratic_options(space.mesh))
+        return linear_solver(matrix, grid, quadratic_options(space.mesh), finest=finest)
     hexahedral = space.mesh.topology.cell_name() == "hexahedron"
-    return linear_solver(matrix, preconditioner=algebraic_options(hexahedral=hexahedral))
+    options = DIRECT_DEFAULTS if direct else algebraic_options(hexahedral=hexahedral)
+    whole = None if stiffened is None else stiffened.assembled()
+    return linear_solver(matrix, preconditioner=options, whole=whole)
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:
