@@ -83,7 +83,7 @@ class NewtonSolver:
 
     Args:
         problem: The equations.
-        face: The contact face.
+        face: The contact face that laws stand on at points; None for laws of patches.
         solver: Linear solver of the body alone, whose preconditioner is set up.
 
     Attributes:
@@ -109,6 +109,9 @@ class NewtonSolver:
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
         self._preconditioner = ContactPreconditioner(problem, face, solver)
+        self._remedy = "take more load steps (load.steps)"
+        if face is None:
+            self._remedy += " or, on a very soft body, coupling.newton = 'condensed'"
         self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
@@ -129,7 +132,7 @@ class NewtonSolver:
                 f"the block at {control}",
                 reason=reason,
                 iterations=int(self.snes.its),
-                remedy="take more load steps (load.steps)",
+                remedy=self._remedy,
             )
         return NewtonReport(
             iterations=int(self.snes.its),

@@ -2,9 +2,9 @@
 
 The preconditioner of the body alone serves every tangent as long as the laws are softer than the
 elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of: iterations
-grow to ten times as many and more. Laws at points couple no other nodes
-than the elements do, so that their stiffness fits into the matrix, and multigrid is set up with it. On
-quadratic elements that takes no second matrix: only the coarser grid has the sum's entries.
+grow to ten times as many and more. Laws at points couple no other nodes than the elements do, so
+that their stiffness fits into the matrix, and multigrid is set up with it. On quadratic elements
+that takes no second matrix: only the coarser grid has the sum's entries.
 
 Theory: section 11 of ``demos/theory.md``.
 """
@@ -82,7 +82,7 @@ class ContactPreconditioner:
         (self._with_laws or self._alone).pc.apply(x, y)
 
     def _largest(self, slope: Array) -> float:
-        """Return the stiffness of the laws over that of the body at the unknown where it is largest."""
+        """Return the largest ratio of the laws' to the body's stiffness at an unknown."""
         own = self._equilibrium.body.stiffness.getDiagonal()
         starts, columns, entries = self._face.points_by_dofs.getValuesCSR()
         springs = own.duplicate()

@@ -1,8 +1,8 @@
 """Multigrid on quadratic elements: from all nodes to the vertices, and algebraic from there.
 
 Linear displacements are a part of the quadratic ones, so that the interpolation is exact: a node in
-the middle of an edge, a face or a cell takes the mean of its vertices. The matrix of the vertices is
-the stiffness of linear elements on the same mesh, which is Galerkin's product on straight cells
+the middle of an edge, a face or a cell takes the mean of its vertices. The matrix of the vertices
+is the stiffness of linear elements on the same mesh, which on straight cells is Galerkin's product
 without its time and memory. It is seven times smaller, and algebraic multigrid suits linear
 elements: on all nodes it took twice the time and four times the memory.
 
