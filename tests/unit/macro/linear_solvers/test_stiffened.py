@@ -14,29 +14,32 @@ WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
 
 @pytest.fixture(scope="module")
-def stiffened():
-    face = standing(box((0, 0, -0.5), (1, 1, 0), (2, 2, 1), "tetrahedron"), SOFT, WHOLE, 2)
+def face():
+    return standing(box((0, 0, -0.5), (1, 1, 0), (2, 2, 1), "tetrahedron"), SOFT, WHOLE, 2)
+
+
+@pytest.fixture(scope="module")
+def stiffened(face):
     points = face.points_by_dofs
     springs = points.transposeMatMult(points)
     springs.scale(1e6)
-    return Stiffened(face.body.stiffness, springs), face.body.stiffness
+    return Stiffened(face.body.stiffness, springs)
 
 
-def test_products_are_those_of_the_sum(stiffened):
-    sum_of, stiffness = stiffened
+def test_products_are_those_of_the_sum(face, stiffened):
+    stiffness = face.body.stiffness
     x, y = stiffness.createVecs()
     x.array[:] = np.random.default_rng(3).standard_normal(x.local_size)
-    sum_of.product.mult(x, y)
-    np.testing.assert_allclose(y.array_r, (sum_of.assembled() * x).array_r, rtol=1e-12)
+    stiffened.product.mult(x, y)
+    np.testing.assert_allclose(y.array_r, (stiffened.assembled() * x).array_r, rtol=1e-12)
     assert abs((stiffness * x).array_r - y.array_r).max() > 1e-3 * abs(y.array_r).max()
 
 
 def test_diagonal_blocks_are_those_of_the_sum(stiffened):
-    sum_of, _ = stiffened
-    every = np.arange(sum_of.product.size[0], dtype=PETSc.IntType)
+    every = np.arange(stiffened.product.size[0], dtype=PETSc.IntType)
     blocks, whole = (
         of.convert("aij", PETSc.Mat()).getValues(every, every)
-        for of in (sum_of.diagonal_blocks(), sum_of.assembled())
+        for of in (stiffened.diagonal_blocks(), stiffened.assembled())
     )
     same_node = every[:, None] // 3 == every // 3
     np.testing.assert_allclose(blocks, np.where(same_node, whole, 0.0), atol=1e-11 * whole.max())
