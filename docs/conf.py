@@ -27,7 +27,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
-    "mathml",
+    "katex",
 ]
 root_doc = "docs/index"
 include_patterns = [
@@ -57,7 +57,7 @@ default_role = "py:obj"
 
 html_theme = "furo"
 html_title = f"patchlaw {release}"
-html_math_renderer = "mathml"
+html_math_renderer = "katex"
 html_static_path = ["static"]
 html_extra_path = ["index.html"]
 html_css_files = ["style.css"]

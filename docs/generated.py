@@ -100,6 +100,7 @@ class Picture(NamedTuple):
 
     path: Path
     page: Path
+    alt: str
     caption: str
     source: Path | None
 
@@ -118,7 +119,8 @@ def pictures() -> list[Picture]:
         for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):
             path = (page.parent / match["path"]).resolve()
             caption = " ".join((match["caption"] or match["alt"]).split())
-            found.setdefault(path, Picture(path, page, caption, _source(path, caption)))
+            source = _source(path, caption)
+            found.setdefault(path, Picture(path, page, match["alt"], caption, source))
     return list(found.values())
 
 
@@ -140,10 +142,10 @@ def gallery() -> str:
         page = _from_docs(one.page)
         made = f" · [`{one.source.name}`]({_from_docs(one.source)})" if one.source else ""
         cards.append(
-            f":::{{grid-item-card}}\n:img-top: {_from_docs(one.path)}\n\n"
+            f":::{{grid-item-card}}\n[![{one.alt}]({_from_docs(one.path)})]({page})\n\n"
             f"{_SENTENCE.split(one.caption)[0]}\n\n[page]({page}){made}\n:::\n"
         )
-    return "::::{grid} 1 2 2 2\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
+    return "::::{grid} 1 1 2 2\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
 
 
 def _from_docs(path: Path) -> str:
