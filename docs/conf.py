@@ -15,7 +15,6 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import generated  # noqa: E402
-
 from sphinx.application import Sphinx  # noqa: E402
 
 project = "patchlaw"
@@ -73,7 +72,9 @@ def _link_from_docs(app: Sphinx, path: Path, parent: str, content: list[str]) ->
         content[0] = re.sub(r"\]\((?!https?:|#)", "](../", content[0])
 
 
-def _keep_bars(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+def _keep_bars(
+    app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+) -> None:
     """Keep bars in docstrings, which stand for absolute values, from naming substitutions."""
     for number, line in enumerate(lines):
         parts = line.split("``")  # every second part is literal

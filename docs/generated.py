@@ -106,7 +106,8 @@ class Picture(NamedTuple):
 
 
 _PICTURE = re.compile(
-    r"!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)(?:\n\n\*(?!\*)(?P<caption>.+?[^\\])\*\n)?", re.DOTALL
+    r"!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
+    re.DOTALL,
 )
 _SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
 
