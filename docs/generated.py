@@ -96,32 +96,34 @@ def history_columns() -> str:
 
 
 class Picture(NamedTuple):
-    """A picture of a demo's page, with its caption and the script or scene behind it."""
+    """A picture on a page, with the heading above it, its caption, and what made it."""
 
     path: Path
     page: Path
-    alt: str
+    title: str
     caption: str
     source: Path | None
 
 
 _PICTURE = re.compile(
-    r"!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
-    re.DOTALL,
+    r"(?:^#+ (?P<title>.+)\n\n)?!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)"
+    r"(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
+    re.DOTALL | re.MULTILINE,
 )
 _SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
 
 
 def pictures() -> list[Picture]:
-    """Return the pictures on the pages of the demos, each once, those of the index first."""
+    """Return the pictures of README and demos, each once: those of the demos' index first."""
     index = ROOT / "demos" / "README.md"
+    others = [ROOT / "README.md", *sorted({*index.parent.rglob("*.md")} - {index})]
     found: dict[Path, Picture] = {}
-    for page in sorted(index.parent.rglob("*.md"), key=lambda path: (path != index, path)):
+    for page in (index, *others):
         for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):
             path = (page.parent / match["path"]).resolve()
             caption = " ".join((match["caption"] or match["alt"]).split())
-            source = _source(path, caption)
-            found.setdefault(path, Picture(path, page, match["alt"], caption, source))
+            picture = Picture(path, page, match["title"] or "", caption, _source(path, caption))
+            found.setdefault(path, picture)
     return list(found.values())
 
 
@@ -137,14 +139,14 @@ def _source(picture: Path, caption: str) -> Path | None:
 
 
 def gallery() -> str:
-    """Return the pictures of the demos as cards: what each says, its page, what made it."""
+    """Return all pictures as cards: what each says, the page it stands on, what made it."""
     cards = []
     for one in pictures():
-        page = _from_docs(one.page)
+        page, says = _from_docs(one.page), _SENTENCE.split(one.caption)[0]
         made = f" · [`{one.source.name}`]({_from_docs(one.source)})" if one.source else ""
         cards.append(
-            f":::{{grid-item-card}}\n[![{one.alt}]({_from_docs(one.path)})]({page})\n\n"
-            f"{_SENTENCE.split(one.caption)[0]}\n\n[page]({page}){made}\n:::\n"
+            f":::{{grid-item-card}} {one.title}\n[![{says}]({_from_docs(one.path)})]({page})\n\n"
+            f"{says}\n\n[page]({page}){made}\n:::\n"
         )
     return "::::{grid} 1 1 2 2\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
 
