@@ -106,7 +106,7 @@ class Picture(NamedTuple):
 
 
 _PICTURE = re.compile(
-    r"(?:^#+ (?P<title>.+)\n\n)?!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)"
+    r"(?:^#+ (?P<title>[^\n]+)\n\n)?!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)"
     r"(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
     re.DOTALL | re.MULTILINE,
 )
