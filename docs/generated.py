@@ -110,6 +110,7 @@ _PICTURE = re.compile(
     r"(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
     re.DOTALL | re.MULTILINE,
 )
+_LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
 _SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
 
 
@@ -121,7 +122,7 @@ def pictures() -> list[Picture]:
     for page in (index, *others):
         for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):
             path = (page.parent / match["path"]).resolve()
-            caption = " ".join((match["caption"] or match["alt"]).split())
+            caption = _LINK.sub(r"\1", " ".join((match["caption"] or match["alt"]).split()))
             picture = Picture(path, page, match["title"] or "", caption, _source(path, caption))
             found.setdefault(path, picture)
     return list(found.values())
