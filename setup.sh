@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Install everything patchlaw needs on a Debian machine (12 or newer), then the package itself into .venv.
-# With --instruments also the readers of instruments' formats. Run it as root or with sudo at hand; when
-# all is there it does nothing.
+# With --instruments also the readers of instruments' formats, with --docs what makes the documentation.
+# Run it as root or with sudo at hand; when all is there it does nothing.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 
@@ -19,19 +19,25 @@ instrument_packages=(
   python3-requests python3-tifffile python3-xmltodict python3-yaml python3-zstandard
 )
 instrument_wheels=(SurfaceTopography==1.27.1 NuMPI==0.18.1 array-api-compat==1.16.0 igor2==0.5.15)
+docs_packages=(libjs-katex) # shows the equations
 python=/usr/bin/python3 # dolfinx belongs to Debian's interpreter; another python3 may come first on PATH
 stamp=.venv/patchlaw-ready
 
 say() { printf 'setup: %s\n' "$*"; }
 fail() { printf 'setup: %s\n' "$*" >&2; exit 1; }
 
-# Once asked for, the readers stay: a later plain ./setup.sh keeps them.
-case "${1-}" in
-  "") instruments=$(grep -sq instruments "$stamp" && echo instruments || true) ;;
-  --instruments) instruments=instruments ;;
-  *) fail "unknown option $1 (allowed: --instruments)" ;;
-esac
+# Once asked for, an option stays: a later plain ./setup.sh keeps it.
+instruments=$(grep -so -- --instruments "$stamp" || true)
+docs=$(grep -so -- --docs "$stamp" || true)
+for option in "$@"; do
+  case "$option" in
+    --instruments) instruments=$option ;;
+    --docs) docs=$option ;;
+    *) fail "unknown option $option (allowed: --instruments, --docs)" ;;
+  esac
+done
 [ -z "$instruments" ] || packages+=("${instrument_packages[@]}")
+[ -z "$docs" ] || packages+=("${docs_packages[@]}")
 
 missing=()
 for package in "${packages[@]}"; do
@@ -52,11 +58,11 @@ fi
 "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || fail "$python is older than Python 3.11; Debian 12 or newer is needed"
 
 # The stamp ties the environment to this checkout, this interpreter and these requirements.
-wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml) ${instruments:+instruments ${instrument_wheels[*]}}"
+wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml) ${instruments:+$instruments ${instrument_wheels[*]}} $docs"
 if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
   say "making .venv"
   "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
-  .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]' ||
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[test${docs:+,docs}]" ||
     fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
   .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, filelock, jinja2, pint, pydantic, rich, threadpoolctl' ||
     fail "the installed packages cannot be imported together; see the message above"
@@ -69,3 +75,4 @@ if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]
   printf '%s\n' "$wanted" >"$stamp"
 fi
 say "ready: .venv/bin/patchlaw"
+[ -z "$docs" ] || say "the documentation: .venv/bin/python -m sphinx -W -c docs . docs/_build, then docs/_build/index.html"

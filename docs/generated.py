@@ -1,0 +1,188 @@
+"""Pages that the project itself has the words for: keys, columns, pictures, public names."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tomllib
+from collections.abc import Iterable, Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+from multiscale.results.history import COLUMNS
+from multiscale.scene.keys import Key, scene_keys
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry")
+"""Packages with public names, from the top down; a name is described in the first that has it."""
+
+
+def version() -> str:
+    """Return the version that ``pyproject.toml`` states."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return settings["project"]["version"]
+
+
+def write(folder: Path) -> None:
+    """Write all pages; those that did not change keep their time, so that nothing is built anew.
+
+    Args:
+        folder: Where they go; made when missing.
+    """
+    folder.mkdir(exist_ok=True)
+    pages = {
+        "scene_keys.md": scene_key_tables(),
+        "history_columns.md": history_columns(),
+        "gallery.md": gallery(),
+        **{f"{package}.md": names_of(package) for package in PACKAGES},
+    }
+    for name, text in pages.items():
+        path = folder / name
+        if not path.is_file() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+
+
+def _table(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """Return a table in Markdown."""
+    head = tuple(heading)
+    lines = [head, ("---",) * len(head), *rows]
+    return "".join(f"| {' | '.join(map(_cell, line))} |\n" for line in lines)
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("*", "\\*")
+
+
+def scene_key_tables() -> str:
+    """Return a table for every section of a scene, from the schema that checks scene files.
+
+    A section that has the keys of an earlier one names them without saying all about them again.
+    """
+    known: dict[tuple[str, ...], str] = {}
+    parts = []
+    for section in (key for key in scene_keys().values() if "." not in key.name):
+        heading = f"## `[{section.name}]`" if section.is_section else f"## `{section.name}`"
+        rows, repeated = [], []
+        for key in _keys_of(section):
+            said = (key.meaning, key.values, key.default)
+            if known.setdefault(said, key.name) != key.name and not key.is_section:
+                repeated.append((key.name, known[said]))
+            elif not key.is_section:
+                rows.append((f"`{key.name}`", key.meaning, key.values, f"`{_default(key)}`"))
+        parts.append(f"{heading}\n\n{section.meaning}\n")
+        parts.append(_table(("key", "meaning", "values", "default"), rows))
+        if repeated:
+            same = "".join(f"* `{name}`: as `{first}`\n" for name, first in repeated)
+            parts.append(f":::{{dropdown}} Keys as in an earlier section\n{same}:::\n")
+    return "\n".join(parts)
+
+
+def _keys_of(section: Key) -> Iterator[Key]:
+    """Yield the keys of a section and of the sections in it; a key that is none, itself."""
+    if not section.is_section:
+        yield section
+    yield from (key for key in scene_keys().values() if key.name.startswith(f"{section.name}."))
+
+
+def _default(key: Key) -> str:
+    return "required" if key.required else key.default
+
+
+def history_columns() -> str:
+    """Return the table of the columns of ``history.csv``, from where they are declared."""
+    rows = ((f"`{one.name}`", one.meaning, one.unit or "–") for one in COLUMNS)
+    return _table(("column", "meaning", "unit"), rows)
+
+
+class Picture(NamedTuple):
+    """A picture on a page, with the heading above it, its caption, and what made it."""
+
+    path: Path
+    page: Path
+    title: str
+    caption: str
+    source: Path | None
+
+
+_PICTURE = re.compile(
+    r"(?:^#+ (?P<title>[^\n]+)\n\n)?!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)"
+    r"(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
+    re.DOTALL | re.MULTILINE,
+)
+_LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
+_SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
+
+
+def pictures() -> list[Picture]:
+    """Return the pictures of README and demos, each once: those of the demos' index first."""
+    index = ROOT / "demos" / "README.md"
+    others = [ROOT / "README.md", *sorted({*index.parent.rglob("*.md")} - {index})]
+    found: dict[Path, Picture] = {}
+    for page in (index, *others):
+        for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):
+            path = (page.parent / match["path"]).resolve()
+            caption = _LINK.sub(r"\1", " ".join((match["caption"] or match["alt"]).split()))
+            picture = Picture(path, page, match["title"] or "", caption, _source(path, caption))
+            found.setdefault(path, picture)
+    return list(found.values())
+
+
+def _source(picture: Path, caption: str) -> Path | None:
+    """Return the script or scene of a picture: of its name, or the first that its caption names."""
+    named = re.findall(r"[\w/]+\.(?:py|toml)\b", caption)
+    folder = picture.parent
+    places = [
+        *(near / f"{picture.stem}.py" for near in (folder, folder.parent)),
+        *(near / name for name in named for near in (ROOT, ROOT / "demos", folder)),
+    ]
+    return next((place for place in places if place.is_file()), None)
+
+
+def gallery() -> str:
+    """Return all pictures as cards: what each says, the page it stands on, what made it."""
+    cards = []
+    for one in pictures():
+        page, says = _from_docs(one.page), _SENTENCE.split(one.caption)[0]
+        made = f" · [`{one.source.name}`]({_from_docs(one.source)})" if one.source else ""
+        cards.append(
+            f":::{{grid-item-card}} {one.title}\n[![{says}]({_from_docs(one.path)})]({page})\n\n"
+            f"{says}\n\n[page]({page}){made}\n:::\n"
+        )
+    return "::::{grid} 1 1 2 2\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
+
+
+def _from_docs(path: Path) -> str:
+    """Return the address of a file of the project from a page in ``docs``."""
+    return f"../{path.relative_to(ROOT).as_posix()}"
+
+
+def public_names(package: str) -> list[str]:
+    """Return the public names that are described with a package, not with one above it."""
+    above = PACKAGES[: PACKAGES.index(package)]
+    described = {id(_named(other, name)) for other in above for name in _all(other)}
+    return [name for name in _all(package) if id(_named(package, name)) not in described]
+
+
+def _all(package: str) -> list[str]:
+    return sorted(import_module(package).__all__, key=str.lower)
+
+
+def _named(package: str, name: str) -> object:
+    return getattr(import_module(package), name)
+
+
+def names_of(package: str) -> str:
+    """Return a page on the public names of a package: a table of them, then each in full."""
+    rows, blocks = [], []
+    for name in public_names(package):
+        thing, path = _named(package, name), f"{package}.{name}"
+        if not callable(thing):
+            blocks.append(f".. autodata:: {path}\n")
+            continue
+        kind = "class" if inspect.isclass(thing) else "function"
+        says = (inspect.getdoc(thing) or "").partition("\n")[0].replace("``", "`")
+        rows.append((f"{{py:obj}}`{path}`", says))
+        blocks.append(f".. auto{kind}:: {path}\n")
+    body = "\n".join(blocks)
+    return f"{_table(('name', 'purpose'), rows)}\n```{{eval-rst}}\n{body}```\n"

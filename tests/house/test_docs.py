@@ -1,0 +1,101 @@
+"""The documentation has every page, key and column; continuous integration builds its site."""
+
+import fnmatch
+import re
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from multiscale.exports.tables import CSV_COLUMNS
+from multiscale.output.results import FILES
+from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
+from multiscale.results.extrapolation import Estimate
+from multiscale.results.history import COLUMNS, PATCH_COLUMNS, PATCH_STIFFNESS
+from multiscale.results.reference_record import ReferenceRecord
+from multiscale.scene.keys import scene_keys
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+RESULTS = (DOCS / "results.md").read_text(encoding="utf-8")
+BUILD = r"\.venv/bin/python -m sphinx .*-W .*-c docs \. docs/_build"
+
+
+@pytest.fixture(scope="module")
+def generated():
+    return runpy.run_path(str(DOCS / "generated.py"))
+
+
+def test_every_key_is_in_the_table(generated):
+    table = generated["scene_key_tables"]()
+    for key in scene_keys().values():
+        if not key.is_section:
+            assert f"`{key.name}`" in table
+    row = next(line for line in table.splitlines() if line.startswith("| `load.steps`"))
+    assert row.split(" | ")[1:] == ["Load steps to every turning point.", "whole number ≥ 1 and "
+                                    "≤ 1e+06", "`8` |"]  # fmt: skip
+
+
+def test_every_column_of_the_history_is_in_the_table(generated):
+    table = generated["history_columns"]()
+    for column in COLUMNS:
+        assert f"| `{column.name}` | {column.meaning} | {column.unit or '–'} |" in table
+
+
+def columns_of_a_reference():
+    none = np.zeros((1, 0))
+    estimate = Estimate(value=none[0], error=none[0], rate=none[0])
+    record = ReferenceRecord(
+        sizes=np.ones(1), unknowns=(1,), approach_mm=none, force_N=none,
+        contact_area_fraction=none, approach=estimate, force=estimate, area=estimate,
+    )  # fmt: skip
+    return tuple(record.columns(()))
+
+
+@pytest.mark.parametrize(
+    ("file", "columns"),
+    [
+        ("patches.csv", (*PATCH_COLUMNS, "region", PATCH_STIFFNESS)),
+        ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
+        ("contact.h5", FIELDS),
+        ("reference.csv", columns_of_a_reference()),
+        ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, "pressure_scatter_MPa")),
+    ],
+)
+def test_every_column_is_described(file, columns):
+    section = RESULTS.partition(f"\n## `{file}`\n")[2].partition("\n## ")[0]
+    described = re.findall(r"`(\w+)`", "".join(re.findall(r"^\| (.*?) \|", section, re.MULTILINE)))
+    assert set(described) == set(columns)
+
+
+def test_every_file_of_a_run_is_described():
+    table = RESULTS.partition("## Files of a run")[2].partition("\n## ")[0]
+    for file in FILES:
+        assert Path(file).stem in table
+
+
+def test_every_page_is_in_the_navigation():
+    trees = re.findall(r"```\{toctree\}\n(.*?)```", (DOCS / "index.md").read_text(), re.DOTALL)
+    lines = [line for tree in trees for line in tree.splitlines() if line[:1] not in (":", "")]
+    entries = [re.sub(r".*<(.*)>", r"\1", line) for line in lines]
+    shown = [entry[1:] if entry.startswith("/") else f"docs/{entry}" for entry in entries]
+    pages = [*ROOT.glob("*.md"), *DOCS.glob("*.md"), *(ROOT / "demos").rglob("*.md")]
+    for page in {path.relative_to(ROOT).with_suffix("") for path in pages} - {Path("docs/index")}:
+        assert any(fnmatch.fnmatch(str(page), entry) for entry in shown), page
+
+
+def test_every_picture_is_in_the_gallery_with_what_made_it(generated):
+    shown = generated["pictures"]()
+    images = [
+        *(ROOT / "demos" / "pictures").glob("*.png"), *(ROOT / "demos" / "bodies").glob("*.png")
+    ]  # fmt: skip
+    on_pages = {one.path for one in shown}
+    assert set(images) <= on_pages
+    assert all(len(one.caption) > 20 for one in shown)
+    assert {one.source.name for one in shown if one.source} >= {"kappa.py", "brake_pad.py"}
+
+
+def test_continuous_integration_builds_the_site_as_the_readme_does():
+    assert re.search(rf"^{BUILD}$", (ROOT / ".ci" / "run").read_text(), re.MULTILINE)
+    assert re.search(BUILD, (ROOT / "README.md").read_text(encoding="utf-8"))
