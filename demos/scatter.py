@@ -9,7 +9,8 @@
 #     (finite elements in smooth modes)                 the block → 16 laws → 8 load steps }
 #
 # Run time: seven minutes on one core, half of it under `mpirun -n 2`; the surfaces are dealt to the
-# ranks. `--quick` for 6 surfaces, `--out DIR` for the folder of the figure.
+# ranks. `--quick` for 6 surfaces, `--out DIR` for the folder of figure and table, `--data
+# demos/data/scatter.csv` to draw that table, which a run has made, again.
 
 # %%
 import argparse
@@ -17,7 +18,6 @@ import time
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from geometry import Control
@@ -25,10 +25,12 @@ from multiscale import CondensedCoupling, Scene, consistent_laws, load_steps, ma
 from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import on_body
 from multiscale.couplings.patch_compliance import patch_compliance
+from multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/scatter"))
+parser.add_argument("--data", type=Path)
 choice = parser.parse_args()
 comm = MPI.COMM_WORLD
 SURFACES = 6 if choice.quick else 1000
@@ -57,15 +59,9 @@ def scene(seed: int) -> Scene:
 # The block is the same below all surfaces: what pressures do to its top is found once, on all
 # ranks together.
 
-# %%
-start = time.perf_counter()
-first = make_setup(scene(0))
-face, compliance = scene_body(first).face(comm), patch_compliance(first, comm)
-once = time.perf_counter() - start
-
 
 # %%
-def curve(seed: int) -> list[float]:
+def curve(seed, face, compliance):
     """Return the forces of one surface at all load steps [N]."""
     setup = make_setup(scene(seed))
     load_history = setup.scene.loading.load_history
@@ -80,10 +76,26 @@ def curve(seed: int) -> list[float]:
     return [step.force_N for step in load_steps(CondensedCoupling(table, compliance), load_history)]
 
 
+def curves():
+    """Return the forces of all surfaces [N], written as a table with the approaches above them."""
+    first = make_setup(scene(0))
+    block = scene_body(first).face(comm), patch_compliance(first, comm)
+    mine = {seed: curve(seed, *block) for seed in range(comm.rank, SURFACES, comm.size)}
+    found = {seed: row for part in comm.allgather(mine) for seed, row in part.items()}
+    forces = np.array([found[seed] for seed in range(SURFACES)])
+    alone = run(scene(0), comm)  # which finds all of this itself
+    # the same laws but for the residual of their micro solutions, 1e-8 here and 1e-10 there
+    np.testing.assert_allclose(forces[0], alone.force_N, rtol=1e-6)
+    if comm.rank == 0:
+        choice.out.mkdir(parents=True, exist_ok=True)
+        text = "approaches [um] in the first row, forces [N] of a surface in every other"
+        table = np.vstack([1e3 * alone.approach_mm, forces])
+        np.savetxt(choice.out / "scatter.csv", table, "%.6g", ",", header=text)
+    return np.vstack([1e3 * alone.approach_mm, forces])
+
+
 start = time.perf_counter()
-mine = {seed: curve(seed) for seed in range(comm.rank, SURFACES, comm.size)}
-found = {seed: row for part in comm.allgather(mine) for seed, row in part.items()}
-forces = np.array([found[seed] for seed in range(SURFACES)])
+approach, *rows = np.loadtxt(choice.data, delimiter=",") if choice.data else curves()
 spent = time.perf_counter() - start
 
 # %% [markdown]
@@ -91,32 +103,28 @@ spent = time.perf_counter() - start
 
 # %%
 if comm.rank == 0:
-    choice.out.mkdir(parents=True, exist_ok=True)
-    alone = run(scene(0))  # which finds all of this itself
-    approach = alone.approach_mm
+    forces = np.array(rows)
     low, median, high = np.percentile(forces, (5, 50, 95), axis=0)
     mean, deviation = forces.mean(axis=0), forces.std(axis=0, ddof=1)
-    print(f"{SURFACES} surfaces, {comm.size} rank(s): block {once:.1f} s, curves {spent:.1f} s")
+    print(f"{len(forces)} surfaces, {comm.size} rank(s): {spent:.1f} s")
     print("approach [µm]   mean force [N]   deviation   5 … 95 % [N]")
-    for row in zip(1e3 * approach, mean, deviation / mean, low, high, strict=True):
+    for row in zip(approach, mean, deviation / mean, low, high, strict=True):
         print("{:10.1f} {:16.3f} {:12.0%} {:9.3f} … {:.3f}".format(*row))
-    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+    use_style()
+    figure = new_figure(1.3 * ONE_COLUMN, 3.0)
     axes = figure.subplots()
-    approach, forces = np.append(0.0, approach), np.insert(forces, 0, 0.0, axis=1)
-    low, median, high = np.percentile(forces, (5, 50, 95), axis=0)
-    axes.plot(1e3 * approach, forces[:60].T, color="0.75", lw=0.6)
-    axes.plot([], [], color="0.75", lw=0.6, label=f"{min(60, SURFACES)} of {SURFACES} surfaces")
-    axes.fill_between(1e3 * approach, low, high, color="C0", alpha=0.25, label="5 to 95 %")
-    axes.plot(1e3 * approach, forces.mean(axis=0), color="C0", lw=2.0, label="mean")
-    axes.plot(1e3 * approach, median, color="C0", lw=1.2, ls="--", label="median")
-    axes.set(
-        xlabel="approach from first touch [µm]",
-        ylabel="force [N]",
-        xlim=(0.0, 1e3 * approach[-1]),
-        ylim=(0.0, None),
-    )
-    axes.legend(loc="upper left", frameon=False)
-    figure.savefig(choice.out / "scatter.png", dpi=130)
+    zero = np.append(0.0, approach)
+    from_zero = [np.append(0.0, values) for values in (low, high, median)]
+    axes.plot(zero, np.insert(forces[:60], 0, 0.0, axis=1).T, color="0.72", lw=0.5)
+    axes.fill_between(zero, *from_zero[:2], color=BLUE, alpha=0.2, lw=0.0)
+    axes.plot(zero, from_zero[2], color=BLUE, lw=2.0)
+    right = {"xytext": (4, 0), "textcoords": "offset points", "va": "center"}
+    for text, values in (("95 %", high), ("median", median), ("5 %", low)):
+        axes.annotate(text, (approach[-1], values[-1]), color=BLUE, **right)
+    few = f"grey: {min(60, len(forces))} of {len(forces)} surfaces"
+    axes.text(0.03, 0.95, few, transform=axes.transAxes, color="0.4", va="top")
+    axes.set(xlim=(0.0, approach[-1]), ylim=(0.0, 1.5 * high[-1]))
+    axes.set(xlabel="approach from first touch [µm]", ylabel="mean pressure [MPa]")
+    figure.savefig(choice.out / "scatter.png")
     assert np.all(np.diff(forces, axis=1) >= 0.0)
-    # the same laws but for the residual of their micro solutions, 1e-8 here and 1e-10 there
-    np.testing.assert_allclose(forces[0, 1:], alone.force_N, rtol=1e-6)
+    assert high[-1] > 2.0 * low[-1] or choice.quick
