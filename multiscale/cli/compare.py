@@ -18,11 +18,11 @@ from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.configuration import RunResult
 from multiscale.comparison.launch import check_launchable
 from multiscale.output import terminal
-from multiscale.output.results import png
+from multiscale.output.results import pictures_of, write_pictures
 from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_bytes, write_csv, write_text
+from multiscale.storage import write_csv, write_text
 
 RESULTS = "configurations"
 """Folder of the results of all configurations, within the folder of the comparison."""
@@ -98,12 +98,12 @@ def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
     """
     columns, pictures = comparison.to_dict(), _pictures(comparison)
     files = [write_csv(folder / "compare.csv", list(columns), zip(*columns.values(), strict=True))]
-    files += [write_bytes(folder / f"{name}.png", picture) for name, picture in pictures.items()]
+    files += write_pictures(folder, pictures)
     return [*files, write_text(folder / "report.html", comparison_html(comparison, pictures))]
 
 
 def _pictures(comparison: Comparison) -> dict[str, bytes]:
-    """Return the figures as PNG images by name; matplotlib is loaded only here."""
+    """Return the files of the figures by name; matplotlib is loaded only here."""
     from multiscale.comparison.error_over_time import pareto_figure
     from multiscale.comparison.figures import curves_figure, maps_figure
 
@@ -113,7 +113,8 @@ def _pictures(comparison: Comparison) -> dict[str, bytes]:
     if any(row.steps for row in comparison.rows):
         drawn["curves"] = curves_figure(comparison)
         drawn["pressures"] = maps_figure(comparison)
-    return {name: png(figure) for name, figure in drawn.items()}
+    files = (pictures_of(name, figure) for name, figure in drawn.items())
+    return {name: content for found in files for name, content in found.items()}
 
 
 def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
@@ -121,7 +122,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
 
     Args:
         comparison: The comparison.
-        pictures: PNG images by name, ``pareto``, ``curves`` and ``pressures``.
+        pictures: Files of the figures by name, ``pareto.png``, ``curves.png``, ``pressures.png``.
     """
     threads = os.environ.get("OMP_NUM_THREADS", "all")
     return filled(

@@ -13,7 +13,7 @@ from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
-from multiscale.output.results import write_figure
+from multiscale.output.results import pictures_of, write_pictures
 from multiscale.restart.results_folder import locked
 from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, values_from_text
@@ -24,7 +24,7 @@ from multiscale.sweeps.sweep_results import SweepResults
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""
 
-FILES = ("cases.csv", "history.csv", "ensembles.csv", "sweep.png")
+FILES = ("cases.csv", "history.csv", "ensembles.csv", "sweep.png", "sweep.svg")
 """Files of the results of a sweep."""
 
 
@@ -94,7 +94,7 @@ def _write(folder: Path, found: SweepResults, figures: bool) -> list[Path]:
         if rows
     ]
     if figures and tables["ensembles.csv"]:
-        files.append(write_figure(folder / "sweep.png", found.plot()))
+        files += write_pictures(folder, pictures_of("sweep", found.plot()))
     return files
 
 

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+from multiscale.figures.style import BLUE, COLOURS, FULL_WIDTH, add_legend, new_figure, styled
 
 
+@styled()
 def history_figure(history: Any, kind: str) -> Figure:
     """Draw force, contact area and mean separation of a run.
 
@@ -17,10 +18,10 @@ def history_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History`.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    figure = new_figure(11.0, 3.6)
+    figure = new_figure(FULL_WIDTH, 2.4)
     force, area, gap = figure.subplots(1, 3)
-    colour = COLOURS.get(kind, COLOURS["analytic"])
-    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": colour, "label": kind}
+    colour = COLOURS.get(kind, BLUE)
+    look: dict[str, Any] = {"marker": "o", "ms": 3.0, "color": colour, "label": kind}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at zero approach of the middle.
     level = not any(any(step.tilt) for step in history.steps)
@@ -33,7 +34,7 @@ def history_figure(history: Any, kind: str) -> Figure:
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
     gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
-    add_grid_and_legend(figure)
+    add_legend(figure)
     return figure
 
 

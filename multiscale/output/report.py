@@ -34,7 +34,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes]) -> str:
 
     Args:
         run: The run, finished or stopped.
-        pictures: PNG images by name, see `multiscale.output.results.write_results`.
+        pictures: Files of the figures by name, see `multiscale.output.results.pictures_of`.
     """
     history = run.history()
     return filled(

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+from multiscale.figures.style import FULL_WIDTH, PALETTE, add_legend, new_figure, styled
 
 MOST_CURVES = 200
 """Cases that are drawn as curves; bands show those beyond."""
@@ -37,6 +37,7 @@ class Ensemble(NamedTuple):
     area_fraction: NDArray[np.float64]
 
 
+@styled()
 def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
@@ -46,10 +47,10 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     Args:
         ensembles: The curves; those beyond `MOST_ENSEMBLES` are left out.
     """
-    figure = new_figure(9.0, 4.0)
+    figure = new_figure(FULL_WIDTH, 3.0)
     force, area = figure.subplots(1, 2)
     shown = ensembles[:MOST_ENSEMBLES]
-    for colour, ensemble in zip(cycle(COLOURS.values()), shown, strict=False):
+    for colour, ensemble in zip(cycle(PALETTE), shown, strict=False):
         x, y, a = 1e3 * ensemble.approach, ensemble.pressure, 100 * ensemble.area_fraction
         for row in range(min(len(x), MOST_CURVES // len(shown))):
             force.plot(x[row], y[row], color=colour, lw=0.5, alpha=0.4)
@@ -62,5 +63,5 @@ def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
             force.fill_between(x[0], low, high, color=colour, alpha=0.2)
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
-    add_grid_and_legend(figure)
+    add_legend(figure)
     return figure

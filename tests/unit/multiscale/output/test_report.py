@@ -45,7 +45,7 @@ def report(text, **changes):
     step = SimpleNamespace(step=2, errors=((text, 0.25), (text, 0.5)), force_N=3.0)
     content = {
         "title": text, "headline": text, "warnings": [text], "statements": [(text, text)],
-        "history": history, "measured": step, "pictures": {"surface": b"PNG"},
+        "history": history, "measured": step, "pictures": {"surface.png": b"PNG"},
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
 
