@@ -76,42 +76,43 @@ def draw_plane(axes, view):
     for x in (0.25 * lx, 0.5 * lx, 0.75 * lx):
         foot = view.seen(x, 0.5 * (near + ly), high)
         axes.annotate("", foot, (foot[0], foot[1] + 0.16 * lx), arrowprops=arrow)
-    axes.text(foot[0] + 0.03 * lx, foot[1] + 0.1 * lx, f"{SCENE['load']['force']}")
+    axes.text(
+        foot[0] + 0.03 * lx,
+        foot[1] + 0.1 * lx,
+        f"rigid plane,\n{SCENE['load']['force']}",
+        va="center",
+    )
 
 
 if COMM.rank == 0:
     use_style()
     setup = make_setup(rough)
     view = BlockView(setup.surface, contact.pressure_MPa, setup.materials.first.poisson_ratio)
-    figure = new_figure(FULL_WIDTH, 4.4)
+    figure = new_figure(FULL_WIDTH, 4.25)
     figure.set_layout_engine("none")  # axes are placed by hand
-    block = figure.add_axes((0.005, 0.14, 0.635, 0.85))
-    block.set(aspect="equal")
-    block.axis("off")
-    block.set_title(f"cut along the dashed line; heights × {view.exaggeration:g}")
-    for draw in (view.draw_side, view.draw_cut, view.draw_top, view.draw_edges):
-        draw(block)
+    block = figure.add_axes((0.005, 0.13, 0.635, 0.85))
+    view.draw(block)
     draw_plane(block, view)
     bar = figure.add_axes((0.14, 0.11, 0.34, 0.02))
     bar.grid(False)
     stresses = ScalarMappable(view.stresses, STRESSES)
-    label = "von Mises stress on the cut [MPa]"
+    label = f"von Mises stress [MPa] on the cut (dashed line; heights × {view.exaggeration:g})"
     figure.colorbar(stresses, cax=bar, orientation="horizontal", label=label)
     bar.set_xticks([0, 25, 50, 100, 150])
-    above, below = (figure.add_axes((0.71, low, 0.19, 0.311)) for low in (0.6, 0.11))
-    scale = map_axes(above, contact.lengths_mm)
+    above, below = (figure.add_axes((0.71, low, 0.19, 0.322)) for low in (0.61, 0.11))
+    map_axes(above, contact.lengths_mm)
     shown = np.ma.masked_less_equal(contact.pressure_MPa, 0.0).T
     extent = (*above.get_xlim(), *above.get_ylim())
     look = {"origin": "lower", "extent": extent, "cmap": PRESSURES, "norm": view.pressures}
     spots = above.imshow(shown, **look)
     draw_patch_borders(above, patches)
     above.axhline(view.y[view.row], color="0.2", lw=0.8, ls=(0, (5, 3)))
-    above.set(title=f"{len(contact.spots)} contact spots, from above", xlabel="")
+    above.set(title=f"{len(contact.spots)} contact spots from above", xlabel="")
     colour_bar(spots, above, "contact pressure [MPa]")
     draw_pressures(below, patches, embedded.patch_pressure_MPa[-1], label="mean pressure [MPa]")
-    below.set(title=f"{patches.count} patches with laws")
+    below.set(title=f"what {patches.count} patch laws carry")
     choice.out.mkdir(parents=True, exist_ok=True)
-    figure.savefig(choice.out / "rough_block.png")
+    figure.savefig(choice.out / "rough_block.png", pil_kwargs={"optimize": True})
 
 # %% [markdown]
 # The same force at the same approach, and each patch carries what its spots carry.
