@@ -36,7 +36,7 @@ PAPER = Path(__file__).parent / "scenes" / "paper.toml"
 SEEDS = (1,) if choice.quick else (1, 2, 3)
 GRIDS = (2,) if choice.quick else (1, 2, 4, 8, 16)
 CELLS = 48 if choice.quick else 128
-TILTS = {"level": 0.0, "tilted by 5 µm/mm": 5.0}
+TILTS = {"level plane": 0.0, "plane tilted by 5 µm/mm": 5.0}
 PLAIN = "coupling.compliance=finite-element"
 ROUGHLY = ["coupling.table_tolerance=1e-3"] if choice.quick else []
 COUPLINGS = {
@@ -107,15 +107,15 @@ LOOKS = ("o-", {"c": GREEN}), ("o", {"c": GREEN, "mfc": "none", "ms": 8.0}), ("s
 for index, (axes, name) in enumerate(zip(figure.subplots(1, 2, sharey=True), TILTS, strict=True)):
     for (mark, look), found in zip(LOOKS, worst[:, index, :, -1], strict=True):
         axes.loglog(counts, 100.0 * found, mark, **look)
-    axes.set(title=f"plane {name}", xlabel="number of patches", ylim=(5e-4, 200.0))
+    axes.set(title=name, xlabel="number of patches", ylim=(5e-4, 200.0))
     axes.set_xticks(counts, [f"{count}" for count in counts])
     axes.minorticks_off()
     axes.yaxis.set_major_formatter("{x:g}")
 left = figure.axes[0]
 left.set_ylabel("error of the force at 8 µm [%]")
-left.text(1.0, 3.0, "every patch on its own\n(isolated laws)", color=RED)
-text = "laws of the whole surface (consistent):\ndots and rings, two kinds of blocks"
-left.text(1.0, 0.15, text, color=GREEN)
+left.text(1.0, 1.6, "every patch on its own\n(isolated laws)", color=RED)
+text = "laws of the whole surface (consistent)\non two kinds of blocks (dots, rings)"
+left.text(1.0, 0.08, text, color=GREEN)
 figure.savefig(choice.out / "couplings.png")
 
 # %% [markdown]

@@ -20,11 +20,10 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from paper.accuracy_figure import draw_accuracy
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
-from multiscale.figures.style import ERROR_BAND, FULL_WIDTH, new_figure, use_style
-from multiscale.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -109,42 +108,16 @@ for key, (force, area) in size.items():
 print(f"| reference, rates {rate[0]:.2f} and {rate[1]:.2f} | {own[0]:.3%} | {own[1]:.3%} | |")
 
 # %%
-use_style()
-figure, PLAIN = new_figure(FULL_WIDTH, 3.1), f", {ASPERITY_GRID}²"
-left, right = figure.subplots(1, 2)
-
-
-def look(key):
-    return {name: LOOKS[key.partition(",")[0]][name] for name in ("marker", "color")}
-
-
-WITHOUT, WITH, CELLWISE = f"elliptic-independent{PLAIN}", f"elliptic{PLAIN}", "half-space, 64²"
-for key in (WITHOUT, WITH, CELLWISE):
-    area, error = 100 * fractions.ravel(), 100 * errors[key][:, 0].ravel()
-    left.semilogx(area, error, ls="", ms=2.5, **look(key))
-left.set(ylim=(-70, 70), xlabel="contact area [% of the face]", ylabel="error of the force [%]")
-names = [f"half-space, {n}²" for n in CELLS if f"half-space, {n}²" not in REFERENCE]
-places = {key: (cost[key], 100 * size[key][0]) for key in MODELS}
-right.loglog(*zip(*(places[key] for key in names), strict=True), **look(CELLWISE))
-marks = f"circular-independent{PLAIN}", f"circular{PLAIN}"
-for key in (WITHOUT, WITH, *marks, "islands", "elliptic, repaired", "circular, repaired"):
-    right.plot(*places[key], ms=5, **look(key))
-for axes, key, at, text in (
-    (left, WITHOUT, (0.105, 50), "asperities without interaction"),
-    (left, WITH, (0.105, -50), "asperities with interaction"),
-    (left, CELLWISE, (0.105, 10), "half-space, 64² heights"),
-    (right, WITHOUT, (2.1, 23), "without interaction"),
-    (right, WITH, (2.1, 9.5), "with interaction"),
-    (right, WITH, (40, 1.2), "with it, repaired"),
-    (right, "islands", (20, 3.4), "islands"),
-    *((right, key, (1.15 * places[key][0], 0.95 * places[key][1]), key) for key in names),
-):
-    axes.text(*at, text, color=look(key)["color"])
-right.axhspan(0.01, 100 * own[0], **ERROR_BAND)
-right.text(1.1, 75 * own[0], "error of the truth itself", va="top", color="0.4")
-right.set(ylim=(0.02, 100), xlim=(1, 100))
-right.set(xlabel="time per approach [ms]", ylabel="rms error of the force [%]")
-figure.savefig(choice.out / "micro_accuracy.png")
+plain = [f"{kind}, {ASPERITY_GRID}²" for kind in KINDS]
+repaired = ["elliptic, repaired", "circular, repaired", "islands"]
+grids = [f"half-space, {n}²" for n in CELLS if choice.quick or n < 256]  # others are of the truth
+draw_accuracy(
+    choice.out / "micro_accuracy.png",
+    fractions,
+    {key: errors[key][:, 0] for key in (plain[0], plain[2], "half-space, 64²")},
+    {key: (cost[key], 100 * size[key][0]) for key in (*plain, *repaired, *grids)},
+    100 * own[0],
+)
 
 # %% [markdown]
 # Without interaction models are far too stiff; with it too soft, until they are repaired.
