@@ -59,7 +59,19 @@ runs = {
 runs |= {f"isolated, {n} × {n}": go("coupling.kind=isolated", n=n) for n in (1, 2, 4)}
 runs["consistent, 16 × 16"] = go("coupling.kind=consistent", "micro.model=half-space")
 truth, bar = float(record.force.value[-1]), float(record.force.error[-1])
-error = {name: history.force_N[-1] / truth - 1.0 for (name, (history, _)), mark, colour in zip(runs.items(), *LOOKS, strict=True):
+error = {name: history.force_N[-1] / truth - 1.0 for name, (history, _) in runs.items()}
+
+# %% [markdown]
+# Figure 14: mean pressure over approach.
+
+# %%
+figure = style.new_figure(style.FULL_WIDTH, 4.2)
+curve = figure.subplots()
+curve.plot(1e3 * reference.approach_mm, record.force.value, color=INK, label="reference")
+draw_error_band(curve, None, reference, colour=INK)
+KINDS = ["analytic"] * 3 + ["isolated"] * 3 + ["consistent"]
+LOOKS = "ds*ov^x", [style.COLOURS[kind] for kind in KINDS]
+for (name, (history, _)), mark, colour in zip(runs.items(), *LOOKS, strict=True):
     look = {"marker": mark, "color": colour, "ls": "--", "lw": 0.8, "label": name}
     curve.plot(1e3 * history.approach_mm, history.mean_pressure_MPa, **look)
 curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
