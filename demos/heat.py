@@ -108,9 +108,10 @@ force, total, series, columns, interface = np.array(rows).T
 use_style()
 figure = new_figure(FULL_WIDTH, 2.6)
 left, right = figure.subplots(1, 2)
-for values, colour, text in ((1.0 / total, BLUE, "whole"), (interface, VERMILLION, "interface")):
-    left.loglog(force, values, "o-", color=colour)
-    left.text(force[-1], 1.2 * values[-1], text, color=colour, ha="right")
+for values, color, text in ((1.0 / total, BLUE, "in all"), (interface, VERMILLION, "interface")):
+    left.loglog(force, values, "o-", color=color)
+    left.text(1.15 * force[1], values[1], text, color=color, va="bottom")
+left.yaxis.set_major_formatter("{x:g}")
 left.set(xlabel="force [N]", ylabel="thermal resistance [K/W]")
 map_axes(right, SIDES[:2])
 shown = right.imshow(1e6 * h.reshape(PATCHES.grid).T, origin="lower", extent=(0, 40, 0, 20))

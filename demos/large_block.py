@@ -73,7 +73,7 @@ beside = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
 for (ratio, history), colour in zip(histories.items(), shades, strict=True):
     change = 100 * (history.force_N / half_space.force_N - 1)
     axes.plot(approach, change, "o-", color=colour)
-    text = f"{ratio} times the face" if ratio > 1 else "a cube"
+    text = {1: "a cube", 8: ""}.get(ratio, f"{ratio} times as large")
     axes.annotate(text, (approach[-1], change[-1]), color=colour, **beside)
 axes.axhline(0.0, color=INK, lw=0.8)
 axes.set(xlabel="approach [µm]", ylabel="force against the half-space [%]")

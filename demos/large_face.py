@@ -99,13 +99,13 @@ for force in FORCES:
 use_style()
 figure = new_figure(FULL_WIDTH, 3.0)
 left, right = figure.subplots(1, 2)
-LABELS = (ORANGE, (0.02, 0.25), "left"), (BLUE, (0.98, 0.95), "right")
+LABELS = (ORANGE, (0.4, 0.4), "left"), (BLUE, (0.98, 0.95), "right")
 for (waves, law), (colour, place, side) in zip(laws.items(), LABELS, strict=True):
     separation = 1e3 * (law.initial_separation - law.rows.closure)
     left.plot(separation, law.rows.pressure, color=colour)
     band = [law.rows.pressure + sign * law.rows.pressure_scatter for sign in (-1.0, 1.0)]
     left.fill_between(separation, *band, color=colour, alpha=0.2, lw=0.0)
-    text = f"samples of {waves} longest\nwave{'s' if waves > 1 else ''}, and their scatter"
+    text = f"samples of\n{waves} longest wave{'s' if waves > 1 else ''},\nand their scatter"
     left.text(*place, text, color=colour, ha=side, va="top", transform=left.transAxes)
 left.set(xlabel="mean separation / rms height", ylabel="mean pressure [MPa]")
 left.set(yscale="log", ylim=(0.1, LARGEST))

@@ -89,6 +89,7 @@ figure = new_figure(FULL_WIDTH, 2.0)
 for axes, (name, part) in zip(figure.subplots(1, 2), found.items(), strict=True):
     map_axes(axes, SIDES[:2])
     levels = np.linspace(0.0, top, 13)
+    levels[0] = 1e-3 * top  # what carries nothing is white
     drawn = axes.tricontourf(*places.T, part, levels=levels, cmap=PRESSURES)
     axes.set(title=name)
 colour_bar(drawn, axes, "pressure [MPa]").ax.yaxis.set_major_formatter("{x:.1f}")

@@ -70,9 +70,8 @@ curve = figure.subplots()
 curve.plot(1e3 * reference.approach_mm, record.force.value, color=INK, label="reference")
 draw_error_band(curve, None, reference, colour=INK)
 KINDS = ["analytic"] * 3 + ["isolated"] * 3 + ["consistent"]
-LOOKS = "ds*ov^x", [style.COLOURS[kind] for kind in KINDS]
-for (name, (history, _)), mark, colour in zip(runs.items(), *LOOKS, strict=True):
-    look = {"marker": mark, "color": colour, "ls": "--", "lw": 0.8, "label": name}
+for (name, (history, _)), mark, kind in zip(runs.items(), "ds*ov^x", KINDS, strict=True):
+    look = {"marker": mark, "color": style.COLOURS[kind], "ls": "--", "lw": 0.8, "label": name}
     curve.plot(1e3 * history.approach_mm, history.mean_pressure_MPa, **look)
 curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
 curve.legend()
