@@ -132,6 +132,7 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     bins = np.logspace(low, high, int(_PER_DECADE * (high - low)) + 1)
     axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
+    axes.minorticks_off()
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 
