@@ -59,7 +59,8 @@ for cells, size, error in zip(MESHES, sizes, errors, strict=True):
     axes.text(1.08 * size, error, " × ".join(map(str, cells)), color=BLUE, va="top")
 axes.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
 axes.minorticks_off()
-axes.yaxis.set_major_formatter("{x:g}")
+ticks = [0.5, 1.0, 2.0, 5.0]
+axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
 axes.set(xlim=(0.85 * min(sizes), 1.8 * max(sizes)))
 axes.set(xlabel="edge of the elements on the face [µm]", ylabel="force in excess [%]")
 figure.savefig(choice.out / "block_mesh.png")
