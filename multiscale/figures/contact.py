@@ -41,12 +41,10 @@ def contact_figure(record: Any) -> Figure:
     fields = record.pressure_MPa is not None
     figure = new_figure(FULL_WIDTH, 5.4 if fields else 2.9)
     panels = figure.subplots(2 if fields else 1, 2).ravel()
+    draw_contact(panels[0], record)
     if fields:
-        draw_contact_pressures(panels[0], record)
         _draw_gaps(panels[1], record)
         _draw_shares(panels[3], record)
-    else:
-        _draw_spots(panels[0], record)
     _draw_sizes(panels[2 if fields else 1], record)
     figure.suptitle(
         f"load step {record.step}: approach {quantity(record.approach_mm, 'mm')}, "
@@ -55,13 +53,16 @@ def contact_figure(record: Any) -> Figure:
     return figure
 
 
-def draw_contact_pressures(axes: Any, record: Any) -> None:
-    """Draw the map of contact pressures; what carries none is white.
+def draw_contact(axes: Any, record: Any) -> None:
+    """Draw the map of contact pressures, white where there are none; of spots alone circles.
 
     Args:
         axes: Axes to draw into.
-        record: A `multiscale.results.contact_record.ContactRecord` with fields.
+        record: A `multiscale.results.contact_record.ContactRecord`.
     """
+    if record.pressure_MPa is None:
+        _draw_spots(axes, record)
+        return
     pressure = np.asarray(record.pressure_MPa)
     shown = np.ma.masked_less_equal(pressure, 0.0)
     top = float(np.quantile(shown.compressed(), _SHOWN)) if shown.count() else 1.0

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from multiscale.figures.block import block_figure
-from multiscale.figures.maps import colour_bar, draw_pressures, map_axes, map_unit, place_colours
+from multiscale.figures.contact import draw_contact
+from multiscale.figures.maps import colour_bar, draw_pressures, map_axes, place_colours
 from multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -22,7 +23,7 @@ from multiscale.figures.style import (
     new_figure,
     styled,
 )
-from multiscale.figures.surface import surface_figure
+from multiscale.figures.surface import draw_surface, surface_figure
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import quantity
@@ -56,7 +57,8 @@ def pressure_figure(history: History) -> Figure:
     last = history.steps[-1]
     assert isinstance(history.patches, PatchGrid)
     draw_pressures(axes, history.patches, last.patches.pressure_MPa)
-    axes.set_title(load_text(last))
+    bar = f" ({history.reference.label})" if history.reference else ""
+    axes.set_title(load_text(last) + bar)
     return figure
 
 
@@ -66,10 +68,37 @@ def load_text(step: LoadStep) -> str:
 
 
 @styled()
+def overview_figure(
+    setup: ProblemSetup, history: History, face: NDArray[np.float64] | None
+) -> Figure:
+    """Draw the surface beside the pressures on it: of cells, spots, the face or patches.
+
+    Args:
+        setup: The problem set up from the scene.
+        history: The load steps.
+        face: Pressures on a face with laws of samples, see `face_figure`; None without.
+    """
+    figure = new_figure(FULL_WIDTH, 2.8)
+    left, right = figure.subplots(1, 2)
+    draw_surface(left, setup.surface, None)
+    left.set_title("surface" + " of a sample" * bool(setup.samples))
+    record, last = history.contact, history.steps[-1]
+    if record is not None:
+        draw_contact(right, record)
+    elif face is not None:
+        draw_face(right, face)
+        right.set_title("contact pressure, averaged over the roughness")
+    elif isinstance(history.patches, PatchGrid):
+        draw_pressures(right, history.patches, last.patches.pressure_MPa)
+        right.set_title("mean pressure of every patch; open ones white")
+    else:
+        right.axis("off")
+    return figure
+
+
+@styled()
 def face_figure(points: NDArray[np.float64], step: LoadStep) -> Figure:
     """Draw the pressures on a contact face of any outline at a load step.
-
-    What bears no pressure is pale grey, so that the outline is seen.
 
     Args:
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
@@ -77,22 +106,34 @@ def face_figure(points: NDArray[np.float64], step: LoadStep) -> Figure:
     """
     figure = new_figure(FULL_WIDTH, 4.2)
     axes = figure.add_subplot()
+    draw_face(axes, points)
+    mean = quantity(step.mean_pressure_MPa, "MPa", 3)
+    axes.set_title(f"{load_text(step)}, mean pressure {mean}")
+    return figure
+
+
+def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
+    """Draw the pressures on a contact face of any outline.
+
+    What bears no pressure is pale grey, so that the outline is seen.
+
+    Args:
+        axes: Axes to draw into.
+        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+    """
     x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
     lengths = float(np.ptp(x)), float(np.ptp(y))
-    scale, _ = map_unit(lengths)
-    map_axes(axes, lengths)
+    scale = map_axes(axes, lengths)
     axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
-    axes.margins(0.02)
+    inches = axes.get_position().width * axes.figure.get_figwidth()
+    size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
     look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
-    loaded, size = pressure > 0.0, max(1.0, 4e4 / len(x))
+    loaded = pressure > 0.0
     axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
     place = scale * x[loaded], scale * y[loaded]
     dots = axes.scatter(*place, size, pressure[loaded], cmap=PRESSURES, **look)
     dots.set_clim(0.0, float(pressure.max()) or 1.0)
     colour_bar(dots, axes, "contact pressure [MPa]")
-    mean = quantity(step.mean_pressure_MPa, "MPa", 3)
-    axes.set_title(f"{load_text(step)}, mean pressure {mean}")
-    return figure
 
 
 def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:

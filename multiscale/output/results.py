@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from geometry.collective import on_root, shared
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
-from multiscale.output.report import provenance, report_html
+from multiscale.output.provenance import provenance
+from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
@@ -30,7 +31,7 @@ from multiscale.storage import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_FIGURES = ("surface", "curves", "pressures", "contact", "laws", "block", "face")
+_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
@@ -60,7 +61,7 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
-        names = ["surface", "curves"] + ["pressures"] * (not run.setup.samples)
+        names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
         face = _face_pressures(run)
         names += ["face"] * (face is not None)
         names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
@@ -87,7 +88,9 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     files += write_pictures(folder, pictures)
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
-        files.append(write_text(folder / "report.html", report_html(run, pictures)))
+        files.append(
+            write_text(folder / "report.html", report_html(run, pictures, options=options))
+        )
     return files
 
 
@@ -187,6 +190,8 @@ def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
     from multiscale.output import figures
 
     setup = run.setup
+    if name == "overview":
+        return figures.overview_figure(setup, run.history(), face)
     if name == "surface":
         return figures.surface_figure_of(setup)
     if name == "curves":
