@@ -48,7 +48,8 @@ SCENE = {
 }
 
 # %% [markdown]
-# The block with its roughness, then the flat one with a law per patch, on a plain mesh.
+# The block with its roughness, then the flat one with a law per patch, on a plain mesh. The
+# stresses that are drawn are those of a half-space under the pressures of the rough one.
 
 # %%
 LAWS = {"kind": "consistent", "compliance": "finite-element"}

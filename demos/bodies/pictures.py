@@ -29,9 +29,9 @@ FACETS = {
 """Corners of the facets of tetrahedra and of hexahedra, in XDMF's order."""
 
 VIEWS = {  # elevation and azimuth [degrees], zoom, height of the figure over its width
-    "brake_pad": (42, -25, 1.3, 0.27),
-    "flange": (32, -60, 1.4, 0.42),
-    "seal_ring": (28, -35, 1.3, 0.42),
+    "brake_pad": (42, -25, 1.02, 0.28),
+    "flange": (32, -60, 1.15, 0.42),
+    "seal_ring": (28, -35, 1.07, 0.42),
 }
 """How the bodies are seen."""
 
@@ -79,7 +79,8 @@ def draw(name: str, folder: Path, out: Path) -> None:
     elevation, azimuth, zoom, height = VIEWS[name]
     figure = new_figure(FULL_WIDTH, height * FULL_WIDTH)
     figure.set_layout_engine("none")  # axes are placed by hand
-    body = figure.add_axes((0.0, 0.0, 0.52, 1.0), projection="3d")
+    square = 0.52 / height  # as high as wide
+    body = figure.add_axes((0.0, 0.5 - 0.5 * square, 0.52, square), projection="3d")
     plane = figure.add_axes((0.57, 0.17, 0.3, 0.76))
     open_ = load <= 0.0  # nothing is carried there: white
     spans = np.ptp(corners[face], axis=(0, 1))

@@ -88,7 +88,10 @@ def draw(picture, path):
     deformed = corners + MAGNIFIED * moved
     sunk = -1e3 * moved[..., 2].mean(axis=1)
     norm = Normalize(0.0, sunk.max())
-    colours = style.STRESSES(norm(sunk))
+    across = np.cross(deformed[:, 1] - deformed[:, 0], deformed[:, 2] - deformed[:, 0])
+    lit = np.abs(across @ (0.3, -0.75, 0.6)) / np.linalg.norm(across, axis=1)
+    colours = style.STRESSES(norm(sunk)) * np.append(np.ones(3), 0.0) * (0.55 + 0.45 * lit[:, None])
+    colours[:, 3] = 1.0
     space.add_collection3d(
         Poly3DCollection(deformed, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True)
     )
