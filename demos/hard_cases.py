@@ -93,7 +93,7 @@ right.set(xscale="log", xlim=(1e-16, 2.0), xlabel="error (points) and its bound 
 left.set(ylim=(len(rows) - 0.4, -0.6))  # from above
 for axes in (left, right):
     axes.grid(axis="y", visible=False)
-figure.savefig(choice.out / "hard_cases.png")
+figure.savefig(choice.out / "hard_cases.png", pil_kwargs={"optimize": True})
 assert not errors, errors
 assert {case.number for case, *_ in rows} == set(range(1, 21))
 assert max(newton) <= 20, rows
