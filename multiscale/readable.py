@@ -61,7 +61,7 @@ def number(value: float, digits: int = 4) -> str:
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    if value and not -6 <= int(power) < 7:
+    if value and not -6 <= int(power) < 10:
         return f"{float(mantissa):g}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
     text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text

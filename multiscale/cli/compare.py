@@ -19,6 +19,8 @@ from multiscale.comparison.configuration import RunResult
 from multiscale.comparison.launch import check_launchable
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
+from multiscale.readable import duration, percent
+from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
@@ -64,7 +66,7 @@ def _followed(
     with terminal.following(comm) as (begun, ended):
 
         def observe(result: RunResult, stored: bool) -> None:
-            spent = f"{result.seconds:8.2f} s" if result.phases else " " * 10
+            spent = f"{duration(result.seconds) if result.phases else '':>12}"
             status = result.status + ", from an earlier call" * stored
             why = f": {result.message}" if result.message else ""
             ended(f"{spent}  {result.name}: {status}{why}")
@@ -130,10 +132,13 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         title=f"patchlaw compare: {comparison.scene}",
         comparison=comparison,
         records=comparison.records(),
+        numbers={row.name: number for number, row in enumerate(comparison.rows, 1)},
         frontier_names=[row.name for row in comparison.frontier()],
         headline=headline(comparison),
         frontier_lines=list(frontier_lines(comparison)),
         pictures=pictures,
+        number=readable_number,
+        percent=percent,
         definitions=(errors.__doc__ or "").strip(),
         machine=f"{platform.platform()}, {os.cpu_count()} cores, threads: {threads}",
     )
@@ -155,7 +160,7 @@ def headline(comparison: Comparison) -> Iterator[str]:
         "of the contact area": own.area_max,
         "of the mean pressure in the distribution of pressures": own.distribution,
     }
-    known = ", ".join(f"{100 * bar:.3g} % {part}" for part, bar in bars.items() if bar > 0)
+    known = ", ".join(f"{percent(bar)} {part}" for part, bar in bars.items() if bar > 0)
     yield (
         f"They are compared with “{comparison.measure}”, whose own uncertainty is "
         f"{known or 'not known'}."
@@ -172,4 +177,4 @@ def frontier_lines(comparison: Comparison) -> Iterator[str]:
     for row in comparison.frontier():
         size = comparison.error(row)
         less = "no more than the uncertainty of the measure, " if size <= bar else ""
-        yield f"{row.seconds:.3g} s: error {less}{100 * size:.3g} %: {row.name}"
+        yield f"{duration(row.seconds)}: error {less}{percent(size)}: {row.name}"

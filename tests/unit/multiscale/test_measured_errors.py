@@ -194,7 +194,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     assert kept["memory_bytes"] > 1e6
     assert kept["decision"] is None
     page = (tmp_path / "report.html").read_text()
-    assert "<h2>What it took</h2>" in page
+    assert "<h2>Error of the force by cause" in page
     assert f"measured at load step {len(run.steps)}</h2>" in page
     assert " ± " in page
 

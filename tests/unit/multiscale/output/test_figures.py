@@ -52,7 +52,7 @@ def test_maps_of_contact_have_the_same_unit(side, unit, end):
         assert axes.get_xlabel() == f"x [{unit}]" and axes.get_xlim() == (0.0, pytest.approx(end))
         (image,) = axes.get_images()
         assert image.get_extent() == pytest.approx([0.0, end, 0.0, end])
-    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 0.25 µN, 0 spots"
+    assert figure._suptitle.get_text() == "load step 1: approach 1 µm, force 250 nN, 0 spots"
 
 
 def test_of_many_summits_the_highest_are_marked():
