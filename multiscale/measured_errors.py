@@ -30,7 +30,7 @@ from geometry.collective import on_root_alone
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import percent, quantity
+from multiscale.readable import Caution, percent, quantity
 from multiscale.setup.problem import ProblemSetup
 
 _FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
@@ -269,7 +269,7 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
     yield f"{text}{share}: {causes}"
     if accuracy is not None and whole > accuracy * step.force_N:
         largest = max(step.errors, key=lambda each: each[1])[0]
-        yield (
+        yield Caution(
             f"an accuracy of {percent(accuracy, 3)} was asked for, and the last load step keeps "
             f"{percent(whole / step.force_N)}, most of it by {largest}"
         )

@@ -10,6 +10,10 @@ Observer = Callable[[str, int, int], None]
 0 where they are not counted."""
 
 
+class Caution(str):
+    """A note that puts results into question: reports show it beside them."""
+
+
 class Detail(str):
     """A note for who looks into the solver: reports fold it away."""
 

@@ -21,8 +21,10 @@ from multiscale.figures.style import (
     MARKERS,
     new_figure,
     panels_above_legend,
+    show_unit,
     styled,
 )
+from multiscale.readable import usual_unit
 
 
 def selected_rows(comparison: Comparison, error: str | None = None, *, most: int = 7) -> list[Row]:
@@ -69,7 +71,9 @@ def curves_figure(comparison: Comparison) -> Figure:
     bar = 100.0 * getattr(comparison.uncertainty, f"{response}_max")
     if np.isfinite(bar):
         differences.axhspan(-bar, bar, **ERROR_BAND)
-    curves.set(xlabel="approach [µm]", ylabel="force [N]")
+    rows = [row.curves for row in selected_rows(comparison)]
+    show_unit(curves.xaxis, "approach", "mm", [row.approach.max() for row in rows], 1e-3)
+    show_unit(curves.yaxis, "force", "N", [row.force.max() for row in rows])
     differences.set(
         xlabel="approach [µm]" if by_approach else "force [N]",
         ylabel=f"{response} minus that of the measure [% of its largest]",
@@ -104,5 +108,6 @@ def maps_figure(comparison: Comparison) -> Figure:
         if index >= len(shown):
             axes.axis("off")
         elif index % 3 == 2 or index == len(shown) - 1:
-            colour_bar(image, axes, "mean pressure of the patch [MPa]")
+            unit, _ = usual_unit([top], "MPa")
+            colour_bar(image, axes, f"mean pressure of the patch [{unit}]")
     return figure

@@ -19,7 +19,7 @@ from multiscale.figures.style import (
     new_figure,
     styled,
 )
-from multiscale.readable import quantity
+from multiscale.readable import quantity, usual_unit
 
 _SHOWN = 0.99
 """Part of the pressures within the colour scale; few cells carry the largest ones."""
@@ -63,22 +63,23 @@ def draw_contact(axes: Any, record: Any) -> None:
     if record.pressure_MPa is None:
         _draw_spots(axes, record)
         return
-    pressure = np.asarray(record.pressure_MPa)
+    unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
     shown = np.ma.masked_less_equal(pressure, 0.0)
     top = float(np.quantile(shown.compressed(), _SHOWN)) if shown.count() else 1.0
     image = _draw_field(axes, record, shown, PRESSURES, Normalize(0.0, top), largest=True)
-    colour_bar(image, axes, "contact pressure [MPa]", extend="max")
-    axes.set_title(f"contact pressure, at most {quantity(float(pressure.max()), 'MPa', 3)}")
+    colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
+    peak = quantity(float(np.max(record.pressure_MPa)), "MPa", 3)
+    axes.set_title(f"contact pressure, at most {peak}")
 
 
 def _draw_gaps(axes: Any, record: Any) -> None:
     closed = np.asarray(record.pressure_MPa) > 0.0
-    gap = 1e3 * np.maximum(np.asarray(record.gap_mm), 0.0)
+    unit, gap = _in_unit(np.maximum(np.asarray(record.gap_mm), 0.0), "mm")
     shown = np.ma.masked_where(closed, gap)
     top = float(shown.max()) if not closed.all() else 1.0
     axes.set_facecolor(VERMILLION)
     image = _draw_field(axes, record, shown, GAPS, Normalize(0.0, top), largest=False)
-    colour_bar(image, axes, "gap [µm]")
+    colour_bar(image, axes, f"gap [{unit}]")
     axes.set_title("gap; contact in red")
 
 
@@ -116,10 +117,11 @@ def _draw_spots(axes: Any, record: Any) -> None:
         offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
         rasterized=many,
     )  # fmt: skip
-    spots.set_array(record.peak_pressure_MPa)
-    spots.set_clim(0.0, float(record.peak_pressure_MPa.max(initial=0.0)) or 1.0)
+    name, pressure = _in_unit(record.peak_pressure_MPa, "MPa")
+    spots.set_array(pressure)
+    spots.set_clim(0.0, float(pressure.max(initial=0.0)) or 1.0)
     axes.add_collection(spots)
-    colour_bar(spots, axes, "largest pressure of the spot [MPa]")
+    colour_bar(spots, axes, f"largest pressure of the spot [{name}]")
     axes.set_title("spots, as circles of their areas")
 
 
@@ -139,11 +141,17 @@ def _draw_sizes(axes: Any, record: Any) -> None:
 
 def _draw_shares(axes: Any, record: Any) -> None:
     """Draw which share of the contact bears more than a pressure."""
-    axes.set(xlabel="contact pressure [MPa]", ylabel="contact that bears more [%]")
+    unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
+    axes.set(xlabel=f"contact pressure [{unit}]", ylabel="contact that bears more [%]")
     axes.set_title("pressures in the contact")
-    pressure = np.asarray(record.pressure_MPa)
     loaded = np.sort(pressure[pressure > 0.0], axis=None)
     if loaded.size:
         share = np.linspace(0.0, 100.0, 401)
         axes.plot(np.percentile(loaded, 100.0 - share), share, color=BLUE)
         axes.set(xlim=(0.0, None), ylim=(0.0, 100.0))
+
+
+def _in_unit(values: Any, unit: str) -> tuple[str, Any]:
+    """Return the unit that suits the largest of values, and the values in it."""
+    name, size = usual_unit([float(np.max(values, initial=0.0))], unit)
+    return name, values / size

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from multiscale.figures.style import BLUE, NO_CONTACT, ORANGE, PRESSURES
+from multiscale.readable import number, usual_unit
 
 Array = NDArray[np.float64]
 
@@ -86,7 +87,7 @@ def draw_pressures(
     pressure: Array,
     *,
     top: float | None = None,
-    label: str = "mean pressure of the patch [MPa]",
+    label: str = "mean pressure of the patch",
 ) -> Any:
     """Draw one map of patch pressures; patches that carry nothing are white.
 
@@ -95,15 +96,16 @@ def draw_pressures(
         patches: The partition of the interface.
         pressure: Mean pressure of each patch, shape (N,) [MPa].
         top: End of the colour scale, for maps that share one [MPa].
-        label: Label of the colour bar; empty draws none.
+        label: Label of the colour bar, without the unit; empty draws none.
 
     Returns:
         The map, for a colour bar.
     """
     scale = map_axes(axes, patches.lengths)
-    shown = np.ma.masked_less_equal(pressure, 0.0).reshape(patches.grid)
     largest = float(pressure.max(initial=0.0)) if top is None else top
-    norm = Normalize(0.0, largest or 1.0)
+    unit, size = usual_unit([largest], "MPa")
+    pressure, norm = pressure / size, Normalize(0.0, largest / size or 1.0)
+    shown = np.ma.masked_less_equal(pressure, 0.0).reshape(patches.grid)
     axes.set_facecolor(NO_CONTACT)
     borders = scale * patches.borders_x, scale * patches.borders_y
     image = axes.pcolormesh(*borders, shown.T, cmap=PRESSURES, norm=norm)
@@ -114,7 +116,7 @@ def draw_pressures(
             colour = "white" if value > 0.6 * norm.vmax else "black"
             axes.text(x, y, _number(value), ha="center", va="center", color=colour, fontsize=7)
     if label:
-        colour_bar(image, axes, label)
+        colour_bar(image, axes, f"{label} [{unit}]")
     return image
 
 
@@ -122,7 +124,7 @@ def _number(value: float) -> str:
     """Return a pressure in few digits and without a power of ten; nothing for an open patch."""
     if value <= 0.0:
         return ""
-    return f"{value:.0f}" if value >= 99.5 else f"{float(f'{value:.2g}'):.6g}"
+    return f"{value:.0f}" if value >= 99.5 else number(value, 2)
 
 
 def place_colours(shares: Array) -> Array:

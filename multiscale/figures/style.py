@@ -16,6 +16,8 @@ from matplotlib import colormaps, cycler, rc_context, rcParams
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
+from multiscale.readable import number, usual_unit
+
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
 PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"
 """Colours of Okabe and Ito (2008), which people who confuse red and green tell apart, and greys."""
@@ -148,6 +150,22 @@ def save(figure: Figure, path: Path) -> Path:
     for kind, content in encoded(figure).items():
         path.with_suffix(f".{kind}").write_bytes(content)
     return path
+
+
+def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) -> None:
+    """Label an axis in the unit that suits its values, whatever unit they are drawn in.
+
+    Args:
+        axis: The x or y axis.
+        text: What it shows, without the unit.
+        unit: Unit of the values, mm, N or MPa.
+        values: The values.
+        drawn: Size of the unit that they are drawn in.
+    """
+    name, size = usual_unit(np.ravel(values).tolist(), unit)
+    axis.set_label_text(f"{text} [{name}]")
+    if size != drawn:
+        axis.set_major_formatter(lambda place, _: number(place * drawn / size))
 
 
 def add_legend(figure: Figure) -> None:

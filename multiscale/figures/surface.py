@@ -25,6 +25,7 @@ from multiscale.figures.style import (
     new_figure,
     styled,
 )
+from multiscale.readable import quantity, usual_unit
 
 Array = NDArray[np.float64]
 
@@ -74,10 +75,11 @@ def draw_surface(
         patches: The partition of the interface; None draws none.
     """
     scale = map_axes(axes, surface.lengths)
-    heights = coarsened(1e3 * (surface.heights - surface.mean_height), largest=False)
+    unit, centred = _centred(surface)
+    heights = coarsened(centred, largest=False)
     extent = (0.0, scale * surface.lengths[0], 0.0, scale * surface.lengths[1])
     image = axes.imshow(heights.T, origin="lower", extent=extent, cmap=HEIGHTS)
-    colour_bar(image, axes, "height over the mean plane [µm]")
+    colour_bar(image, axes, f"height over the mean plane [{unit}]")
     if patches is not None and 1 < patches.count <= MOST_PATCHES:
         draw_patch_borders(axes, patches, colour="white")
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
@@ -114,16 +116,18 @@ def draw_heights(axes: Any, surface: Surface) -> None:
         axes: Axes to draw into.
         surface: The heights.
     """
-    heights = 1e3 * (surface.heights - surface.mean_height).ravel()
-    rough = roughness(surface)
-    sq, bins = 1e3 * rough.sq, min(80, max(10, int(heights.size**0.4)))
+    unit, centred = _centred(surface)
+    heights, rough = centred.ravel(), roughness(surface)
+    sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
     axes.hist(heights, bins, density=True, color=BLUE, alpha=0.55, label="heights")
     if sq > 0.0:
         h = np.linspace(float(heights.min()), float(heights.max()), 200)
         normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)
         axes.plot(h, normal, "--", color=INK, lw=1.1, label="normal distribution")
-        axes.set_title(f"Sq {sq:.3g} µm, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}")
-    axes.set(xlabel="height over the mean plane [µm]", ylabel="share of the heights per µm")
+        axes.set_title(
+            f"Sq {quantity(rough.sq, 'mm', 3)}, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}"
+        )
+    axes.set(xlabel=f"height over the mean plane [{unit}]", ylabel=f"share of heights per {unit}")
     axes.legend(loc="upper left")
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
 
@@ -162,8 +166,17 @@ def draw_bearing_ratio(axes: Any, surface: Surface) -> None:
     Source: ISO 25178-2, areal material ratio.
     """
     share = np.linspace(0.0, 100.0, 401)
-    heights = 1e3 * (surface.heights - surface.mean_height)
+    unit, heights = _centred(surface)
     axes.plot(share, np.percentile(heights, 100.0 - share), color=BLUE)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
     axes.set(xlabel="bearing ratio: share of the surface above [%]", xlim=(0.0, 100.0))
-    axes.set(ylabel="height over the mean plane [µm]", title="bearing ratio (Abbott–Firestone)")
+    axes.set(
+        ylabel=f"height over the mean plane [{unit}]", title="bearing ratio (Abbott–Firestone)"
+    )
+
+
+def _centred(surface: Surface) -> tuple[str, Array]:
+    """Return the unit that suits the heights, and the heights over their mean in it."""
+    heights = surface.heights - surface.mean_height
+    name, size = usual_unit([float(np.abs(heights).max())], "mm")
+    return name, heights / size

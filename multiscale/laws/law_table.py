@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import PlanePath
-from multiscale.readable import Detail, number, percent, quantity
+from multiscale.readable import Caution, Detail, number, percent, quantity
 
 Array = NDArray[np.float64]
 
@@ -83,7 +83,7 @@ class LawTable:
         )
         reached = max(self.force_error, largest / PATCH_FACTOR)
         if reached > tolerance:
-            yield (
+            yield Caution(
                 f"the laws miss coupling.table_tolerance = {tolerance:g} with all the rows that "
                 f"are solved at most; what they reach is a tolerance of {number(reached, 2)}"
             )

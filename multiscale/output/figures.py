@@ -21,12 +21,13 @@ from multiscale.figures.style import (
     PALETTE,
     PRESSURES,
     new_figure,
+    show_unit,
     styled,
 )
 from multiscale.figures.surface import draw_surface, surface_figure
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import quantity
+from multiscale.readable import quantity, usual_unit
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
@@ -131,9 +132,10 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
     loaded = pressure > 0.0
     axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
     place = scale * x[loaded], scale * y[loaded]
-    dots = axes.scatter(*place, size, pressure[loaded], cmap=PRESSURES, **look)
-    dots.set_clim(0.0, float(pressure.max()) or 1.0)
-    colour_bar(dots, axes, "contact pressure [MPa]")
+    name, unit = usual_unit([float(pressure.max())], "MPa")
+    dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)
+    dots.set_clim(0.0, float(pressure.max()) / unit or 1.0)
+    colour_bar(dots, axes, f"contact pressure [{name}]")
 
 
 def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
@@ -173,8 +175,12 @@ def law_figure(table: LawTable) -> Figure:
         if few:
             dots = 1e3 * law.rows.closure, law.rows.pressure
             pressure.plot(*dots, ".", ms=3, color=colours[index])
-    pressure.set(xlabel="closure [µm]", ylabel="mean pressure [MPa]")
-    area.set(xlabel="closure [µm]", ylabel="contact area fraction [%]")
+    ends = [table.laws[index].range[1] for index in closing]
+    tops = [table.laws[index].rows.pressure[-1] for index in closing]
+    area.set(ylabel="contact area fraction [%]")
+    show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
+    for axes in (pressure, area):
+        show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
     if key:
         _draw_places(key[0], table, colours)
     elif len(closing) > 1:

@@ -12,7 +12,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.output.citation import citations
 from multiscale.output.provenance import library_versions
 from multiscale.planning import plan
-from multiscale.readable import Detail, measured, number, percent, quantity
+from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
 from multiscale.run import Run
 from multiscale.setup.problem import ProblemSetup
@@ -40,6 +40,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
     history, setup = run.history(), run.setup
     statements = dict(plan.statements(setup))
     folded = [(topic, text) for topic, text in statements.items() if topic not in _OF_INPUTS]
+    cautions = [note for note in history.notes if isinstance(note, Caution)]
     return filled(
         "output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
@@ -47,8 +48,8 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
         results=list(results(history.steps[-1], setup, run)) if len(history) else [],
         reference=history.reference.sentence if history.reference else "",
         finished=run.finished,
-        warnings=list(plan.warnings(setup)),
-        notes=[note for note in history.notes if not isinstance(note, Detail)],
+        warnings=[*cautions, *plan.warnings(setup)],
+        notes=[note for note in history.notes if not isinstance(note, Caution | Detail)],
         details=[note for note in history.notes if isinstance(note, Detail)],
         inputs=[
             *_inputs(setup),

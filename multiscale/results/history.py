@@ -13,7 +13,7 @@ from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import SCALED_UNITS, usual_unit, with_error
+from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -24,6 +24,8 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "stiffness_MPa_per_mm"
 """Column of the derivative dp/dc of a patch's law."""
+MOST_SHOWN = 1000
+"""Load steps in the table of a report or notebook; ``history.csv`` has all."""
 
 
 @dataclass(eq=False)
@@ -253,7 +255,7 @@ class History:
         """
         return data_frame(self.records())
 
-    def table(self, *names: str) -> Table:
+    def table(self, *names: str, most: int = MOST_SHOWN) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
         Units have the prefixes that suit the largest value of their column. A reference has one
@@ -262,22 +264,29 @@ class History:
         Args:
             *names: The tables, see `Column.table`, each with the number of the load step; by
                 default the curve and the solver's work.
+            most: Load steps that are shown; of more the middle is left out, and a row says so.
         """
         names = names or ("curve", "solver")
+        whole, half = len(self.steps) <= most, most // 2
+        shown = self.steps if whole else self.steps[:half] + self.steps[-half:]
         columns = [
             column
             for column in COLUMNS
             if column.heading and (column.table in names or column.name == "step")
         ]
-        known = [
-            column
+        texts = dict(
+            column.shown(shown)
             for column in columns
-            if column.table != "more" or any(column.of(step) for step in self.steps)
-        ]
-        texts = dict(column.shown(self.steps) for column in known)
+            if column.table != "more" or any(column.of(step) for step in shown)
+        )
         if self.reference is not None and "curve" in names:
-            heading, texts[heading] = self.reference.cells
-        return list(texts), list(zip(*texts.values(), strict=True))
+            heading, cells = self.reference.cells
+            texts[heading] = list(cells) if whole else [*cells[:half], *cells[-half:]]
+        rows = list(zip(*texts.values(), strict=True))
+        if not whole:
+            left = len(self.steps) - len(shown)
+            rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
+        return list(texts), rows
 
     def plot(self, label: str = "history") -> Any:
         """Draw mean pressure, contact area and mean separation.
@@ -339,7 +348,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
                 )
     if outside:
         first = min(outside)
-        yield (
+        yield Caution(
             f"load steps outside the micro model's range of validity: {len(outside)} of "
             f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
             "no such range"

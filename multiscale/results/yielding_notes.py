@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import number, percent, quantity
+from multiscale.readable import Caution, number, percent, quantity
 
 HARDNESS_OVER_YIELD = (2.8, 3.0)
 """Hardness over yield strength of metals: Tabor 1951, The Hardness of Metals, ch. 3."""
@@ -82,7 +82,7 @@ def energy_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     )
     missing = missing_energy(known)
     if missing > BALANCE:
-        yield (
+        yield Caution(
             f"warning: energies are not balanced: {percent(missing)} of the largest is missing "
             "between two load steps; finite slopes of steep surfaces may be the cause "
             "(micro.finite_slopes = false leaves them out)"
