@@ -16,9 +16,9 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from multiscale import Scene, run
+from multiscale.figures.style import BLUE, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -49,13 +49,21 @@ for cells, value in zip(MESHES, plain, strict=True):
     print("  {:3d} × {:2d} × {:2d} {:9.5f} {:+8.3%}".format(*cells, value, value / limit - 1.0))
 
 # %%
-figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+use_style()
+figure = new_figure(1.3 * ONE_COLUMN, 2.8)
 axes = figure.subplots()
+sizes = [1e3 / cells[0] for cells in MESHES]  # of elements on the face of 1 mm [µm]
 errors = [100.0 * (value / limit - 1.0) for value in plain]
-axes.loglog([np.prod(cells) for cells in MESHES], errors, "o-")
-axes.set(xlabel="cells of a plain mesh", ylabel="force at 8 µm beyond the decomposed block's [%]")
-axes.grid(alpha=0.3, which="both")
-figure.savefig(choice.out / "block_mesh.png", dpi=130)
+axes.loglog(sizes, errors, "o-", color=BLUE)
+for cells, size, error in zip(MESHES, sizes, errors, strict=True):
+    axes.text(1.08 * size, error, " × ".join(map(str, cells)), color=BLUE, va="top")
+axes.set_xticks(sizes, [f"{size:.3g}" for size in sizes])
+axes.minorticks_off()
+ticks = [0.5, 1.0, 2.0, 5.0]
+axes.set_yticks(ticks, [f"{tick:g}" for tick in ticks])
+axes.set(xlim=(0.85 * min(sizes), 1.8 * max(sizes)))
+axes.set(xlabel="edge of the elements on the face [µm]", ylabel="force in excess [%]")
+figure.savefig(choice.out / "block_mesh.png")
 
 # %% [markdown]
 # A plain mesh is too stiff below a loaded patch: it carries more force until it is fine.

@@ -19,10 +19,10 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 
-from micro import MODELS
 from multiscale import History, Scene, run
+from multiscale.figures import style
+from multiscale.figures.maps import colour_bar, map_axes
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -54,13 +54,13 @@ def go(*keys: str, patches: int = GRIDS[-1]) -> History:
 reference = go(*MESHES)
 shallow = go(*MESHES, "surface.spectrum.rms_slope=0.0215", "load.approach='0.8 um'")
 models = {"half-space": go("coupling.kind=analytic", HALF_SPACE)}
-for name in MODELS:
-    models[f"half-space, {name}"] = go("coupling.kind=analytic", f"micro.model={name}")
+models["asperities"] = go("coupling.kind=analytic", "micro.model=circular")
 models["concurrent"] = go("coupling.kind=concurrent", HALF_SPACE)
 flat = float(go("coupling.kind=concurrent", HALF_SPACE, SMALL).force_N[-1])
-for kind in ("consistent", "isolated"):
-    for n in GRIDS:
-        models[f"{kind}, {n} × {n}"] = go(f"coupling.kind={kind}", HALF_SPACE, patches=n)
+models["consistent"] = go("coupling.kind=consistent", HALF_SPACE)
+isolated = {n: f"{n**2} patches on their own" for n in GRIDS}
+for n, name in isolated.items():
+    models[name] = go("coupling.kind=isolated", HALF_SPACE, patches=n)
 
 # %% [markdown]
 # The difference of every model to the reference, and its parts, at the largest approach. What
@@ -75,56 +75,56 @@ print(f"reference at 8 µm: {truth:.4f} N {record.label}, {record.unknowns} unkn
 for name, force in final.items():
     print(f"  {name:36s} {force:8.4f} N  {force / truth - 1.0:+7.1%}")
 parts = {
-    "finest mesh": record.force_N[-1, -1] / truth - 1.0,
-    "finite slopes": limit / truth - 1.0,
-    "finite slopes, concurrent": flat / final["concurrent"] - 1.0,
-    "left: concurrent": final["concurrent"] / truth - 1.0,
-    "no finite block": final["half-space"] / final["concurrent"] - 1.0,
+    "half-space instead of the block": final["half-space"] / final["concurrent"] - 1.0,
+    "small slopes instead of finite ones": limit / truth - 1.0,
+    "small slopes, concurrent": flat / final["concurrent"] - 1.0,
+    "laws of the whole surface": final["consistent"] / final["concurrent"] - 1.0,
+    **{name: final[name] / flat - 1.0 for name in isolated.values()},  # of small slopes, too
+    "finest mesh of the reference": record.force_N[-1, -1] / truth - 1.0,
+    "what is left, concurrent": final["concurrent"] / truth - 1.0,
 }
-coupled = [name for name in models if "×" in name]
-for name in coupled:  # each beside the contact problem with slopes such as its own
-    parts[name] = final[name] / (flat if "isolated" in name else final["concurrent"]) - 1.0
 for name, part in parts.items():
     print(f"  part: {name:30s} {part:+8.2%}")
 
 # %%
-figure = Figure(figsize=(14.0, 8.6), layout="constrained")
-upper, lower = figure.subfigures(2, 1, height_ratios=(1.5, 1.0))
-curve, apart, split = upper.subplots(1, 3)
+style.use_style()
+figure = style.new_figure(style.FULL_WIDTH, 5.0)
+upper, lower = figure.subfigures(2, 1, height_ratios=(1.25, 1.0))
+apart, split = upper.subplots(1, 2)
 approach, value = 1e3 * reference.approach_mm, record.force.value
-bar, band = 100 * record.force.error / value, {"color": "0.75", "lw": 0}
-curve.fill_between(approach, value * (1 - bar / 100), value * (1 + bar / 100), **band)
-curve.plot(approach, value, "k", lw=2.5, label=f"reference, {record.label}")
-apart.fill_between(approach, -bar, bar, **band)
-COLOURS = {"half-space": "#0b3c5d", "half-space,": "#edae49", "concurrent": "#1b998b"}
-COLOURS |= {"consistent,": "#6a4c93", "isolated,": "#d1495b"}
-for (name, history), mark in zip(models.items(), "*sdv^osdvsdv", strict=False):
-    look = {"color": COLOURS[name.split()[0]], "marker": mark, "label": name}
-    look |= {"ls": ":", "mfc": "none", "ms": 10.0 if name == "concurrent" else 6.0}
-    curve.plot(approach, history.mean_pressure_MPa, **look)
-    apart.plot(approach, 100 * (history.force_N / value - 1.0), **look)
-curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", ylim=(0.0, None))
-curve.legend(frameon=False, fontsize=8)
-apart.set(xlabel="approach [µm]", ylabel="force against the reference, grey its error bar [%]")
-bars = split.barh(list(parts), [100 * part for part in parts.values()], color="#0b3c5d")
-split.bar_label(bars, fmt="%+.2f", padding=3, fontsize=9)
-split.set(xlabel="part of the difference at 8 µm [%]", xmargin=0.2)
-split.invert_yaxis()
-for axes in (curve, apart, split):
-    axes.grid(alpha=0.3)
-seen = ("half-space", "concurrent", coupled[len(GRIDS) - 1], coupled[-1])
-maps = {"reference": reference} | {name: models[name] for name in seen}
-BORDERS = reference.patches.borders_x, reference.patches.borders_y
-SHADES = PowerNorm(0.5, vmin=0.0, vmax=reference.patch_pressure_MPa[-1].max())
-panels = lower.subplots(1, len(maps), sharey=True)
-for axes, (name, history) in zip(panels, maps.items(), strict=True):
+bar = 100 * record.force.error / value
+apart.fill_between(approach, -bar, bar, **style.ERROR_BAND)
+apart.text(1.1, -9.0, "error bar of the reference", color="0.4")
+FIRST, *_, LAST = isolated.values()
+for name, mark, colour, text in (
+    ("half-space", "o-", style.COLOURS["analytic"], "half-space"),
+    ("asperities", "D-", style.ORANGE, "\nasperities"),
+    ("consistent", "o-", style.COLOURS["consistent"], "concurrent and consistent"),
+    ("concurrent", "^-", style.COLOURS["concurrent"], ""),
+    (FIRST, "s--", style.COLOURS["isolated"], FIRST),
+    (LAST, "s-", style.COLOURS["isolated"], LAST),
+):
+    error = 100 * (models[name].force_N / value - 1.0)
+    error[np.abs(error) < bar] = np.nan  # nobody knows what is true within the bar
+    apart.plot(approach, error, mark, color=colour)
+    beside = {"xytext": (6, 0), "textcoords": "offset points", "va": "center", "color": colour}
+    apart.annotate(text.replace(" on their own", ",\neach on its own"), (8.0, error[-1]), **beside)
+apart.set(xlabel="approach [µm]", ylabel="force off the reference [%]", ymargin=0.08)
+seen = {name: 100 * part for name, part in parts.items() if abs(100 * part) > bar[-1]}
+bars = split.barh(list(seen), list(seen.values()), color=style.BLUE)
+split.bar_label(bars, fmt="%+.1f", padding=3)
+split.set(xlabel="change of the force at 8 µm [%]", xmargin=0.2, ylim=(len(seen) - 0.4, -0.6))
+MAPS = {"roughness meshed": reference, "consistent laws": models["consistent"], LAST: models[LAST]}
+scale = PowerNorm(0.5, vmin=0.0, vmax=reference.patch_pressure_MPa[-1].max())
+for axes, (name, history) in zip(lower.subplots(1, len(MAPS)), MAPS.items(), strict=True):
     halves = (GRIDS[-1], history.patches.grid[0] // GRIDS[-1])
     pressure = history.patch_pressure_MPa[-1].reshape(halves * 2).mean(axis=(1, 3)).T
-    pressure[pressure == 0.0] = np.nan  # open patches stay white
-    image = axes.pcolormesh(*BORDERS, pressure, cmap="magma_r", norm=SHADES)
-    axes.set(title=name, xlabel="x [mm]", aspect="equal", xticks=(0.0, 0.5, 1.0))
-panels[0].set_ylabel("y [mm]")
-lower.colorbar(image, ax=panels, label="patch pressure at 8 µm [MPa]", extend="max", shrink=0.75)
-figure.savefig(choice.out / "embedded_vs_reference.png", dpi=110)
-assert abs(parts["left: concurrent"]) < (0.02 if choice.quick else 0.01)
-assert 0.01 < parts["finite slopes"] < 0.06
+    map_axes(axes, history.patches.lengths)
+    borders = reference.patches.borders_x, reference.patches.borders_y
+    shown = np.ma.masked_equal(pressure, 0.0)  # open patches stay white
+    image = axes.pcolormesh(*borders, shown, cmap=style.PRESSURES, norm=scale)
+    axes.set(title=name)
+colour_bar(image, axes, "mean pressure [MPa]", extend="max")
+figure.savefig(choice.out / "embedded_vs_reference.png")
+assert abs(parts["what is left, concurrent"]) < (0.02 if choice.quick else 0.01)
+assert 0.01 < parts["small slopes instead of finite ones"] < 0.06

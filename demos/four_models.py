@@ -17,7 +17,6 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from paper.models_figure import models_figure
 
 from geometry import (
     Material,
@@ -29,7 +28,8 @@ from geometry import (
     synthesise,
 )
 from micro import MODELS, AsperityModel
-from multiscale.figures.surface import surface_figure
+from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
+from multiscale.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -46,9 +46,6 @@ spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
 surface = synthesise(spectrum, grid=(256, 256), lengths=(1.0, 1.0))
 asperities = find_asperities(surface, periodic=False)
 whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-surface_figure(surface, asperities, PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))).savefig(
-    choice.out / "surface.png", dpi=130
-)
 
 # %% [markdown]
 # One response per model over the approach, from first touch to 16 µm.
@@ -62,9 +59,34 @@ responses = {
     )
     for name in MODELS
 }
-figure = models_figure(responses, rms_slope=roughness(surface).sdq)
-figure.savefig(choice.out / "four_models.png", dpi=130)
 
+
+# %%
+def at(axes):
+    """Return that places are shares of the axes."""
+    return {"transform": axes.transAxes}
+
+
+use_style()
+figure = new_figure(FULL_WIDTH, 2.9)
+motion, area = figure.subplots(1, 2)
+height, modulus = 1e3 * roughness(surface).sq, 1e3 / MODULUS
+for name, response in responses.items():
+    look = {"color": LOOKS[name]["color"], "ls": LOOKS[name]["ls"]}
+    if name.startswith("circular"):  # nearly the same: dots on the lines
+        look |= {"ls": "", "marker": "o", "ms": 3.5, "markevery": 5, "mfc": LOOKS[name].get("mfc")}
+    pressure = modulus * response.mean_pressure
+    motion.plot(1e3 * response.approach / height, pressure, **look)
+    area.plot(pressure, 100 * response.contact_area_fraction, **look)
+motion.set(xlabel="approach / rms height", ylabel="mean pressure / E* [10⁻³]")
+area.set(xlabel="mean pressure / E* [10⁻³]", ylabel="contact area [% of the face]")
+motion.text(
+    0.02, 0.93, "lines: elliptic contacts\ncircles: circular contacts", va="top", **at(motion)
+)
+motion.text(0.74, 0.66, "without\ninteraction", ha="right", **at(motion))
+motion.text(0.98, 0.3, "with interaction", ha="right", **at(motion))
+area.text(0.02, 0.93, "all four models", va="top", **at(area))
+figure.savefig(choice.out / "four_models.png")
 # %%
 print("mean pressure [MPa] and contact area [%] at an approach of 16 µm")
 for name, response in responses.items():

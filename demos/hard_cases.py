@@ -17,9 +17,9 @@ from pathlib import Path
 
 from hard import bench, blocks_and_loads, surfaces
 from hard.bench import CASES, Count
-from matplotlib.figure import Figure
 
 from geometry import NotConverged
+from multiscale.figures.style import BLUE, FULL_WIDTH, INK, SKY, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -75,24 +75,25 @@ print(f"{len(rows)} cases in {sum(row[-1] for row in rows):.0f} s")
 # gradients for the contacts. Right how far from its bound each case stays.
 
 # %%
-figure = Figure(figsize=(12.0, 0.23 * len(rows) + 1.2), layout="constrained")
-left, right = figure.subplots(1, 2, sharey=True)
+use_style()
+figure = new_figure(FULL_WIDTH, 0.16 * len(rows) + 0.9)
+left, right = figure.subplots(1, 2, sharey=True, width_ratios=(1.0, 1.2))
 names = [f"{case.number}  {case.hard}" for case, *_ in rows]
 place = range(len(rows))
 newton, gradients = (
     [getattr(work, name) / work.steps for _, _, work, _ in rows] for name in ("newton", "contact")
 )
-left.barh(place, newton, color="0.35", height=0.7, label="Newton")
-left.barh(place, gradients, color="C0", height=0.7, label="conjugate gradients")
+left.barh(place, newton, color=BLUE, height=0.7, label="Newton's method")
+left.barh(place, gradients, color=SKY, height=0.7, label="conjugate gradients")
 left.set(xlabel="iterations per load step", yticks=place, yticklabels=names)
-left.legend(frameon=False)
+left.legend(loc="lower right")
 right.barh(place, [case.bound for case, *_ in rows], left=1e-16, color="0.85", height=0.7)
-right.plot([max(error, 1e-16) for _, error, *_ in rows], place, "ko", markersize=4)
-right.set(xscale="log", xlim=(1e-16, 2.0), xlabel="off by (points), at most (bars)")
+right.plot([max(error, 1e-16) for _, error, *_ in rows], place, "o", color=INK)
+right.set(xscale="log", xlim=(1e-16, 2.0), xlabel="error (points) and its bound (bars)")
 left.set(ylim=(len(rows) - 0.4, -0.6))  # from above
 for axes in (left, right):
-    axes.grid(axis="x", alpha=0.3)
-figure.savefig(choice.out / "hard_cases.png", dpi=130)
+    axes.grid(axis="y", visible=False)
+figure.savefig(choice.out / "hard_cases.png", pil_kwargs={"optimize": True})
 assert not errors, errors
 assert {case.number for case, *_ in rows} == set(range(1, 21))
 assert max(newton) <= 20, rows

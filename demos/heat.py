@@ -20,19 +20,19 @@ from pathlib import Path
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from matplotlib.figure import Figure
 from mpi4py import MPI
 from petsc4py import PETSc
 
 import patchlaw as pl
 from macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from micro.conductance import conductance_per_area, pair_conductivity
+from multiscale.figures.maps import colour_bar, map_axes
+from multiscale.figures.style import BLUE, FULL_WIDTH, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/heat"))
 choice = parser.parse_args()
-choice.out.mkdir(parents=True, exist_ok=True)
 SIDES, CELLS = (40.0, 20.0, 10.0), [16, 8, 4] if choice.quick else [32, 16, 8]
 PATCHES, PAD, STEEL, MODULUS = pl.PatchGrid(grid=(8, 4), lengths=SIDES[:2]), 1.5, 50.0, 4167.0
 
@@ -60,11 +60,7 @@ rough = pl.Interface(
 problem = pl.ContactProblem(ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx, u, [held], rough)
 
 
-# %% [markdown]
-# Mean temperatures of patches by heat into patches of a body whose outer face is held.
-
-
-# %%
+# %%  Mean temperatures of patches by heat into patches of a body whose outer face is held.
 def resistances() -> np.ndarray:
     """Return mean temperature of patch i by unit heat into patch j of a body of 1 W/mm/K [K/W]."""
     body = mesh.create_box(MPI.COMM_WORLD, *BOX)
@@ -109,17 +105,21 @@ for force in forces:
 
 # %%
 force, total, series, columns, interface = np.array(rows).T
-figure = Figure(figsize=(8.0, 3.0), layout="constrained")
+use_style()
+figure = new_figure(FULL_WIDTH, 2.6)
 left, right = figure.subplots(1, 2)
-left.loglog(force, interface, "o-", label="interface")
-left.loglog(force, 1.0 / total, "s-", label="with both bodies")
+for values, color, text in ((1.0 / total, BLUE, "in all"), (interface, VERMILLION, "interface")):
+    left.loglog(force, values, "o-", color=color)
+    left.text(1.15 * force[1], values[1], text, color=color, va="bottom")
+left.yaxis.set_major_formatter("{x:g}")
 left.set(xlabel="force [N]", ylabel="thermal resistance [K/W]")
-left.legend()
+map_axes(right, SIDES[:2])
 shown = right.imshow(1e6 * h.reshape(PATCHES.grid).T, origin="lower", extent=(0, 40, 0, 20))
-right.set(title=f"W/m²/K at {forces[-1]:.0f} N", xlabel="x [mm]", ylabel="y [mm]")
-figure.colorbar(shown, ax=right)
+right.set(title=f"at {forces[-1]:.0f} N")
+colour_bar(shown, right, "conductance [W/m²/K]")
 if pad.comm.rank == 0:
-    figure.savefig(choice.out / "heat.png", dpi=130)
+    choice.out.mkdir(parents=True, exist_ok=True)
+    figure.savefig(choice.out / "heat.png")
 
 # %% [markdown]
 # Uniform heat passes as through resistances in series, exactly. Any other lies between columns

@@ -14,10 +14,11 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
+from multiscale.figures.style import MODELS as LOOKS
+from multiscale.figures.style import ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -59,22 +60,26 @@ for name, values in found.items():
         print(f"| {name} | {fraction:.1%} | {len(kept)} | {spread} |")
 
 # %%
-figure = Figure(figsize=(8.0, 4.4), layout="constrained")
-axes = figure.subplots()
-paper = {"color": "0.85", "label": "the paper above 5 %, without interaction"}
-axes.fill_between([5.0, 10.0], 2.0, 2.34, **paper)
-for number, (name, values) in enumerate(found.items()):
-    low, high = np.nanpercentile(values, (5, 95), axis=0)
-    mean = np.nanmean(values, axis=0)
-    place = 100 * FRACTIONS * 1.04 ** (number - 2)  # side by side
-    axes.errorbar(place, mean, (mean - low, high - mean), fmt="o-", ms=4, capsize=3, label=name)
-axes.set(xscale="log", xlabel="contact area fraction [%]", ylabel="κ (mean, 5 to 95 %)")
-axes.set_xticks(100 * FRACTIONS, [f"{100 * fraction:g}" for fraction in FRACTIONS])
+use_style()
+figure = new_figure(1.3 * ONE_COLUMN, 3.0)
+axes, place = figure.subplots(), 100 * FRACTIONS
+axes.fill_between([5.0, 10.0], 2.0, 2.34, color="0.85", zorder=0)
+axes.text(9.8, 2.37, "Waddad et al.", ha="right", color="0.4")
+low, high = np.nanpercentile(found["half-space"], (5, 95), axis=0)
+axes.fill_between(place, low, high, color=LOOKS["half-space"]["color"], alpha=0.15, lw=0.0)
+axes.text(0.52, 3.75, "nine surfaces out of ten", color=LOOKS["half-space"]["color"])
+for name in ("half-space", "elliptic", "elliptic-independent"):
+    axes.semilogx(place, np.nanmean(found[name], axis=0), **LOOKS[name])
+for name, y, text in (
+    ("half-space", 2.93, "half-space"),
+    ("elliptic", 1.75, "asperities, filled: with interaction"),
+):
+    axes.text(0.52, y, text, color=LOOKS[name]["color"])
+axes.set(xlabel="contact area [% of the face]", ylabel="κ = area · rms gradient · E* / pressure")
+axes.set_xticks(place, [f"{value:g}" for value in place])
 axes.minorticks_off()
-axes.grid(alpha=0.3)
-axes.legend(frameon=False, fontsize="small")
 choice.out.mkdir(parents=True, exist_ok=True)
-figure.savefig(choice.out / "kappa.png", dpi=110)
+figure.savefig(choice.out / "kappa.png")
 
 # %%
 at_two = np.nanmean(found["half-space"][:, 2])

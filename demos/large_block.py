@@ -19,9 +19,11 @@
 import argparse
 from pathlib import Path
 
-from matplotlib.figure import Figure
+import numpy as np
+from matplotlib import colormaps
 
 from multiscale import Scene, run
+from multiscale.figures.style import INK, ONE_COLUMN, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -63,21 +65,19 @@ for ratio in RATIOS:
     print(f"block {ratio:2d} × the interface: {histories[ratio].force_N[-1]:.5f} N, {error:+.2%}")
 
 # %%
-figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-curve, difference = figure.subplots(1, 2)
-approach = 1e3 * half_space.approach_mm
-curve.plot(approach, half_space.mean_pressure_MPa, "k-", lw=3, alpha=0.35, label="half-space")
-for ratio, history in histories.items():
-    relative = 100 * (history.force_N / half_space.force_N - 1)
-    curve.plot(approach, history.mean_pressure_MPa, ".-", lw=0.8, label=f"block {ratio} ×")
-    difference.plot(approach, relative, ".-", label=f"block {ratio} ×")
-curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-difference.set(xlabel="approach [µm]", ylabel="force against the half-space [%]")
-difference.axhline(0.0, color="black", lw=0.8)
-for axes in (curve, difference):
-    axes.grid(alpha=0.3)
-curve.legend(frameon=False)
-figure.savefig(choice.out / "large_block.png", dpi=130)
+use_style()
+figure = new_figure(1.3 * ONE_COLUMN, 2.8)
+axes, approach = figure.subplots(), 1e3 * half_space.approach_mm
+shades = colormaps["viridis"](np.linspace(0.85, 0.0, len(RATIOS)))
+beside = {"xytext": (6, 0), "textcoords": "offset points", "va": "center"}
+for (ratio, history), colour in zip(histories.items(), shades, strict=True):
+    change = 100 * (history.force_N / half_space.force_N - 1)
+    axes.plot(approach, change, "o-", color=colour)
+    text = {1: "a cube", 8: ""}.get(ratio, f"{ratio} times as large")
+    axes.annotate(text, (approach[-1], change[-1]), color=colour, **beside)
+axes.axhline(0.0, color=INK, lw=0.8)
+axes.set(xlabel="approach [µm]", ylabel="force against the half-space [%]")
+figure.savefig(choice.out / "large_block.png")
 
 # %% [markdown]
 # What remains is the block's size, about 1/ratio, and the mesh of the interface: linear elements

@@ -15,12 +15,13 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
+from matplotlib import colormaps
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, Material, PatchGrid, Spectrum, synthesise
 from macro import Block, LawContactProblem, LoadedFace, block_mesh
 from multiscale import representative_law
+from multiscale.figures.style import BLUE, FULL_WIDTH, INK, ORANGE, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -95,24 +96,31 @@ for force in FORCES:
     print(f"| {force:g} | {alpha:.3f} | {1 / ratio:.3f} | {ratio:.3f} | {steps} |")
 
 # %%
-figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+use_style()
+figure = new_figure(FULL_WIDTH, 3.0)
 left, right = figure.subplots(1, 2)
-for waves, law in laws.items():
+LABELS = (ORANGE, (0.4, 0.4), "left"), (BLUE, (0.98, 0.95), "right")
+for (waves, law), (colour, place, side) in zip(laws.items(), LABELS, strict=True):
     separation = 1e3 * (law.initial_separation - law.rows.closure)
-    (curve,) = left.plot(separation, law.rows.pressure, label=f"samples of {waves} longest waves")
+    left.plot(separation, law.rows.pressure, color=colour)
     band = [law.rows.pressure + sign * law.rows.pressure_scatter for sign in (-1.0, 1.0)]
-    left.fill_between(separation, *band, color=curve.get_color(), alpha=0.2)
-left.set(xlabel="mean separation [µm]", ylabel="pressure [MPa]", yscale="log", ylim=(0.1, LARGEST))
-along = np.linspace(-2.5, 2.5, 400)
-right.plot(along, np.maximum(1.0 - along**2, 0.0), "k--", lw=1.0, label="Hertz")
-for _, alpha, hertz, middle, line in found:
-    right.plot((strips.centres[:, 0] - 0.5 * FACE) / hertz, line / middle, label=f"α = {alpha:.2f}")
-right.set(xlabel="x over Hertz' radius", ylabel="force per length over Hertz'", xlim=(-2.5, 2.5))
-for axes in (left, right):
-    axes.legend(frameon=False, fontsize="small")
-    axes.grid(alpha=0.3)
+    left.fill_between(separation, *band, color=colour, alpha=0.2, lw=0.0)
+    text = f"samples of\n{waves} longest wave{'s' if waves > 1 else ''},\nand their scatter"
+    left.text(*place, text, color=colour, ha=side, va="top", transform=left.transAxes)
+left.set(xlabel="mean separation / rms height", ylabel="mean pressure [MPa]")
+left.set(yscale="log", ylim=(0.1, LARGEST))
+along = np.linspace(-3.2, 3.2, 400)
+right.plot(along, np.maximum(1.0 - along**2, 0.0), "--", color=INK, lw=1.0)
+right.text(0.35, 1.0, "Hertz", color=INK)
+shades = colormaps["viridis"](np.linspace(0.0, 0.85, len(found)))
+for (force, alpha, hertz, middle, line), colour in zip(found, shades, strict=True):
+    x, y = (strips.centres[:, 0] - 0.5 * FACE) / hertz, line / middle
+    right.plot(x, y, ".-", color=colour, label=f"{alpha:.2g}  ({1e-3 * force:g} kN)")
+right.set(xlabel="distance / Hertz' radius", ylabel="force per length / Hertz' largest")
+right.set(xlim=(-3.2, 3.2))
+right.legend(title="σR/a²", loc="upper left", handlelength=1.2)
 choice.out.mkdir(parents=True, exist_ok=True)
-figure.savefig(choice.out / "large_face.png", dpi=110)
+figure.savefig(choice.out / "large_face.png")
 
 # %%
 peaks = [line[CELLS // 2] / middle for _, _, _, middle, line in found]

@@ -10,17 +10,17 @@
 #                extrapolated (Richardson) with the rate observed over all results; its own
 #                error is what the finest grid changes in it; rows marked * are part of it
 #
-# Run time: four minutes. `--quick`: two seeds, coarser grids; `--out DIR`: the figure's folder.
+# Run time: four minutes. `--quick`: two seeds, coarser grids; `--out DIR`: folder of figure, table;
+# `--data demos/data/micro_accuracy.csv` draws that table, which a run has made, again.
 
 # %%
 import argparse
 import time
 from functools import lru_cache
-from itertools import product
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
+from paper.accuracy_figure import draw_accuracy
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
@@ -28,7 +28,9 @@ from micro import micro_model
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/micro_accuracy"))
+parser.add_argument("--data", type=Path)
 choice = parser.parse_args()
+choice.out.mkdir(parents=True, exist_ok=True)
 SETS = {"Set 1": {"waves": (2, 10)}, "Set 2": {"waves_x": (2, 7), "waves_y": (2, 12)}}
 SEEDS = range(1, 3) if choice.quick else range(1, 21)
 CELLS = (32, 64, 128) if choice.quick else (32, 64, 128, 256, 512, 1024)
@@ -47,8 +49,6 @@ MODELS = {
     **{f"half-space, {n}²": ("half-space", n, {}) for n in CELLS},
 }
 REFERENCE = list(MODELS)[-3:]
-COLOURS = dict(zip(MODELS, "C0 navy C2 C3 C4 C5 C6 C7 C8 C9 C1".split(), strict=False))
-DRAWN = (*list(MODELS)[0:3:2], "elliptic, repaired", "islands", "half-space, 64²")
 
 
 @lru_cache(maxsize=8)
@@ -63,19 +63,27 @@ def answer(spectrum, name, grid, options):
     model = micro_model(name, surface, contact_modulus=MODULUS, **options)
     response = model.respond(APPROACHES, patches=WHOLE, mean_heights=patch_means(surface, WHOLE))
     seconds = (time.process_time() - start) / len(APPROACHES)
-    return np.array([response.force, response.contact_area]), seconds
+    return [*response.force, *response.contact_area, seconds]
 
 
 # %%
-solved, times = {key: [] for key in MODELS}, {key: [] for key in MODELS}
-for band in SETS.values():
-    for seed in SEEDS:
-        spectrum = Spectrum(hurst=0.95, rms_slope=0.215, seed=seed, **band)
-        for key, model in MODELS.items():
-            result, seconds = answer(spectrum, *model)
-            solved[key].append(result)
-            times[key].append(seconds)
-coarse, middle, fine = (np.array(solved[key]) for key in REFERENCE)  # surface, quantity, approach
+def solutions():
+    """Return forces, areas at all approaches and seconds; a row for each model and surface."""
+    bands = [
+        Spectrum(hurst=0.95, rms_slope=0.215, seed=k, **x) for x in SETS.values() for k in SEEDS
+    ]
+    found = [[answer(band, *model) for model in MODELS.values()] for band in bands]
+    rows = np.swapaxes(found, 0, 1).reshape(-1, 9)  # surface by surface, for the cache
+    text = "4 forces [N], 4 areas [mm2], seconds per approach; rows: model, surface"
+    np.savetxt(choice.out / "micro_accuracy.csv", rows, "%.6g", ",", header=text)
+    return rows
+
+
+table = np.loadtxt(choice.data, delimiter=",") if choice.data else solutions()
+table = table.reshape(len(MODELS), -1, 9)
+times = dict(zip(MODELS, table[..., 8], strict=True))
+solved = dict(zip(MODELS, table[..., :8].reshape(*table.shape[:2], 2, 4), strict=True))
+coarse, middle, fine = (solved[key] for key in REFERENCE)  # surface, quantity, approach
 fractions = fine[:, 1]
 valid = (fractions > 1e-3) & (fractions < 0.08)
 
@@ -100,28 +108,16 @@ for key, (force, area) in size.items():
 print(f"| reference, rates {rate[0]:.2f} and {rate[1]:.2f} | {own[0]:.3%} | {own[1]:.3%} | |")
 
 # %%
-figure = Figure(figsize=(14.5, 4.4), layout="constrained")
-panels = figure.subplots(1, 3)
-for (index, what), key in product(enumerate(("force", "contact area")), DRAWN):
-    axes, area, error = panels[index], 100 * fractions.ravel(), 100 * errors[key][:, index].ravel()
-    far, look = np.abs(error) > 60, {"color": COLOURS.get(key, "black"), "ms": 4}
-    axes.semilogx(area[~far], error[~far], ".", label=key, **look)
-    axes.plot(area[far], 60 * np.sign(error[far]), "x", **look)
-    axes.set_title(f"reference: {own[index]:.2%} (rms), rate {rate[index]:.1f}", fontsize="medium")
-    axes.set(ylim=(-80, 65), xlabel="contact area fraction [%]", ylabel=f"error of the {what} [%]")
-panels[0].legend(frameon=False, fontsize="small", title="crosses: beyond 60 %", loc="lower left")
-for (key, colour), mark in zip(COLOURS.items(), "o^vs><DdpPh", strict=True):
-    panels[2].plot(cost[key], 100 * size[key][0], mark, c=colour, mfc="none", ms=8, label=key)
-grids = {shown[key]: (cost[key], 100 * size[key][0]) for key in MODELS if key not in COLOURS}
-panels[2].loglog(*zip(*grids.values(), strict=True), "k.-", lw=0.8, label="half-space")
-for key, at in grids.items():
-    panels[2].text(*at, key.replace("half-space, ", "") + " ", ha="right", va="top")
-panels[2].legend(frameon=False, fontsize="small", loc="upper left", bbox_to_anchor=(1.01, 1.0))
-panels[2].set(xlabel="time per approach [ms]", ylabel="rms error of the force [%]")
-for axes in panels:
-    axes.grid(alpha=0.3)
-choice.out.mkdir(parents=True, exist_ok=True)
-figure.savefig(choice.out / "micro_accuracy.png", dpi=110)
+plain = [f"{kind}, {ASPERITY_GRID}²" for kind in KINDS]
+repaired = ["elliptic, repaired", "circular, repaired", "islands"]
+grids = [f"half-space, {n}²" for n in CELLS if choice.quick or n < 256]  # others are of the truth
+draw_accuracy(
+    choice.out / "micro_accuracy.png",
+    fractions,
+    {key: errors[key][:, 0] for key in (plain[0], plain[2], "half-space, 64²")},
+    {key: (cost[key], 100 * size[key][0]) for key in (*plain, *repaired, *grids)},
+    100 * own[0],
+)
 
 # %% [markdown]
 # Without interaction models are far too stiff; with it too soft, until they are repaired.

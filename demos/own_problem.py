@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 import ufl
 from dolfinx import fem, mesh
-from matplotlib.figure import Figure
 from mpi4py import MPI
 
+from multiscale.figures.maps import colour_bar, map_axes
+from multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 from patchlaw import (
     ContactProblem,
     Control,
@@ -83,14 +84,17 @@ for name, strained in (("cold", 0.0), ("hot", 2e-3)):
 places = np.vstack(pad.comm.allgather(rough.points))
 found = {name: np.concatenate(pad.comm.allgather(part)) for name, part in found.items()}
 top = max(part.max() for part in found.values())
-figure = Figure(figsize=(8.0, 2.8), layout="constrained")
-for axes, (name, part) in zip(figure.subplots(1, 2, sharey=True), found.items(), strict=True):
-    drawn = axes.tricontourf(*places.T, part, levels=np.linspace(0.0, top, 13))
-    axes.set(title=name, xlabel="x on the face [mm]", aspect="equal")
-figure.axes[0].set_ylabel("y on the face [mm]")
-figure.colorbar(drawn, ax=figure.axes, label="pressure [MPa]", format="%.1f")
+use_style()
+figure = new_figure(FULL_WIDTH, 2.0)
+for axes, (name, part) in zip(figure.subplots(1, 2), found.items(), strict=True):
+    map_axes(axes, SIDES[:2])
+    levels = np.linspace(0.0, top, 13)
+    levels[0] = 1e-3 * top  # what carries nothing is white
+    drawn = axes.tricontourf(*places.T, part, levels=levels, cmap=PRESSURES)
+    axes.set(title=name)
+colour_bar(drawn, axes, "pressure [MPa]").ax.yaxis.set_major_formatter("{x:.1f}")
 if pad.comm.rank == 0:
-    figure.savefig(choice.out / "own_problem.png", dpi=130)
+    figure.savefig(choice.out / "own_problem.png")
 
 # %% [markdown]
 # The supports bear what the laws give. The real area hardly depends on how the force is spread.

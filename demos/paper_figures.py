@@ -13,12 +13,14 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from paper.page import Page
 
 from geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from micro import HertzContact
 from micro.closed_forms.hertz import factors_at, shape_factors
+from multiscale.figures.maps import colour_bar
+from multiscale.figures.style import BLUE, FULL_WIDTH, GREEN, HEIGHTS, new_figure, use_style
+from multiscale.figures.style import VERMILLION as RED
 from multiscale.figures.surface import draw_surface
 
 parser = argparse.ArgumentParser()
@@ -27,7 +29,7 @@ parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
 choice = parser.parse_args()
 page, grid = Page(choice.out), 2 * (64 if choice.quick else 256,)
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
-BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
+use_style()
 
 # %% [markdown]
 # Figure 3. The limits are Johnson's: 1 for spheres, and with K → Λ = ln(4a/b), E → 1 for slender
@@ -36,7 +38,7 @@ BLUE, RED, GREEN = "#0b3c5d", "#d1495b", "#1b998b"
 # %%
 ratio = np.geomspace(1.0, 100.0, 200)
 exact, paper = shape_factors(ratio, 1.0), factors_at(np.sqrt(1.0 - ratio ** (-4.0 / 3.0)))
-figure = Figure(figsize=(9.6, 4.0), layout="constrained")
+figure = new_figure(FULL_WIDTH, 2.9)
 over_ratio, over_e = figure.subplots(1, 2)
 for shape, name, style in ((exact, "exact", "-"), (paper, "paper's eq. 2", "--")):
     over_ratio.semilogx(ratio, shape.force, style, color=BLUE, label=f"F1, {name}")
@@ -49,8 +51,7 @@ over_e.set(xlabel="eccentricity e [-]", ylabel="F1, A1 [-]")
 (f, a), (f2, a2) = ((shape.force, shape.area) for shape in (exact, paper))
 ten = np.searchsorted(ratio, 10.0)
 for axes in (over_ratio, over_e):
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+    axes.legend()
 found = f"at R'/R'' = 10: F1 = {f[ten]:.3f}, A1 = {a[ten]:.3f}; the approximate eccentricity of "
 found += f"eq. 2 changes them by {f2[ten] / f[ten] - 1:+.2%} and {a2[ten] / a[ten] - 1:+.2%}."
 claim = "circles overestimate the area and underestimate the force where e is high."
@@ -72,22 +73,20 @@ ellipse, circle = (
 a, b = float(ellipse.semi_major), float(ellipse.semi_minor)
 r = np.linspace(0.0, 5.0 * a, 401)
 along, across = ellipse.displacement(r, 0), ellipse.displacement(0, r)
-figure = Figure(figsize=(10.4, 4.0), layout="constrained")
+figure = new_figure(FULL_WIDTH, 2.9)
 field, cut = figure.subplots(1, 2)
-figure.get_layout_engine().set(wspace=0.08)
 span = np.linspace(-3 * a, 3 * a, 201)
 levels = np.linspace(0.0, 1e3 * depth, 11)
 field_map = 1e3 * ellipse.displacement(span[None, :], span[:, None])
-image = field.contourf(1e3 * span, 1e3 * span, field_map, levels, cmap="cividis")
+image = field.contourf(1e3 * span, 1e3 * span, field_map, levels, cmap=HEIGHTS)
 field.contour(1e3 * span, 1e3 * span, np.hypot(span / a, span[:, None] / b), [1.0], colors="w")
 field.set(xlabel="x [µm]", ylabel="y [µm]", aspect="equal", title="white: border of the contact")
-figure.colorbar(image, ax=field, label="normal displacement [µm]")
+colour_bar(image, field, "normal displacement [µm]")
 curves = {"major axis": along, "minor axis": across, "circular": circle.displacement(r, 0)}
 for (name, u), look in zip(curves.items(), ("-", "--", ":"), strict=True):
     cut.plot(1e3 * r, 1e3 * u, look, color={"-": BLUE, "--": RED, ":": GREEN}[look], label=name)
 cut.set(xlabel="distance from the centre [µm]", ylabel="normal displacement [µm]")
-cut.grid(alpha=0.3)
-cut.legend(frameon=False)
+cut.legend()
 apart = (along - across) / across
 found = f"displacement on the major axis against that on the minor one: {apart[80]:+.0%} at r = a, "
 found += f"{apart[160]:+.1%} at 2a, {apart[-1]:+.2%} at 5a (R'/R'' = 4)."
@@ -109,15 +108,14 @@ density = power_spectrum(surface)
 band = (density.wavenumber > 5 * np.pi) & (density.wavenumber < 19 * np.pi)  # whole rings
 q, S = density.wavenumber[band], density.density[band]
 slope, start = np.polyfit(np.log(q), np.log(S), 1)
-figure = Figure(figsize=(10.6, 4.6), layout="constrained")
+figure = new_figure(FULL_WIDTH, 3.0)
 spectral, heights = figure.subplots(1, 2)
 spectral.loglog(q, S, "o", color=BLUE, label="this surface, by rings")
 spectral.loglog(q, np.exp(start) * q**slope, "--", color=RED, label=f"slope {slope:.2f}")
 spectral.set(xlabel="angular wavenumber [rad/mm]", ylabel="spectral density [mm⁴]")
 summits = find_asperities(surface, periodic=False)
 draw_surface(heights, surface, summits)
-spectral.grid(alpha=0.3)
-spectral.legend(frameon=False)
+spectral.legend()
 height = 1e3 * density.variance**0.5
 found = f"slope {slope:.2f}, rms height {height:.1f} µm, {len(summits)} summits."
 claim = "S ∝ |k|^(−2(H + 1)) = |k|^(−3.9) between 2 and 10 waves per side."

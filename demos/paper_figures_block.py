@@ -15,18 +15,19 @@ import time
 from pathlib import Path
 
 import numpy as np
-from matplotlib.colors import PowerNorm
-from matplotlib.figure import Figure
 from paper.page import Page
 
 from multiscale import Scene, run
+from multiscale.figures import style
 from multiscale.figures.curves import draw_error_band
+from multiscale.figures.maps import colour_bar, draw_pressures
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/paper_figures"))
 choice = parser.parse_args()
-page = Page(choice.out)
+page, INK = Page(choice.out), style.INK
+style.use_style()
 os.environ["PATCHLAW_CACHE"] = "off"  # times must not depend on earlier runs
 PAPER = Path(__file__).parent / "scenes" / "paper.toml"
 COMMON = ["output.check=none"]  # the errors are those against the reference
@@ -64,16 +65,16 @@ error = {name: history.force_N[-1] / truth - 1.0 for name, (history, _) in runs.
 # Figure 14: mean pressure over approach.
 
 # %%
-figure = Figure(figsize=(8.6, 5.2), layout="constrained")
+figure = style.new_figure(style.FULL_WIDTH, 4.2)
 curve = figure.subplots()
-curve.plot(1e3 * reference.approach_mm, record.force.value, "k", lw=1.5, label="reference")
-draw_error_band(curve, None, reference, colour="black")
-LOOKS = ("s:#edae49", "d:#b07d00", "*:#0b3c5d", "o:#d1495b", "v:#8c2f39", "^:#e98a96", "x:#1b998b")
-for (name, (history, _)), look in zip(runs.items(), LOOKS, strict=True):
-    style = {"marker": look[0], "color": look[2:], "ls": "--", "lw": 1.0, "label": name}
-    curve.plot(1e3 * history.approach_mm, history.mean_pressure_MPa, **style)
+curve.plot(1e3 * reference.approach_mm, record.force.value, color=INK, label="reference")
+draw_error_band(curve, None, reference, colour=INK)
+KINDS = ["analytic"] * 3 + ["isolated"] * 3 + ["consistent"]
+for (name, (history, _)), mark, kind in zip(runs.items(), "ds*ov^x", KINDS, strict=True):
+    look = {"marker": mark, "color": style.COLOURS[kind], "ls": "--", "lw": 0.8, "label": name}
+    curve.plot(1e3 * history.approach_mm, history.mean_pressure_MPa, **look)
 curve.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-curve.legend(frameon=False)
+curve.legend()
 found = f"against the reference's {truth:.3f} ± {bar:.3f} MPa at 8 µm: "
 found += ", ".join(f"{name} {part:+.1%}" for name, part in error.items()) + "."
 claim = "too high without interaction, matched with it; patch sizes differ by 0 to 3 %."
@@ -87,14 +88,13 @@ assert abs(error["consistent, 16 × 16"]) < 0.02  # half-space contacts with fin
 # %%
 maps = {"reference": reference} | {name: history for name, (history, _) in runs.items()}
 target = reference.patch_pressure_MPa[-1]
-figure = Figure(figsize=(13.0, 6.2), layout="constrained")
-panels, norm = figure.subplots(2, 4, sharex=True, sharey=True), PowerNorm(0.5, 0.0, target.max())
+figure = style.new_figure(style.FULL_WIDTH, 3.9)
+panels, TOP = figure.subplots(2, 4), 0.5 * target.max()
 for axes, (name, history) in zip(panels.flat, maps.items(), strict=True):
-    shown, place = history.patch_pressure_MPa[-1], history.patches
-    shown = np.where(shown > 0.0, shown, np.nan).reshape(place.grid).T  # open patches stay white
-    image = axes.pcolormesh(place.borders_x, place.borders_y, shown, cmap="magma_r", norm=norm)
-    axes.set(title=name, aspect="equal", xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
-figure.colorbar(image, ax=panels, label="patch pressure [MPa]", extend="max", shrink=0.8)
+    draw_pressures(axes, history.patches, history.patch_pressure_MPa[-1], top=TOP, label="")
+    axes.set(title=name, xlabel="", ylabel="", xticks=(0.0, 0.5, 1.0), yticks=(0.0, 0.5, 1.0))
+for axes in panels[:, -1]:
+    colour_bar(axes.collections[0], axes, "mean pressure [MPa]", extend="max")
 figure.supxlabel("x [mm]")
 figure.supylabel("y [mm]")
 fine = {name: x.patch_pressure_MPa[-1] for name, x in maps.items() if x.patches.count == 256}
@@ -116,8 +116,8 @@ PAPERS = {"reference, 6·10⁵ hexahedra": 10800.0, "embedded": 900.0, "semi-ana
 rows = [(f"paper: {name}", seconds, "") for name, seconds in PAPERS.items()]
 rows.append((f"reference, {record.unknowns[-1]} unknowns", spent, f"(± {bar / truth:.2%})"))
 rows += [(name, seconds, f"({error[name]:+.1%})") for name, (_, seconds) in runs.items()]
-figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-axes, colours = figure.subplots(), ["0.7"] * 3 + ["black"] + ["#0b3c5d"] * len(runs)
+figure = style.new_figure(style.FULL_WIDTH, 3.4)
+axes, colours = figure.subplots(), ["0.7"] * 3 + [INK] + [style.BLUE] * len(runs)
 bars = axes.barh([row[0] for row in rows], [row[1] for row in rows], color=colours)
 axes.bar_label(bars, [f"{s:.{0 if s > 5 else 2}f} s {part}" for _, s, part in rows], padding=4)
 axes.set(xscale="log", xlabel="time [s] (and error of the force)", xlim=(None, 2e5))

@@ -12,12 +12,13 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from paper.models_figure import models_figure
 from paper.page import Page
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
+from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
+from multiscale.figures.style import MODELS as LOOKS
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -92,11 +93,12 @@ for number, band in SETS.items():
 FRACTIONS = np.geomspace(0.004, 0.08, 40)
 CROWD = ("elliptic-independent", "circular-independent", "half-space")
 crowd = [respond(SETS[7], seed, CROWD, 34e-3) for seed in SEEDS]
-figure = Figure(figsize=(10.4, 4.4), layout="constrained")
+use_style()
+figure = new_figure(FULL_WIDTH, 3.0)
 curve, spread = figure.subplots(1, 2)
 spread.axhspan(2.0, 2.34, color="0.85", label="the paper's range above 5 %")
 mean = {}
-for name, colour, style in zip(CROWD, ("#0b3c5d", "#d1495b", "#1b998b"), "-:-", strict=True):
+for name in CROWD:
     kappa, pressure = np.array([at(FRACTIONS, x[name]) for x in crowd]).transpose(1, 2, 0)
     full = np.isfinite(kappa).all(axis=1)  # the same surfaces at every area
     area, kappa, pressure = 100 * FRACTIONS[full], kappa[full], pressure[full]
@@ -104,15 +106,16 @@ for name, colour, style in zip(CROWD, ("#0b3c5d", "#d1495b", "#1b998b"), "-:-", 
         np.interp(5.0, area, kappa.mean(axis=1)),
         np.interp(5.0, area, kappa.std(axis=1, ddof=1)),
     )
-    look = {"color": colour, "ls": style, "lw": 2.0, "label": name}
+    colour, style = LOOKS[name]["color"], LOOKS[name]["ls"]
+    look = {"color": colour, "ls": style, "label": name.replace("-independent", ", no interaction")}
     for axes, values in ((curve, pressure), (spread, kappa)):
         axes.plot(area, values.mean(axis=1), **look)
-        axes.fill_between(area, *np.percentile(values, (5, 95), axis=1), color=colour, alpha=0.15)
+        axes.fill_between(
+            area, *np.percentile(values, (5, 95), axis=1), color=colour, alpha=0.15, lw=0.0
+        )
 curve.set(xlabel="contact area fraction [%]", ylabel="mean pressure [MPa]")
-spread.set(xlabel="contact area fraction [%]", ylabel="κ [-]", title="mean, band 5 to 95 %")
-for axes in (curve, spread):
-    axes.grid(alpha=0.3)
-    axes.legend(frameon=False)
+spread.set(xlabel="contact area fraction [%]", ylabel="κ, mean and 5 to 95 %")
+spread.legend()
 found = f"κ at 5 % over {len(crowd)} surfaces (mean ± standard deviation): "
 found += ", ".join(f"{name} {k:.2f} ± {s:.2f}" for name, (k, s) in mean.items()) + "."
 claim = "κ tends to values between 2 and 2.34 above 5 % of contact area (20 surfaces)."

@@ -17,11 +17,11 @@ import argparse
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import HalfSpaceModel, influence_matrix
 from multiscale import CondensedCoupling, consistent_laws
+from multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -69,17 +69,18 @@ for (name, count), values in found.items():
     print(f"  {name:26s} {count:2d} × {count:<2d} patches {force:8.3%} {patch:8.2%}")
 
 # %%
-figure = Figure(figsize=(5.5, 4.0), layout="constrained")
-axes = figure.subplots()
-for mark, name in zip("so", MADE, strict=True):
+use_style()
+figure = new_figure(1.3 * ONE_COLUMN, 2.8)
+axes, counts = figure.subplots(), [count**2 for count in GRIDS]
+for mark, colour, name in zip("so", (VERMILLION, GREEN), MADE, strict=True):
     worst = [100.0 * np.abs(found[name, count][:, 0]).max() for count in GRIDS]
-    axes.loglog([count**2 for count in GRIDS], worst, mark + "-", label=name)
-axes.set_xticks([count**2 for count in GRIDS], [str(count**2) for count in GRIDS])
+    axes.loglog(counts, worst, mark + "-", color=colour)
+    axes.text(counts[0], 1.5 * worst[0], name, color=colour)
+axes.set_xticks(counts, [str(count) for count in counts])
 axes.minorticks_off()
-axes.set(xlabel="number of patches", ylabel="largest error of the force [%]")
-axes.grid(alpha=0.3)
-axes.legend(frameon=False)
-figure.savefig(choice.out / "tilt.png", dpi=130)
+axes.yaxis.set_major_formatter("{x:g}")
+axes.set(xlabel="number of patches", ylabel="largest error of the force [%]", ymargin=0.15)
+figure.savefig(choice.out / "tilt.png")
 
 # %% [markdown]
 # Under the tilt's own laws not even one patch for the whole surface does harm.

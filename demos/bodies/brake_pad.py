@@ -15,11 +15,10 @@ face [mm], `--out` the file. It writes physical names: volumes `lining` and `bac
 `pad face`, `piston` and `back`, the rest of the plate's rear.
 """
 
-import argparse
 from math import cos, pi, radians, sin
-from pathlib import Path
 
 import gmsh
+from meshing import in_plane, name, set_size, write_body
 
 PLATE, LINING = 5.0, 10.0
 TOP = PLATE + LINING
@@ -58,24 +57,8 @@ def cutters() -> list[tuple[int, int]]:
     return tools
 
 
-def surfaces(z: float) -> list[int]:
-    """Return the surfaces in the plane across z."""
-    box = (-200, -200, z - 1e-3, 200, 200, z + 1e-3)
-    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
-
-
-def name(dimension: int, tags: list[int], label: str) -> None:
-    """Make a physical group with a name."""
-    group = gmsh.model.addPhysicalGroup(dimension, tags)
-    gmsh.model.setPhysicalName(dimension, group, label)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=2.0)
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
-    choice = parser.parse_args()
-    gmsh.initialize(["", "-v", "2"])
+def build(size: float) -> None:
+    """Make the geometry, name its parts and set the length of edges [mm]."""
     occ = gmsh.model.occ
     plate = sector(INNER - 3.0, OUTER + 3.0, radians(64.0), 0.0, PLATE)
     lining = sector(INNER, OUTER, WIDTH, PLATE, LINING)
@@ -87,25 +70,16 @@ def main() -> None:
     _, pieces = occ.fragment([plate, lining], piston)
     occ.synchronize()
 
-    rear = surfaces(0.0)
+    rear = in_plane(0.0, 200.0)
     held = [tag for dimension, tag in pieces[2] if dimension == 2]
     name(3, [tag for _, tag in pieces[0]], "back plate")
     name(3, [tag for _, tag in pieces[1]], "lining")
-    name(2, surfaces(TOP), "pad face")
+    name(2, in_plane(TOP, 200.0), "pad face")
     name(2, held, "piston")
     name(2, [tag for tag in rear if tag not in held], "back")
 
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)  # edges around a full circle
-    field = gmsh.model.mesh.field.add("MathEval")  # coarser with the depth below the face
-    gmsh.model.mesh.field.setString(field, "F", f"{choice.size} * (1 + 0.1 * ({TOP} - z))")
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
-    gmsh.model.mesh.generate(3)
-    gmsh.write(str(choice.out))
-    nodes = len(gmsh.model.mesh.getNodes()[0])
-    print(f"{choice.out}: {nodes} nodes, {sum(map(len, gmsh.model.mesh.getElements(3)[1]))} cells")
-    gmsh.finalize()
+    set_size(f"{size} * (1 + 0.1 * ({TOP} - z))")  # coarser with the depth below the face
 
 
 if __name__ == "__main__":
-    main()
+    write_body(__file__, __doc__, 2.0, build)

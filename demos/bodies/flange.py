@@ -15,11 +15,10 @@ rim of the raised face [mm], where it will touch, `--out` the file. It writes ph
 volume `flange`, surfaces `raised face`, `washers` and `pipe end`.
 """
 
-import argparse
 from math import cos, pi, sin
-from pathlib import Path
 
 import gmsh
+from meshing import in_plane, name, set_size, write_body
 
 DISC, RAISED, NECK = 18.0, 2.0, 40.0
 TOP = DISC + RAISED
@@ -32,24 +31,8 @@ def cylinder(z: float, height: float, radius: float, x: float = 0.0, y: float = 
     return 3, gmsh.model.occ.addCylinder(x, y, z, 0, 0, height, radius)
 
 
-def surfaces(z: float, reach: float) -> list[int]:
-    """Return the surfaces in the plane across z within a distance of the axis."""
-    box = (-reach, -reach, z - 1e-3, reach, reach, z + 1e-3)
-    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
-
-
-def name(dimension: int, tags: list[int], label: str) -> None:
-    """Make a physical group with a name."""
-    group = gmsh.model.addPhysicalGroup(dimension, tags)
-    gmsh.model.setPhysicalName(dimension, group, label)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=2.0)
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
-    choice = parser.parse_args()
-    gmsh.initialize(["", "-v", "2"])
+def build(size: float) -> None:
+    """Make the geometry, name its parts and set the length of edges [mm]."""
     occ = gmsh.model.occ
     solid, _ = occ.fuse(
         [cylinder(0, DISC, OUTER)], [cylinder(DISC, RAISED, FACE), cylinder(-NECK, NECK, PIPE)]
@@ -67,22 +50,13 @@ def main() -> None:
     occ.synchronize()
 
     name(3, [tag for _, tag in pieces[0]], "flange")
-    name(2, surfaces(TOP, FACE + 1), "raised face")
+    name(2, in_plane(TOP, FACE + 1), "raised face")
     name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
-    name(2, surfaces(-NECK, PIPE + 1), "pipe end")
+    name(2, in_plane(-NECK, PIPE + 1), "pipe end")
 
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 24)  # edges around a full circle
-    field = gmsh.model.mesh.field.add("MathEval")  # coarser with the distance from the face's rim
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
-    gmsh.model.mesh.field.setString(field, "F", f"{choice.size} * (1 + 0.15 * {away})")
-    gmsh.model.mesh.field.setAsBackgroundMesh(field)
-    gmsh.model.mesh.generate(3)
-    gmsh.write(str(choice.out))
-    nodes = len(gmsh.model.mesh.getNodes()[0])
-    print(f"{choice.out}: {nodes} nodes, {sum(map(len, gmsh.model.mesh.getElements(3)[1]))} cells")
-    gmsh.finalize()
+    set_size(f"{size} * (1 + 0.15 * {away})")  # coarser with the distance from the face's rim
 
 
 if __name__ == "__main__":
-    main()
+    write_body(__file__, __doc__, 2.0, build)

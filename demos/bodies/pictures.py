@@ -12,12 +12,15 @@ is the folder of the runs, `--out` that of the pictures.
 
 import argparse
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
-from matplotlib.collections import PolyCollection
-from matplotlib.figure import Figure
+from matplotlib.collections import LineCollection, PolyCollection
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from multiscale.figures.maps import colour_bar
+from multiscale.figures.style import FULL_WIDTH, PRESSURES, new_figure, use_style
 
 FACETS = {
     4: [(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)],
@@ -25,8 +28,12 @@ FACETS = {
 }
 """Corners of the facets of tetrahedra and of hexahedra, in XDMF's order."""
 
-VIEWS = {"brake_pad": (42, -60, 1.45), "flange": (32, -60, 1.3), "seal_ring": (30, -25, 1.2)}
-"""Elevation and azimuth of the views [degrees], and their zoom."""
+VIEWS = {  # elevation and azimuth [degrees], zoom, height of the figure over its width
+    "brake_pad": (42, -25, 1.02, 0.28),
+    "flange": (32, -60, 1.15, 0.42),
+    "seal_ring": (28, -35, 1.07, 0.42),
+}
+"""How the bodies are seen."""
 
 GREY, LIGHT = np.array([0.78, 0.82, 0.88]), np.array([0.35, -0.35, 0.87])
 
@@ -69,24 +76,46 @@ def draw(name: str, folder: Path, out: Path) -> None:
         f"the mean on {size[load < 0.1 * mean].sum() / size.sum():.1%}"
     )
 
-    figure = Figure(figsize=(9.6, 4.0), layout="constrained")
-    body, plane = figure.add_subplot(1, 2, 1, projection="3d"), figure.add_subplot(1, 2, 2)
-    map_ = PolyCollection(corners[face][:, :, :2], array=load, cmap="viridis", edgecolors="face")
+    elevation, azimuth, zoom, height = VIEWS[name]
+    figure = new_figure(FULL_WIDTH, height * FULL_WIDTH)
+    figure.set_layout_engine("none")  # axes are placed by hand
+    square = 0.52 / height  # as high as wide
+    body = figure.add_axes((0.0, 0.5 - 0.5 * square, 0.52, square), projection="3d")
+    plane = figure.add_axes((0.57, 0.17, 0.3, 0.76))
+    open_ = load <= 0.0  # nothing is carried there: white
+    spans = np.ptp(corners[face], axis=(0, 1))
+    axis = [1, 0] if spans[1] > 2.0 * spans[0] else [0, 1]  # the longer side lies
+    seen = corners[face][:, :, axis]
+    map_ = PolyCollection(
+        seen, array=np.ma.masked_where(open_, load), cmap=PRESSURES,
+        edgecolors="face", lw=0.2, rasterized=True,
+    )  # fmt: skip
+    map_.set_clim(0.0, load.max())
     plane.add_collection(map_)
+    outline(plane, seen)
     plane.autoscale_view()
-    plane.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    figure.colorbar(map_, ax=plane, label="contact pressure [MPa]")
+    across, up = np.array(["x [mm]", "y [mm]"])[axis]
+    plane.set(xlabel=across, ylabel=up, aspect="equal")
+    plane.grid(False)
+    colour_bar(map_, plane, "contact pressure [MPa]")
     shade = 0.55 + 0.45 * np.abs(vectors @ LIGHT) / area
     colours = shade[:, None] * GREY
-    colours[face] = map_.to_rgba(load)[:, :3]
-    body.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours))
+    colours[face] = np.where(open_[:, None], 1.0, map_.to_rgba(load)[:, :3])
+    body.add_collection3d(Poly3DCollection(corners, facecolors=colours, edgecolors=colours, lw=0.2))
     lower, upper = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     body.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-    elevation, azimuth, zoom = VIEWS[name]
     body.set_box_aspect(upper - lower, zoom=zoom)
     body.view_init(elevation, azimuth)
     body.set_axis_off()
-    figure.savefig(out / f"{name}.png", dpi=90)
+    figure.savefig(out / f"{name}.png", pil_kwargs={"optimize": True})
+
+
+def outline(axes: Any, facets: np.ndarray) -> None:
+    """Draw the edges that belong to one facet alone."""
+    ends = np.stack([facets, np.roll(facets, -1, axis=1)], axis=2).reshape(-1, 2, 2)
+    middles = np.round(ends.mean(axis=1), 6)
+    _, first, count = np.unique(middles, axis=0, return_index=True, return_counts=True)
+    axes.add_collection(LineCollection(ends[first[count == 1]], colors="0.35", lw=0.6))
 
 
 def main() -> None:
@@ -94,6 +123,7 @@ def main() -> None:
     parser.add_argument("--results", type=Path, default=Path("results"))
     parser.add_argument("--out", type=Path, default=Path(__file__).parent)
     choice = parser.parse_args()
+    use_style()
     for name in VIEWS:
         if (choice.results / name / "fields.h5").exists():
             draw(name, choice.results / name, choice.out)

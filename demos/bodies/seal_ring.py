@@ -14,11 +14,10 @@ section, `--out` the file. It writes physical names: volume `ring`, surfaces `se
 `shoulder`, `seat`, `plane x` and `plane y`.
 """
 
-import argparse
 from math import ceil, pi
-from pathlib import Path
 
 import gmsh
+from meshing import in_box, name, write_body
 
 RADII = (20.0, 22.0, 24.5, 26.0)
 RING, NOSE = 8.0, 2.0
@@ -48,49 +47,25 @@ def section(size: float) -> list[tuple[int, int]]:
     return faces
 
 
-def surfaces(low: tuple[float, float, float], high: tuple[float, float, float]) -> list[int]:
-    """Return the surfaces within a box."""
-    box = [*(value - 1e-3 for value in low), *(value + 1e-3 for value in high)]
-    return [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, 2)]
-
-
 def between(z: float, inner: float, outer: float) -> list[int]:
     """Return the surfaces in a plane across z between two radii."""
-    inside = set(surfaces((0, 0, z), (inner, inner, z)))
-    return [tag for tag in surfaces((0, 0, z), (outer, outer, z)) if tag not in inside]
+    inside = set(in_box((0, 0, z), (inner, inner, z)))
+    return [tag for tag in in_box((0, 0, z), (outer, outer, z)) if tag not in inside]
 
 
-def name(dimension: int, tags: list[int], label: str) -> None:
-    """Make a physical group with a name."""
-    group = gmsh.model.addPhysicalGroup(dimension, tags)
-    gmsh.model.setPhysicalName(dimension, group, label)
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=0.25)
-    parser.add_argument("--out", type=Path, default=Path(__file__).with_suffix(".msh"))
-    choice = parser.parse_args()
-    gmsh.initialize(["", "-v", "2"])
-    layers = ceil(0.5 * pi * RADII[1] / (SLOWER * choice.size))
-    gmsh.model.occ.revolve(
-        section(choice.size), 0, 0, 0, 0, 0, 1, 0.5 * pi, [layers], recombine=True
-    )
+def build(size: float) -> None:
+    """Make the geometry, name its parts and set the length of edges [mm]."""
+    layers = ceil(0.5 * pi * RADII[1] / (SLOWER * size))
+    gmsh.model.occ.revolve(section(size), 0, 0, 0, 0, 0, 1, 0.5 * pi, [layers], recombine=True)
     gmsh.model.occ.synchronize()
 
     name(3, [tag for _, tag in gmsh.model.getEntities(3)], "ring")
     name(2, between(TOP, RADII[1], RADII[2]), "sealing face")
     name(2, between(RING, RADII[2], RADII[3]), "shoulder")
     name(2, between(0.0, RADII[0], RADII[1]), "seat")
-    name(2, surfaces((0, 0, 0), (0, RADII[3], TOP)), "plane x")
-    name(2, surfaces((0, 0, 0), (RADII[3], 0, TOP)), "plane y")
-
-    gmsh.model.mesh.generate(3)
-    gmsh.write(str(choice.out))
-    nodes = len(gmsh.model.mesh.getNodes()[0])
-    print(f"{choice.out}: {nodes} nodes, {sum(map(len, gmsh.model.mesh.getElements(3)[1]))} cells")
-    gmsh.finalize()
+    name(2, in_box((0, 0, 0), (0, RADII[3], TOP)), "plane x")
+    name(2, in_box((0, 0, 0), (RADII[3], 0, TOP)), "plane y")
 
 
 if __name__ == "__main__":
-    main()
+    write_body(__file__, __doc__, 0.25, build)

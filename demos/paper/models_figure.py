@@ -21,7 +21,11 @@ def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Fig
     figure = new_figure(FULL_WIDTH, 5.4)
     (motion, separation), (area, kappa) = figure.subplots(2, 2)
     for name, response in responses.items():
-        look = {"ls": MODELS[name]["ls"], "color": MODELS[name]["color"], "label": name}
+        look = {
+            "ls": MODELS[name]["ls"],
+            "color": MODELS[name]["color"],
+            "label": name.replace("-independent", ", no interaction"),
+        }
         pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
         motion.plot(1e3 * response.approach, pressure, **look)
         separation.plot(1e3 * response.mean_separation, pressure, **look)

@@ -28,7 +28,7 @@ class Page:
         """Save a figure as PNG, print the finding, and write the page anew."""
         known = json.loads(self.store.read_text("utf-8")) if self.store.exists() else {}
         picture = name.lower().replace(" ", "_") + ".png"
-        figure.savefig(self.folder / picture, dpi=110)
+        figure.savefig(self.folder / picture)
         print(f"{name}, {title}: {found}")
         known[name] = [picture, title, claim, found]
         self.store.write_text(json.dumps(known, ensure_ascii=False), "utf-8")

@@ -45,12 +45,7 @@ def block_figure(
     figure = new_figure(FULL_WIDTH, 4.65)
     figure.set_layout_engine("none")  # axes are placed by hand
     axes = figure.add_axes((0.01, 0.0, 0.83, 0.93))
-    axes.set_aspect("equal")
-    axes.axis("off")
-    view.draw_side(axes)
-    view.draw_cut(axes)
-    view.draw_top(axes)
-    view.draw_edges(axes)
+    view.draw(axes)
     for at, scale, colours, label in (
         (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
         (0.10, view.stresses, STRESSES, "von Mises stress [MPa]"),
@@ -112,6 +107,15 @@ class BlockView:
         across = -x * np.sin(_TURN) + y * np.cos(_TURN)
         along = x * np.cos(_TURN) + y * np.sin(_TURN)
         return along, z * np.cos(_ELEVATION) + across * np.sin(_ELEVATION)
+
+    def draw(self, axes: Any) -> None:
+        """Draw the cut block into empty axes, which lose their own."""
+        axes.set_aspect("equal")
+        axes.axis("off")
+        self.draw_side(axes)
+        self.draw_cut(axes)
+        self.draw_top(axes)
+        self.draw_edges(axes)
 
     def draw_top(self, axes: Any) -> None:
         """Draw the surface in grey, lit from the left, and the contacts in their pressures."""
@@ -187,7 +191,7 @@ class BlockView:
         for at, text, turn, ha in (
             ((0.5 * lx, front - 7 * tick, low), "x [µm]", -12, "center"),
             ((lx + 7 * tick, 0.5 * (front + ly), low), "y [µm]", 45, "center"),
-            ((-5.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
+            ((-7.5 * tick, front, 0.5 * low), "depth [µm]", 90, "center"),
         ):
             px, py = self.seen(*at)
             axes.text(px, py, text, fontsize=8, rotation=turn, ha=ha, va="center")

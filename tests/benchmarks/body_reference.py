@@ -18,12 +18,9 @@ import tempfile
 import time
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from dolfinx import mesh as dmesh
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from scipy.spatial import cKDTree
 
@@ -34,10 +31,12 @@ from l_shape import Reference, reach, scene, write_foot
 from geometry.face_frame import UPWARD
 from macro import compat, contact_facets, nodal_contact
 from multiscale import run
+from multiscale.figures import style
+from multiscale.figures.maps import colour_bar, map_axes
 from multiscale.planning.problem_setup import make_setup
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
-MAGNIFIED, ROUGH, RED = 30, 0.2, "#d1495b"  # the face lies above −0.2 mm
+MAGNIFIED, ROUGH = 30, 0.2  # the face lies above −0.2 mm
 SMALL = {"micro": {"model": "half-space", "finite_slopes": False}}
 
 
@@ -81,57 +80,60 @@ def shown(problem, state):
 
 def draw(picture, path):
     """Draw the deformed foot with its contact spots, the face from above, and the forces."""
-    figure = Figure(figsize=(15.0, 5.2), layout="constrained")
-    space = figure.add_subplot(1, 3, 1, projection="3d", computed_zorder=False)
+    style.use_style()
+    figure = style.new_figure(style.FULL_WIDTH, 2.75)
+    figure.set_layout_engine("none")  # axes are placed by hand
+    space = figure.add_axes((-0.03, -0.08, 0.38, 1.1), projection="3d", computed_zorder=False)
     corners, moved, spots = (picture[key] for key in ("corners", "moved", "spots"))
     deformed = corners + MAGNIFIED * moved
     sunk = -1e3 * moved[..., 2].mean(axis=1)
     norm = Normalize(0.0, sunk.max())
-    colours = matplotlib.colormaps["viridis"](norm(sunk))
-    space.add_collection3d(Poly3DCollection(deformed, facecolors=colours, rasterized=True))
+    across = np.cross(deformed[:, 1] - deformed[:, 0], deformed[:, 2] - deformed[:, 0])
+    lit = np.abs(across @ (0.3, -0.75, 0.6)) / np.linalg.norm(across, axis=1)
+    colours = style.STRESSES(norm(sunk)) * np.append(np.ones(3), 0.0) * (0.55 + 0.45 * lit[:, None])
+    colours[:, 3] = 1.0
+    space.add_collection3d(
+        Poly3DCollection(deformed, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True)
+    )
     on_top = np.abs(corners[..., 2]).max(axis=1) < ROUGH
     nearest = cKDTree(corners[on_top][..., :2].mean(axis=1)).query(spots)[1]
     x, y, z = deformed[on_top][nearest].mean(axis=1).T
-    space.scatter(x, y, z, s=5, c=RED, depthshade=False, zorder=3)
-    space.set(xlabel="x [mm]", ylabel="y [mm]", xlim=(0, 1.6), ylim=(-0.3, 1.3))
-    space.set(xticks=(0, 0.5, 1, 1.5), yticks=(0, 0.5, 1), zticks=(-1.5, -1, -0.5, 0))
-    space.set(zlim=(-1.8, 0.1), box_aspect=(1.6, 1.6, 1.9))
+    space.scatter(x, y, z, s=2, c=style.VERMILLION, depthshade=False, zorder=3)
+    space.set(xlim=(0, 1.6), ylim=(-0.3, 1.3), zlim=(-1.8, 0.1), box_aspect=(1.6, 1.6, 1.9))
+    space.set_box_aspect((1.6, 1.6, 1.9), zoom=1.08)
     space.view_init(elev=38.0, azim=-62.0)
-    space.set_title(f"displacements × {MAGNIFIED}; contact in red")
-    figure.colorbar(ScalarMappable(norm, "viridis"), ax=space, label="sunk by [µm]", shrink=0.6)
-    face = figure.add_subplot(1, 3, 2)
+    space.set_axis_off()
+    figure.text(0.02, 0.93, f"displacements × {MAGNIFIED}")
+    face = figure.add_axes((0.38, 0.17, 0.2, 0.72))
     image = face.tripcolor(
         *corners[on_top][..., :2].reshape(-1, 2).T,
         np.arange(3 * on_top.sum()).reshape(-1, 3),
         -1e3 * moved[on_top][..., 2].ravel(),
-        shading="gouraud",
-        rasterized=True,
-    )
-    face.scatter(*spots.T, s=4, c=RED, label="contact")
-    face.set(xlabel="x [mm], the arm goes on to the right", ylabel="y [mm]", aspect="equal")
-    face.legend(loc="upper left")
-    figure.colorbar(image, ax=face, label="the face sinks by [µm]", shrink=0.8)
-    _draw_curves(figure.add_subplot(1, 3, 3), dict(picture["curves"]))
-    figure.savefig(path, dpi=110)
+        shading="gouraud", cmap=style.STRESSES, norm=norm, rasterized=True,
+    )  # fmt: skip
+    face.scatter(*spots.T, s=2, c=style.VERMILLION)
+    map_axes(face, (1.0, 1.0))
+    face.set_title("face, contact in red")
+    colour_bar(image, face, "moves down by [µm]")
+    curves = figure.add_axes((0.72, 0.17, 0.27, 0.76))
+    _draw_curves(curves, dict(picture["curves"]))
+    figure.savefig(path, pil_kwargs={"optimize": True})
 
 
 def _draw_curves(axes, curves):
-    """Draw forces over the approach, and in a corner what they miss of the reference."""
+    """Draw forces over the approach: the reference with its bar as points, and models as lines."""
     approach, value, bar = curves.pop("reference")
-    axes.errorbar(1e3 * approach, value, bar, color="k", lw=2.5, capsize=4, label="reference")
-    apart = axes.inset_axes((0.1, 0.46, 0.36, 0.22))
-    band = [100 * side * bar / value.max() for side in (-1, 1)]
-    apart.fill_between(1e3 * approach, *band, color="0.7")
-    for (name, (at, force)), look in zip(curves.items(), ("--", "o", "x", ":"), strict=True):
-        (line,) = axes.plot(1e3 * at, force, look, ms=9, mfc="none", label=name)
-        if not name.startswith("a block"):
-            part = 100 * (force - value) / value.max()
-            apart.plot(1e3 * at, part, look, color=line.get_color(), ms=6, mfc="none")
-    apart.set_title("off the reference [%]", fontsize=9)
-    axes.set(xlabel="approach [µm]", ylabel="force [N]", ylim=(0.0, None))
-    axes.legend(frameon=False)
-    for each in (axes, apart):
-        each.grid(alpha=0.3)
+    looks = {
+        "a block as high": (style.SKY, "--", (0.1, 0.72)),
+        "concurrent": (style.BLUE, "-", (0.52, 0.1)),
+    }
+    for name, (colour, line, place) in looks.items():
+        at, force = curves[name]
+        axes.plot(1e3 * np.append(0.0, at), np.append(0.0, force), line, color=colour)
+        axes.text(*place, name, color=colour, transform=axes.transAxes)
+    axes.errorbar(1e3 * approach, value, bar, color=style.INK, fmt="o", capsize=3)
+    axes.text(0.02, 0.93, "points: roughness meshed", transform=axes.transAxes)
+    axes.set(xlabel="approach [µm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
 
 
 def compare(seed, edges, foot):
