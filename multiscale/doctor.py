@@ -20,6 +20,7 @@ from typing import Any
 import threadpoolctl
 
 from geometry.errors import InputError, PatchlawError
+from geometry.packages import optional_packages
 from multiscale.installation import removal, shadows, versions
 from multiscale.machine import control_group_memory, detached_processes
 
@@ -65,7 +66,8 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> dict[str, CheckResult]:
 
     def made(check: Check) -> CheckResult:
         try:
-            return check(comm)
+            with optional_packages():
+                return check(comm)
         except PatchlawError as failure:  # its text holds the remedy
             return CheckResult("fail", str(failure))
         except Exception as failure:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
+from geometry.packages import optional_packages
 from multiscale.results.history import COLUMNS, data_frame
 from multiscale.sweeps.cases import Case
 from multiscale.sweeps.journal import CaseResult
@@ -178,7 +179,8 @@ class SweepResults:
         Raises:
             InputError: When no case is finished, or they took different numbers of load steps.
         """
-        from multiscale.sweeps.figure import Ensemble, sweep_figure  # loads matplotlib
+        with optional_packages():
+            from multiscale.sweeps.figure import Ensemble, sweep_figure  # loads matplotlib
 
         names = ("approach_mm", "mean_pressure_MPa", "contact_area_fraction")
         return sweep_figure(
