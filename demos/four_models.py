@@ -29,7 +29,7 @@ from geometry import (
     synthesise,
 )
 from micro import MODELS, AsperityModel
-from multiscale.output.figures import surface_figure
+from multiscale.figures.surface import surface_figure
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -26,7 +26,8 @@ from mpi4py import MPI
 
 from micro import MODELS
 from multiscale import Scene, make_setup, run
-from multiscale.output.figures import draw_pressures, draw_surface
+from multiscale.figures.maps import draw_pressures
+from multiscale.figures.surface import draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -63,7 +64,7 @@ if COMM.rank == 0:
     setup = make_setup(Scene.load(PAPER))
     figure = Figure(figsize=(14.0, 4.4), layout="constrained")
     surface, curve, pressures = figure.subplots(1, 3)
-    draw_surface(figure, surface, setup.surface, setup.asperities, setup.patches)
+    draw_surface(surface, setup.surface, setup.asperities, setup.patches)
     for (name, history), style in zip(analytic.items(), ("-", "--", "-.", ":"), strict=True):
         approach = 1e3 * history.approach_mm
         curve.plot(approach, history.mean_pressure_MPa, style, label=f"half-space, {name}")
@@ -76,7 +77,7 @@ if COMM.rank == 0:
     curve.legend(frameon=False, fontsize="small")
     curve.grid(alpha=0.3)
     last = embedded[4].steps[-1]
-    draw_pressures(figure, pressures, embedded[4].patches, last.patches.pressure_MPa)
+    draw_pressures(pressures, embedded[4].patches, last.patches.pressure_MPa)
     pressures.set_title("block, 4 × 4 patches, at 8 µm")
     choice.out.mkdir(parents=True, exist_ok=True)
     figure.savefig(choice.out / "paper_block.png", dpi=110)

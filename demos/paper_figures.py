@@ -16,10 +16,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from paper.page import Page
 
-from geometry import Material, PatchGrid, Spectrum, find_asperities, power_spectrum, synthesise
+from geometry import Material, Spectrum, find_asperities, power_spectrum, synthesise
 from micro import HertzContact
 from micro.closed_forms.hertz import factors_at, shape_factors
-from multiscale.output.figures import draw_surface
+from multiscale.figures.surface import draw_surface
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -115,7 +115,7 @@ spectral.loglog(q, S, "o", color=BLUE, label="this surface, by rings")
 spectral.loglog(q, np.exp(start) * q**slope, "--", color=RED, label=f"slope {slope:.2f}")
 spectral.set(xlabel="angular wavenumber [rad/mm]", ylabel="spectral density [mm⁴]")
 summits = find_asperities(surface, periodic=False)
-draw_surface(figure, heights, surface, summits, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+draw_surface(heights, surface, summits)
 spectral.grid(alpha=0.3)
 spectral.legend(frameon=False)
 height = 1e3 * density.variance**0.5

@@ -2,7 +2,8 @@
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
 → LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
-A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block.
+A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block;
+TaggedMesh → write_mesh → a file that ranks read in parts.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
@@ -41,6 +42,7 @@ from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 from macro.mesh.supports import check_supports
 from macro.mesh.tagged import TaggedMesh
+from macro.mesh.to_file import write_mesh
 from macro.meshed_body import MeshedBody, Support, Traction
 
 __all__ = [
@@ -88,5 +90,6 @@ __all__ = [
     "stepped_mesh",
     "vector_space",
     "write_fields",
+    "write_mesh",
     "write_rough_fields",
 ]

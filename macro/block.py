@@ -5,7 +5,7 @@ Theory: section 11 of ``demos/theory.md``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, get_args
 
@@ -77,14 +77,27 @@ class Block(ElasticBody):
     @cached_property
     def stiffness(self) -> PETSc.Mat:
         """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom."""
-        return self.assembled("baij" if self.lattice else "aij")
+        return self.assembled("baij" if self.lattice or self.degree == 2 else "aij")
 
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the block alone; its preconditioner also serves the contact solves."""
         return block_solver(
-            self.stiffness, self.space, self.mesh.shape, self.lattice, self.material, self.free
+            self.stiffness,
+            self.space,
+            self.mesh.shape,
+            self.lattice,
+            self.material,
+            self.free,
+            lambda: self.linear,
         )
+
+    @cached_property
+    def linear(self) -> Block:
+        """The same block with linear displacements."""
+        shape = self.mesh.shape
+        linear = replace(shape, element=f"{shape.element[0]}1")
+        return Block(replace(self.mesh, shape=linear), self.material, self.sides)
 
     def reaction(self, displacement: PETSc.Vec) -> float:
         """Return the reaction force of the clamped bottom, from nodal residuals [N].

@@ -393,6 +393,12 @@ def write_misfit(vector: PETSc.Vec, conditions: Sequence[Any], values: PETSc.Vec
     fem_petsc.set_bc(vector, list(conditions), values, -1.0)
 
 
+def write_tags(file: Any, tags: Any, mesh: Any) -> None:
+    """Write tags of a mesh's facets or cells to an XDMF file that holds the mesh; collective."""
+    in_python = inspect.isfunction(io.XDMFFile.write_meshtags)  # later than 0.5
+    file.write_meshtags(tags, *([mesh.geometry] if in_python else []))
+
+
 def collect_garbage(comm: PETSc.Comm) -> None:
     """Free PETSc objects that Python has dropped on all ranks, and every rank's own objects.
 

@@ -23,6 +23,7 @@ from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
+from multiscale.readable import quantity
 from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.setup.problem import ProblemSetup
 
@@ -176,10 +177,10 @@ def conductance_notes(steps: Sequence[LoadStep], *, with_laws: bool) -> Iterator
     step, parts = known[-1], []
     if step.thermal_conductance_W_per_K is not None:
         gap = step.gap_conductance_W_per_K or 0.0
-        through = f", {gap:.4g} W/K of it through the gaps" if gap else ""
-        parts.append(f"thermal {step.thermal_conductance_W_per_K:.5g} W/K{through}")
+        through = f", {quantity(gap, 'W/K')} of it through the gaps" if gap else ""
+        parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
     if step.electrical_conductance_S is not None:
-        parts.append(f"electrical {step.electrical_conductance_S:.5g} S")
+        parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
     what = (
         "the sum over patches or regions side by side, without what the bodies add"
         if with_laws

@@ -11,6 +11,7 @@ from micro import MicroModel
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, HasContact, HasStiffness
+from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.setup.problem import ProblemSetup
 
@@ -101,9 +102,12 @@ class ContactRecorder:
         if not (self._setup.uses_laws and self.records):
             return []
         last = self.records[-1]
+        force = quantity(last.force_N, "N", 5)
         return [
-            f"contact of load step {last.step}: the contact problem behind the laws, solved under "
-            f"the plane of the step, with a force of {last.force_N:.5g} N"
+            Detail(
+                f"contact of load step {last.step}: the contact problem behind the laws, solved "
+                f"under the plane of the step, with a force of {force}"
+            )
         ]
 
     def _solved(self, step: LoadStep, model: MicroModel) -> LoadStep:

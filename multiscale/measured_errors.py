@@ -30,6 +30,7 @@ from geometry.collective import on_root_alone
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import Caution, percent, quantity
 from multiscale.setup.problem import ProblemSetup
 
 _FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
@@ -257,15 +258,18 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
         return
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
-    share = f" ({100 * whole / step.force_N:.2g} %)" if step.force_N else ""
-    causes = ", ".join(f"{cause} {error:.2g} N" for cause, error in step.errors)
-    text = f"measured at load step {step.step}: at its approach the force is within {whole:.2g} N"
+    share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
+    causes = ", ".join(f"{cause} {quantity(error, 'N', 2)}" for cause, error in step.errors)
+    size = quantity(whole, "N", 2)
+    text = f"measured at load step {step.step}: at its approach the force is within {size}"
     if step.approach_error_mm:
-        text += f", and under its force the approach within {1e3 * step.approach_error_mm:.2g} µm"
+        text += (
+            f", and under its force the approach within {quantity(step.approach_error_mm, 'mm', 2)}"
+        )
     yield f"{text}{share}: {causes}"
     if accuracy is not None and whole > accuracy * step.force_N:
         largest = max(step.errors, key=lambda each: each[1])[0]
-        yield (
-            f"an accuracy of {100 * accuracy:.3g} % was asked for, and the last load step keeps "
-            f"{100 * whole / step.force_N:.2g} %, most of it by {largest}"
+        yield Caution(
+            f"an accuracy of {percent(accuracy, 3)} was asked for, and the last load step keeps "
+            f"{percent(whole / step.force_N)}, most of it by {largest}"
         )

@@ -1,18 +1,43 @@
-"""Numbers as people say them: times in minutes and hours, quantities with a prefix."""
+"""Numbers as people say them: times in minutes and hours, quantities with engineering prefixes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable
 
 Observer = Callable[[str, int, int], None]
 """Told what a run is at: a phase, or parts of one, how many are done, and of how many at most; 0 of
 0 where they are not counted."""
 
-_PREFIXES = {
+
+class Caution(str):
+    """A note that puts results into question: reports show it beside them."""
+
+
+class Detail(str):
+    """A note for who looks into the solver: reports fold it away."""
+
+
+_PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("m", 1e3), ("mm", 1.0), ("µm", 1e-3), ("nm", 1e-6)),
-    "N": (("MN", 1e6), ("kN", 1e3), ("N", 1.0), ("mN", 1e-3), ("µN", 1e-6)),
-    "MPa": (("GPa", 1e3), ("MPa", 1.0), ("kPa", 1e-3), ("Pa", 1e-6)),
+    "N": (("MN", 1e6), ("kN", 1e3), ("N", 1.0), ("mN", 1e-3), ("µN", 1e-6), ("nN", 1e-9)),
+    "MPa": (("TPa", 1e6), ("GPa", 1e3), ("MPa", 1.0), ("kPa", 1e-3), ("Pa", 1e-6)),
+    "mm²": (("mm²", 1.0), ("µm²", 1e-6), ("nm²", 1e-12)),
+    "N/mm": (("GN/m", 1e6), ("MN/m", 1e3), ("kN/m", 1.0), ("N/m", 1e-3)),
+    "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
+    "W/K": (("kW/K", 1e3), ("W/K", 1.0), ("mW/K", 1e-3), ("µW/K", 1e-6)),
+    "S": (("MS", 1e6), ("kS", 1e3), ("S", 1.0), ("mS", 1e-3), ("µS", 1e-6)),
 }
+"""Units with their sizes in the unit of the key, the largest first."""
+
+SCALED_UNITS = frozenset(_PREFIXES)
+"""Units that take prefixes."""
+
+_USUAL = {"mm": "µm", "N/mm": "kN/m"}
+"""Units that columns and headlines keep as long as their numbers are of a handy size."""
+_HANDY = 0.1, 1e4
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def duration(seconds: float) -> str:
@@ -30,17 +55,92 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if minutes else f"{hours} h"
 
 
+def number(value: float, digits: int = 4) -> str:
+    """Return a number such as ``0.00012``, ``41000`` or, far from one, ``1.2·10⁻⁹``.
+
+    Args:
+        value: The number.
+        digits: Significant digits; zeros at the end are left out.
+    """
+    if not math.isfinite(value):
+        return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    if value and not -6 <= int(power) < 10:
+        return f"{float(mantissa):g}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
+    text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
 def quantity(value: float, unit: str, digits: int = 4) -> str:
     """Return a quantity in the prefix that suits its size, such as ``8 µm`` or ``4 GPa``.
 
     Args:
         value: The magnitude in ``unit``.
-        unit: mm, N or MPa.
+        unit: A key of the prefixes, such as mm, N or MPa.
         digits: Significant digits.
     """
+    name, size = _fitting(float(f"{abs(value):.{digits}g}"), unit)
+    return f"{number(value / size, digits)} {name}"
+
+
+def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
+    """Return the unit, and its size, in which numbers that belong together are shown.
+
+    It is the usual one, such as µm, N and MPa, as long as the largest number is of a handy size,
+    and that with the prefix that suits the largest number else.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: A key of the prefixes, such as mm, N or MPa.
+    """
+    name, size = next(one for one in _PREFIXES[unit] if one[0] == _USUAL.get(unit, unit))
+    largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
+    if not largest or _HANDY[0] <= largest / size < _HANDY[1]:
+        return name, size
+    return _fitting(largest, unit)
+
+
+def with_error(value: float, error: float | None = None, digits: int = 5) -> str:
+    """Return a number with its error, both rounded to the second digit of the error.
+
+    Args:
+        value: The number.
+        error: Its error; 0 or None for none.
+        digits: Significant digits of a number without an error.
+    """
+    if not error or not math.isfinite(error):
+        return number(value, digits)
+    places = max(1 - math.floor(math.log10(error)), 0)
+    return f"{value:.{places}f} ± {error:.{places}f}"
+
+
+def measured(value: float, error: float | None, unit: str, digits: int = 4) -> str:
+    """Return a quantity with its error in one unit, such as ``0.5899 ± 0.0007 µm``.
+
+    Args:
+        value: The magnitude in ``unit``.
+        error: Its error in ``unit``; 0 or None for none.
+        unit: A key of the prefixes, such as mm, N or MPa.
+        digits: Significant digits of a number without an error.
+    """
+    name, size = usual_unit([value], unit)
+    return f"{with_error(value / size, error and error / size, digits)} {name}"
+
+
+def percent(share: float, digits: int = 2) -> str:
+    """Return a share in per cent, such as ``0.012 %``.
+
+    Args:
+        share: The share, 1 for the whole.
+        digits: Significant digits.
+    """
+    return f"{number(100.0 * share, digits)} %"
+
+
+def _fitting(value: float, unit: str) -> tuple[str, float]:
+    """Return the largest unit that is not above a value, and its size; of none the smallest."""
     prefixes = _PREFIXES[unit]
-    rounded = float(f"{abs(value):.{digits}g}")
-    fitting = (one for one in prefixes if rounded >= one[1] * (1.0 - 1e-12))
-    name, size = next(fitting, prefixes[-1]) if value else (unit, 1.0)
-    shown = float(f"{value / size:.{digits}g}")
-    return f"{shown:.{max(digits, 15)}g} {name}"
+    plain = next((one for one in prefixes if one[1] == 1.0), prefixes[-1])
+    if not value:
+        return plain
+    return next((one for one in prefixes if abs(value) >= one[1] * (1.0 - 1e-12)), prefixes[-1])

@@ -226,10 +226,8 @@ class LoadedFace:
     def pointwise(self) -> Sampling:
         """Laws at quadrature points."""
         points = self.quadrature
-        operator = PETSc.Mat()
-        self.points_by_dofs.transpose(operator)
         return Sampling(
-            operator=operator,
+            operator=PETSc.Mat().createTranspose(self.points_by_dofs),
             weight=points.weight,
             x=points.x,
             y=points.y,

@@ -83,7 +83,7 @@ class NewtonSolver:
 
     Args:
         problem: The equations.
-        face: The contact face.
+        face: The contact face that laws stand on at points; None for laws of patches.
         solver: Linear solver of the body alone, whose preconditioner is set up.
 
     Attributes:
@@ -109,6 +109,9 @@ class NewtonSolver:
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
         self._preconditioner = ContactPreconditioner(problem, face, solver)
+        self._remedy = "take more load steps (load.steps)"
+        if face is None:
+            self._remedy += " or, on a very soft body, coupling.newton = 'condensed'"
         self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
@@ -129,7 +132,7 @@ class NewtonSolver:
                 f"the block at {control}",
                 reason=reason,
                 iterations=int(self.snes.its),
-                remedy="take more load steps (load.steps)",
+                remedy=self._remedy,
             )
         return NewtonReport(
             iterations=int(self.snes.its),
@@ -179,8 +182,8 @@ class DisplacementBasis:
         size: Largest number of vectors; the oldest are dropped first.
 
     Attributes:
-        vectors: W, this rank's degrees of freedom of the vectors, shape (k, n) [mm].
-        forces: K W, their forces, shape (k, n) [N].
+        vectors: W, this rank's degrees of freedom of the k vectors, shape (n,) each [mm]. They are
+            all that is kept; three products with K for every solution replace their forces.
 
     Note:
         Collective.
@@ -189,8 +192,7 @@ class DisplacementBasis:
     def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
         self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
         self._comm = equilibrium.body.comm
-        self.vectors: Array = np.empty((0, equilibrium.body.owned_dofs))
-        self.forces: Array = np.empty_like(self.vectors)
+        self.vectors: list[Array] = []
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
 
     def __len__(self) -> int:
@@ -198,24 +200,24 @@ class DisplacementBasis:
 
     def add(self, displacement: PETSc.Vec) -> None:
         """Add the part of a displacement that is new to the basis; collective."""
-        work = displacement.duplicate()
-        self._equilibrium.body.stiffness.mult(displacement, work)
-        vector, force = displacement.array_r.copy(), work.array_r.copy()
-        before = self._sum(vector @ force)
+        stiffness = self._equilibrium.body.stiffness
+        work, force = displacement.copy(), displacement.duplicate()
+        vector, before = work.array, 0.0
         for _ in range(2):  # a second pass removes what rounding left
-            shares = self._sum(self.vectors @ force)
-            vector -= shares @ self.vectors
-            force -= shares @ self.forces
-        square = self._sum(vector @ force)
+            stiffness.mult(work, force)
+            before = before or self._sum(vector @ force.array_r)
+            shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
+            for share, each in zip(shares, self.vectors, strict=True):
+                vector -= share * each
+        stiffness.mult(work, force)
+        square = self._sum(vector @ force.array_r)
         if not square > _ROUNDING**2 * before:
             return
-        vector, force = vector / square**0.5, force / square**0.5
-        work.array[:] = vector
+        vector /= square**0.5
         sampled = self._sampling.operator.createVecRight()
         self._sampling.operator.multTranspose(work, sampled)
         first = max(0, len(self) + 1 - self._size)
-        self.vectors = np.vstack([self.vectors, vector])[first:]
-        self.forces = np.vstack([self.forces, force])[first:]
+        self.vectors = [*self.vectors, vector.copy()][first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
 
     def write_guess(self, into: PETSc.Vec) -> None:
@@ -238,7 +240,9 @@ class DisplacementBasis:
             else:
                 break
             y, value, slope = trial, trial_value, trial_slope
-        into.array[:] = y @ self.vectors
+        into.set(0.0)
+        for share, vector in zip(y, self.vectors, strict=True):
+            into.array[:] += share * vector
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""

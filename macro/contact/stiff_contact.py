@@ -2,8 +2,9 @@
 
 The preconditioner of the body alone serves every tangent as long as the laws are softer than the
 elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of: iterations
-grow to ten times as many and more. Laws at points couple no other nodes
-than the elements do, so that their stiffness fits into the matrix, and multigrid is set up with it.
+grow to ten times as many and more. Laws at points couple no other nodes than the elements do, so
+that their stiffness fits into the matrix, and multigrid is set up with it. On quadratic elements
+that takes no second matrix: only the coarser grid has the sum's entries.
 
 Theory: section 11 of ``demos/theory.md``.
 """
@@ -20,6 +21,7 @@ from petsc4py import PETSc
 from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.loaded_face import LoadedFace
+from macro.linear_solvers.stiffened import Stiffened
 from macro.meshed_body import MeshedBody
 
 Array = NDArray[np.float64]
@@ -52,6 +54,7 @@ class ContactPreconditioner:
         if isinstance(face, LoadedFace) and isinstance(body, MeshedBody):
             self._body = body
         self._with_laws: PETSc.KSP | None = None
+        self._stiffened: Stiffened | None = None
         self._slope: Array | None = None
 
     def update(self) -> None:
@@ -65,24 +68,29 @@ class ContactPreconditioner:
             change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
             if change <= _MOVED * largest:
                 return
-        springs = self._springs(slope)
-        ratio = springs.getDiagonal()
-        ratio.pointwiseDivide(ratio, body.stiffness.getDiagonal())
         self._slope = slope.copy()
         if self._with_laws is not None:
             self._with_laws.destroy()
-            self._with_laws = None
-        if ratio.max()[1] > _STIFF:
-            matrix = body.stiffness.copy()
-            matrix.axpy(1.0, springs, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-            matrix.setNearNullSpace(body.stiffness.getNearNullSpace())
-            self._with_laws = body.solver_of(matrix)
-        springs.destroy()
+            self._with_laws = self._stiffened = None
+        if self._largest(slope) > _STIFF:
+            self._stiffened = Stiffened(body.stiffness, self._springs(slope))
+            self._with_laws = body.solver_of(self._stiffened)
         compat.collect_garbage(body.stiffness.comm)
 
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x; PETSc calls this."""
         (self._with_laws or self._alone).pc.apply(x, y)
+
+    def _largest(self, slope: Array) -> float:
+        """Return the largest ratio of the laws' to the body's stiffness at an unknown."""
+        own = self._equilibrium.body.stiffness.getDiagonal()
+        starts, columns, entries = self._face.points_by_dofs.getValuesCSR()
+        springs = own.duplicate()
+        springs.set(0.0)
+        springs.setValues(columns, np.repeat(slope, np.diff(starts)) * entries**2, addv=True)
+        springs.assemble()
+        springs.pointwiseDivide(springs, own)
+        return float(springs.max()[1])
 
     def _springs(self, slope: Array) -> PETSc.Mat:
         """Return the stiffness B diag(p'/w) Bᵀ of the laws."""

@@ -115,6 +115,8 @@ def linear_solver(
     coarser: Sequence[CoarserGrid] | None = None,
     preconditioner: Mapping[str, object] | None = None,
     *,
+    finest: tuple[PETSc.Mat, PETSc.Mat] | None = None,
+    whole: PETSc.Mat | None = None,
     prefix: str = PREFIX,
 ) -> PETSc.KSP:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
@@ -124,6 +126,10 @@ def linear_solver(
         coarser: Coarser grids of a geometric multigrid, finest first; None for another
             preconditioner.
         preconditioner: Options of the preconditioner, which override the defaults here.
+        finest: What the finest grid of a geometric multigrid smooths in place of the matrix, and
+            the matrix with its diagonal blocks.
+        whole: The matrix that another preconditioner is made of, which is destroyed; None: the
+            matrix.
         prefix: Prefix of its PETSc options.
 
     Note:
@@ -131,18 +137,25 @@ def linear_solver(
     """
     solver = PETSc.KSP().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
-    solver.setOperators(matrix, _pointwise(matrix) if coarser is None else matrix)
+    made_of = _pointwise(whole or matrix) if coarser is None else matrix
+    solver.setOperators(matrix, made_of)
     if coarser is not None:
         solver.pc.setType("mg")
         solver.pc.setMGLevels(len(coarser) + 1)
         for level, grid in enumerate(reversed(coarser)):
             solver.pc.setMGInterpolation(level + 1, grid.interpolation)
             solver.pc.getMGSmoother(level).setOperators(grid.matrix)
+        if finest is not None:
+            solver.pc.getMGSmoother(len(coarser)).setOperators(*finest)
     one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
     usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
         set_up(solver)  # multigrid reads the options of its levels here
+    if made_of is not matrix:
+        solver.pc.setReusePreconditioner(True)
+        solver.setOperators(matrix)
+        made_of.destroy()  # preconditioners that need it still hold it
     return solver
 
 

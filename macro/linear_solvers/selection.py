@@ -19,7 +19,7 @@ Theory: section 11 of ``demos/theory.md``.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from petsc4py import PETSc
@@ -29,8 +29,9 @@ from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
 from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.multigrid import Lattice, coarser_grids
-from macro.linear_solvers.multigrid_degrees import quadratic_options, vertex_grid
+from macro.linear_solvers.multigrid_degrees import Linear, quadratic_options, vertex_grid
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
+from macro.linear_solvers.stiffened import Stiffened
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -65,6 +66,7 @@ def block_solver(
     lattice: Lattice | None,
     material: Material,
     free: PETSc.Vec,
+    linear: Callable[[], Linear],
 ) -> PETSc.KSP:
     """Return a solver for a block's stiffness; PETSc's options of the user win.
 
@@ -75,6 +77,7 @@ def block_solver(
         lattice: The lattice that its nodes form, if they form one.
         material: Elastic constants of the block.
         free: 1 for unknowns that are free, 0 for constrained ones.
+        linear: Gives the same block with linear displacements.
 
     Note:
         Collective.
@@ -82,7 +85,9 @@ def block_solver(
     ratio = material.poisson_ratio
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
     if lattice is None:
-        return body_solver(matrix, space, degree=shape.degree, poisson_ratio=ratio, free=free)
+        return body_solver(
+            matrix, space, degree=shape.degree, poisson_ratio=ratio, free=free, linear=linear
+        )
     if not requested and ratio > STIFF and matrix.getSize()[0] <= FACTORISED:
         return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
     if requested not in ("", "mg"):
@@ -92,7 +97,14 @@ def block_solver(
 
 
 def body_solver(
-    matrix: PETSc.Mat, space: Any, *, degree: int, poisson_ratio: float, free: PETSc.Vec
+    matrix: PETSc.Mat,
+    space: Any,
+    *,
+    degree: int,
+    poisson_ratio: float,
+    free: PETSc.Vec,
+    linear: Callable[[], Linear],
+    stiffened: Stiffened | None = None,
 ) -> PETSc.KSP:
     """Return a solver for the stiffness of a body whose mesh is no lattice.
 
@@ -102,18 +114,25 @@ def body_solver(
         degree: Degree of the displacements.
         poisson_ratio: Largest Poisson's ratio of the body.
         free: 1 for unknowns that are free, 0 for constrained ones.
+        linear: Gives the same body with linear displacements; used for degree 2.
+        stiffened: The matrix with springs, which the preconditioner is to know; None: no springs.
 
     Note:
         Collective.
     """
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
-    if not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED:
-        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    if degree == 2 and requested in ("", "mg"):
-        grid = vertex_grid(matrix, space, free)
-        return linear_solver(matrix, grid, quadratic_options(space.mesh))
+    direct = not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED
+    if degree == 2 and not direct and requested in ("", "mg"):
+        springs, finest = None, None
+        if stiffened is not None:
+            springs = stiffened.springs
+            finest = stiffened.product, stiffened.diagonal_blocks()
+        grid = vertex_grid(space, linear(), free, springs)
+        return linear_solver(matrix, grid, quadratic_options(space.mesh), finest=finest)
     hexahedral = space.mesh.topology.cell_name() == "hexahedron"
-    return linear_solver(matrix, preconditioner=algebraic_options(hexahedral=hexahedral))
+    options = DIRECT_DEFAULTS if direct else algebraic_options(hexahedral=hexahedral)
+    whole = None if stiffened is None else stiffened.assembled()
+    return linear_solver(matrix, preconditioner=options, whole=whole)
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:

@@ -17,8 +17,8 @@ Array = NDArray[np.float64]
 _FLAT = 1e-8
 """Volume at a corner, relative to the product of its edges, that counts as none."""
 
-_CHUNK = 1 << 18
-"""Cells that are checked at a time, which bounds the memory."""
+_CHUNK = 1 << 14
+"""Cells that are checked at a time, which bounds the memory to 10 MB."""
 
 _SMALL, _LARGE = 1.0, 2.0e4
 """Diagonals of bodies beyond which the unit of their mesh is in doubt [mm]."""

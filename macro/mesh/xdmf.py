@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,16 +21,20 @@ from macro.mesh.tagging import filled, of_owned_cells
 _CELLS = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 """Names of the cells' topology, without capitals, and of their facets'."""
 
+NAMES = "patchlaw tags"
+"""Name of the entry with the names of the tags, as JSON: tags of ``facets`` and ``cells``."""
+
 _ALLOWED = "one mesh of first-order tetrahedra or hexahedra, as dolfinx writes it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Layout:
-    """Names of the grids of a file."""
+    """Names of the grids of a file, and those of its tags, where it has some."""
 
     mesh: str
     facets: str | None
     cells: str | None
+    names: dict[str, dict[str, int]]
 
 
 def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
@@ -59,12 +64,13 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
     if facets is None:
         facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
     cells = cells and filled(mesh, cells)
+    names = layout.names
     return TaggedMesh(
         mesh=mesh,
         facet_tags=of_owned_cells(mesh, facets),
         cell_tags=cells,
-        facet_names=_numbers(facets, comm),
-        cell_names={} if cells is None else _numbers(cells, comm),
+        facet_names=names.get("facets") or _numbers(facets, comm),
+        cell_names=names.get("cells") or ({} if cells is None else _numbers(cells, comm)),
     )
 
 
@@ -105,7 +111,20 @@ def _layout(path: Path) -> _Layout:
             raise InputError(
                 f"the file has several sets of tags of {what}", value=several, allowed="one"
             )
-    return _Layout(mesh=mesh, facets=next(iter(of_facets), None), cells=next(iter(of_cells), None))
+    facets, cells = (next(iter(found), None) for found in (of_facets, of_cells))
+    return _Layout(mesh=mesh, facets=facets, cells=cells, names=_names(root))
+
+
+def _names(root: ElementTree.Element) -> dict[str, dict[str, int]]:
+    """Return the names that `write_mesh` gave the tags; none in other files."""
+    for entry in root.iter("Information"):
+        if entry.get("Name") == NAMES:
+            try:
+                found = json.loads(entry.get("Value", ""))
+                return {kind: {str(k): int(found[kind][k]) for k in found[kind]} for kind in found}
+            except (ValueError, TypeError, AttributeError) as error:
+                raise InputError(f"its names of tags cannot be read: {error}") from error
+    return {}
 
 
 def _kind(grid: ElementTree.Element) -> str:

@@ -42,7 +42,7 @@ from scipy import fft
 
 from geometry import Material, Surface
 from geometry.errors import InputError
-from micro.compliance.waves import Around, Spectrum, Waves
+from micro.compliance.waves import Around, Spectrum, surface_waves
 
 Array = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ class FiniteSlopes:
         self._surface, self._periodic = surface, periodic
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
-        self._waves = Waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
+        self._waves = surface_waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
         self.spacing = self._waves.spacing
         top = float(surface.heights.max())
         below = self._waves.coarsened(surface.heights - top)

@@ -33,6 +33,9 @@ Pair = tuple[float, float]
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
+_FEW_CELLS = 2**14
+"""Cells up to which half-spaces are cached for other surfaces too, with 2 MB then."""
+_small_half_space = lru_cache(maxsize=_MOST_GRIDS + 8)(HalfSpaceGrid)
 _DIFFERENCE = 1e-6
 """Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
 slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
@@ -134,7 +137,7 @@ class Compliance:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_last"}
+        caches = {"half_space", "_terms_on", "_last"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -149,6 +152,17 @@ class Compliance:
             coarse: Whether these are no cells of the surface but coarser ones, where free sides are
                 left out.
         """
+        terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
+        return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+
+    @cached_property
+    def _terms_on(self) -> Callable[[tuple[int, int], Pair, Pair, bool], list[ComplianceTerm]]:
+        """Function from cells to the terms beside the half-space on them, cached; see `on_grid`."""
+        return lru_cache(maxsize=_MOST_GRIDS)(self._make_terms)
+
+    def _make_terms(
+        self, grid: tuple[int, int], spacing: Pair, corner: Pair, coarse: bool
+    ) -> list[ComplianceTerm]:
         terms: list[ComplianceTerm] = []
         if self.sides is not None and not coarse:
             rows, columns = (
@@ -158,7 +172,7 @@ class Compliance:
             terms.append(side_cells(self.sides, spacing).among(rows, columns))
         if self.body is not None:
             terms.append(self.body_on(grid, spacing, corner))
-        return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+        return terms
 
     def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
         """Return what the finite body, which must be given, adds on cells; see `on_grid`."""
@@ -172,7 +186,14 @@ class Compliance:
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
-        return lru_cache(maxsize=_MOST_GRIDS)(partial(HalfSpaceGrid, periodic=self.periodic))
+        own = lru_cache(maxsize=_MOST_GRIDS)(partial(HalfSpaceGrid, periodic=self.periodic))
+
+        def made(grid: tuple[int, int], spacing: Pair) -> HalfSpaceGrid:
+            if grid[0] * grid[1] <= _FEW_CELLS:
+                return _small_half_space(grid, spacing, periodic=self.periodic)
+            return own(grid, spacing)
+
+        return made
 
     def slope_displacement(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_slopes, mode_values
+from geometry.small_caches import cached_where_small
 from micro.compliance.free_sides import FreeSides, distance_nodes, gauss_points, values_at
 
 Array = NDArray[np.float64]
@@ -36,8 +37,13 @@ _WAVES = 8
 """Waves along a side, per mode: shorter ones are left out, as the cube of their length."""
 _NEAREST = 1.0 / 1024.0
 """First node of the distance from a side, of its length over the square of the modes."""
+_FEW = 20
+"""Modes along a side up to which matrices are cached, of 1.3 or 3.8 MB then."""
+
+_of_few_modes = cached_where_small(lambda *arguments: arguments[-1] <= _FEW, most=8)
 
 
+@_of_few_modes
 def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     """Return the displacements into the half-space by modes of pressure, in modes, for E* = 1.
 
@@ -53,6 +59,7 @@ def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
+@_of_few_modes
 def half_space_stress_modes(
     lengths: tuple[float, float], poisson_ratio: float, count: int
 ) -> Array:
@@ -144,6 +151,7 @@ def _overlaps(
     return np.asarray((first * (half * weights)[:, None]) @ second.transpose(1, 2, 0))
 
 
+@_of_few_modes
 def side_modes(sides: FreeSides, count: int) -> Array:
     """Return the displacements that free sides add by modes of pressure, in modes, for E* = 1.
 
@@ -158,6 +166,7 @@ def side_modes(sides: FreeSides, count: int) -> Array:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
+@_of_few_modes
 def side_stress_modes(sides: FreeSides, count: int) -> Array:
     """Return the stresses in the surface that free sides add by modes of pressure, in modes.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Self
+from typing import Any, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,12 +23,15 @@ from micro.compliance.free_sides import FreeSides, distance_nodes, means_over
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 Waves = NDArray[np.complex128]
+Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
 _NEAREST = 1.0 / 16.0
 """First node of the distance from a side, in cells."""
 _NEAREST_STRESS = 1.0 / 256.0
 """That for stresses: the mean over the cell in a corner of constant pressure then errs by 0.4 % of
 the largest stress, with 1/16 by 8 %."""
+_FEW_ROWS = 128
+"""Rows of cells up to which products with full matrices are quicker than with sparse ones."""
 _SWAPPED = [1, 0, 2]
 """Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
 _SHEAR = np.array([-1j, 1j])
@@ -46,8 +49,8 @@ class _SidePair:
         place: Places of the cells in a row, counted from the first of them, shape (cells,).
     """
 
-    means: csr_array
-    loads: csr_array
+    means: Means
+    loads: Means
     kernels: Array
     place: Indices
 
@@ -67,7 +70,8 @@ class _SidePair:
         nodes = distance_nodes((_NEAREST_STRESS if stress else _NEAREST) * step, length)
         lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
         low, high = (float(there) for there in sides.pair(axis))
-        means = csr_array(hstack([low * lower, high * lower[::-1]]))
+        both = csr_array(hstack([low * lower, high * lower[::-1]]))
+        means = both.toarray() if rows <= _FEW_ROWS else both
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):
@@ -79,41 +83,51 @@ class _SidePair:
             else:
                 kernel = sides.compliance(axis, nodes, np.abs(waves))
             parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
-        return cls(means, csr_array(means.T), np.sum(parts, axis=0), np.arange(cells))
+        return cls(means, _transposed(means), np.sum(parts, axis=0), np.arange(cells))
 
     def among(self, rows: Indices, cells: Indices) -> _SidePair:
         """Return the same sides with some of these rows, and some of the cells of each."""
         means, place = self.means[rows], self.place[cells]
-        return _SidePair(means, csr_array(means.T), self.kernels, place - place[0])
+        return _SidePair(means, _transposed(means), self.kernels, place - place[0])
 
-    def loaded(self, pressure: Array) -> Waves:
-        """Return the waves of loads at the nodes by pressures on cells, shape (waves, a, 2)."""
-        lines = np.zeros((self.loads.shape[0], self.place[-1] + 1))
-        lines[:, self.place] = self.loads @ pressure
-        waves = fft.rfft(lines, 2 * len(self.kernels) - 2, axis=1)
-        return np.ascontiguousarray(waves.reshape(2, -1, len(self.kernels)).transpose(2, 1, 0))
+    def loaded(self, fields: Array) -> Waves:
+        """Return the waves of loads at the nodes by f fields on cells, shape (waves, f a, 2)."""
+        count, rows, cells = fields.shape
+        lines = self.loads @ fields.transpose(1, 0, 2).reshape(rows, count * cells)
+        placed = np.zeros((len(lines) * count, self.place[-1] + 1))
+        placed[:, self.place] = lines.reshape(-1, cells)
+        waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
+        parts = waves.reshape(2, -1, count, len(self.kernels)).transpose(3, 2, 1, 0)
+        return np.ascontiguousarray(parts.reshape(len(self.kernels), -1, 2))
 
-    def on_cells(self, waves: Waves) -> Array:
-        """Return the means over the cells of values at the nodes, by their waves, (rows, cells)."""
-        by_side = waves.transpose(2, 1, 0).reshape(self.means.shape[1], -1)
-        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)
-        return np.asarray(self.means @ lines[:, self.place])
+    def on_cells(self, waves: Waves, count: int) -> Array:
+        """Return f fields of means over the cells by values' waves, shape (f, rows, cells)."""
+        parts = waves.reshape(len(self.kernels), count, -1, 2).transpose(3, 2, 1, 0)
+        by_side = parts.reshape(-1, len(self.kernels))
+        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
+        found = self.means @ lines.reshape(self.means.shape[1], -1)
+        return np.ascontiguousarray(found.reshape(len(found), count, -1).transpose(1, 0, 2))
 
     def displacement(self, pressure: Array) -> Array:
         """Return displacements of the cells by pressures on them, shape (rows, cells)."""
-        return self.on_cells(_multiplied(self.kernels, self.loaded(pressure)))
+        return self.on_cells(_multiplied(self.kernels, self.loaded(pressure[None])), 1)[0]
 
     def stresses(self, pressure: Array) -> Array:
         """Return stresses normal to the sides, along them and in shear, (3, rows, cells)."""
-        found = _multiplied(self.kernels, self.loaded(pressure))
-        normal, parallel, shear = np.split(found, 3, axis=1)
-        return np.stack([self.on_cells(part) for part in (normal, parallel, shear * _SHEAR)])
+        found = _multiplied(self.kernels, self.loaded(pressure[None]))
+        found[:, -(found.shape[1] // 3) :] *= _SHEAR
+        return self.on_cells(found, 3)
 
     def adjoint(self, fields: Array) -> Array:
         """Apply the transpose of `stresses`, shape (rows, cells)."""
-        normal, parallel, shear = (self.loaded(field) for field in fields)
-        waves = np.concatenate([normal, parallel, shear * _SHEAR.conj()], axis=1)
-        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves))
+        waves = self.loaded(fields)
+        waves[:, -(waves.shape[1] // 3) :] *= _SHEAR.conj()
+        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves), 1)[0]
+
+
+def _transposed(means: Means) -> Means:
+    """Return the transpose of a full or sparse matrix, of the same kind."""
+    return csr_array(means.T) if isinstance(means, csr_array) else means.T
 
 
 def _multiplied(kernels: Array, waves: Waves) -> Waves:

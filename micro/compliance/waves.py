@@ -16,12 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from geometry.small_caches import cached_where_small
+
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 
 _KEPT, _DROPPED = 0.6, 0.9
 """Of the shortest wave number of the coarse cells: kept whole below, left out above."""
+_FEW_CELLS = 2**16
+"""Coarse cells up to which what belongs to their waves is cached, with 10 MB then."""
 
 
 class Waves:
@@ -116,3 +120,9 @@ class Waves:
         """Return fields by their waves, shape (..., sx, sy)."""
         rows = fft.ifft(waves, axis=-2)[..., : self.shown[0], :]
         return np.asarray(fft.irfft(rows, n=self.padded[1], axis=-1)[..., : self.shown[1]])
+
+
+surface_waves = cached_where_small(
+    lambda grid, spacing, *, coarse, around: coarse[0] * coarse[1] <= _FEW_CELLS, most=8
+)(Waves)
+"""Waves on the cells of a surface, cached for the next surface of the same cells."""

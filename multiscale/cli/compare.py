@@ -18,11 +18,13 @@ from multiscale.comparison.comparison import Comparison
 from multiscale.comparison.configuration import RunResult
 from multiscale.comparison.launch import check_launchable
 from multiscale.output import terminal
-from multiscale.output.results import png
+from multiscale.output.results import pictures_of, write_pictures
+from multiscale.readable import duration, percent
+from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_bytes, write_csv, write_text
+from multiscale.storage import write_csv, write_text
 
 RESULTS = "configurations"
 """Folder of the results of all configurations, within the folder of the comparison."""
@@ -64,7 +66,7 @@ def _followed(
     with terminal.following(comm) as (begun, ended):
 
         def observe(result: RunResult, stored: bool) -> None:
-            spent = f"{result.seconds:8.2f} s" if result.phases else " " * 10
+            spent = f"{duration(result.seconds) if result.phases else '':>12}"
             status = result.status + ", from an earlier call" * stored
             why = f": {result.message}" if result.message else ""
             ended(f"{spent}  {result.name}: {status}{why}")
@@ -98,12 +100,12 @@ def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
     """
     columns, pictures = comparison.to_dict(), _pictures(comparison)
     files = [write_csv(folder / "compare.csv", list(columns), zip(*columns.values(), strict=True))]
-    files += [write_bytes(folder / f"{name}.png", picture) for name, picture in pictures.items()]
+    files += write_pictures(folder, pictures)
     return [*files, write_text(folder / "report.html", comparison_html(comparison, pictures))]
 
 
 def _pictures(comparison: Comparison) -> dict[str, bytes]:
-    """Return the figures as PNG images by name; matplotlib is loaded only here."""
+    """Return the files of the figures by name; matplotlib is loaded only here."""
     from multiscale.comparison.error_over_time import pareto_figure
     from multiscale.comparison.figures import curves_figure, maps_figure
 
@@ -113,7 +115,8 @@ def _pictures(comparison: Comparison) -> dict[str, bytes]:
     if any(row.steps for row in comparison.rows):
         drawn["curves"] = curves_figure(comparison)
         drawn["pressures"] = maps_figure(comparison)
-    return {name: png(figure) for name, figure in drawn.items()}
+    files = (pictures_of(name, figure) for name, figure in drawn.items())
+    return {name: content for found in files for name, content in found.items()}
 
 
 def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:
@@ -121,7 +124,7 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
 
     Args:
         comparison: The comparison.
-        pictures: PNG images by name, ``pareto``, ``curves`` and ``pressures``.
+        pictures: Files of the figures by name, ``pareto.png``, ``curves.png``, ``pressures.png``.
     """
     threads = os.environ.get("OMP_NUM_THREADS", "all")
     return filled(
@@ -129,10 +132,13 @@ def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> st
         title=f"patchlaw compare: {comparison.scene}",
         comparison=comparison,
         records=comparison.records(),
+        numbers={row.name: number for number, row in enumerate(comparison.rows, 1)},
         frontier_names=[row.name for row in comparison.frontier()],
         headline=headline(comparison),
         frontier_lines=list(frontier_lines(comparison)),
         pictures=pictures,
+        number=readable_number,
+        percent=percent,
         definitions=(errors.__doc__ or "").strip(),
         machine=f"{platform.platform()}, {os.cpu_count()} cores, threads: {threads}",
     )
@@ -154,7 +160,7 @@ def headline(comparison: Comparison) -> Iterator[str]:
         "of the contact area": own.area_max,
         "of the mean pressure in the distribution of pressures": own.distribution,
     }
-    known = ", ".join(f"{100 * bar:.3g} % {part}" for part, bar in bars.items() if bar > 0)
+    known = ", ".join(f"{percent(bar)} {part}" for part, bar in bars.items() if bar > 0)
     yield (
         f"They are compared with “{comparison.measure}”, whose own uncertainty is "
         f"{known or 'not known'}."
@@ -171,4 +177,4 @@ def frontier_lines(comparison: Comparison) -> Iterator[str]:
     for row in comparison.frontier():
         size = comparison.error(row)
         less = "no more than the uncertainty of the measure, " if size <= bar else ""
-        yield f"{row.seconds:.3g} s: error {less}{100 * size:.3g} %: {row.name}"
+        yield f"{duration(row.seconds)}: error {less}{percent(size)}: {row.name}"

@@ -19,7 +19,7 @@ from multiscale.exports.export import export_texts, remove_exports
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes
 from multiscale.output import terminal
-from multiscale.output.results import write_figure
+from multiscale.output.results import pictures_of, write_pictures
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
@@ -83,7 +83,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-            files = [laws, write_figure(folder / "laws.png", law_figure(table))]
+            files = [laws, *write_pictures(folder, pictures_of("laws", law_figure(table)))]
             remove_exports(folder)
             for name, text in exports.items():
                 write_text(folder / name, text)
@@ -110,11 +110,9 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
         def write() -> list[Path]:
-            from multiscale.output.figures import surface_figure
+            from multiscale.output.figures import surface_figure_of
 
-            summits = setup.asperities if setup.uses_summits else None
-            figure = surface_figure(setup.surface, summits, setup.patches)
-            return [write_figure(folder / "surface.png", figure)]
+            return write_pictures(folder, pictures_of("surface", surface_figure_of(setup)))
 
         terminal.show_files(comm, on_root(comm, write))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,10 +14,16 @@ from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
-from multiscale.output.results import write_figure
+from multiscale.output.results import pictures_of, write_pictures
+from multiscale.planning.auto_keys import auto_keys
+from multiscale.planning.costs import predicted_cost, step_count
+from multiscale.planning.problem_setup import make_setup
+from multiscale.readable import duration
 from multiscale.restart.results_folder import locked
+from multiscale.scene.scene import Scene
 from multiscale.storage import remove, write_csv
-from multiscale.sweeps.cases import Case, values_from_text
+from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
+from multiscale.sweeps.forecast import SweepForecast
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, sweep
 from multiscale.sweeps.sweep_results import SweepResults
@@ -24,12 +31,12 @@ from multiscale.sweeps.sweep_results import SweepResults
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""
 
-FILES = ("cases.csv", "history.csv", "ensembles.csv", "sweep.png")
+FILES = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 """Files of the results of a sweep."""
 
 
 def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Run a scene for many values of its keys; write all load steps, means and bands.
+    """Run a scene for many values of its keys; write all load steps and their statistics.
 
     Args:
         choice: Parsed words of the command line.
@@ -42,6 +49,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
+        terminal.say(comm, on_root(comm, lambda: _forecast(scene, vary, comm, parts)))
         with terminal.following(comm) as (begun, ended):
 
             def observe(case: Case, result: CaseResult) -> None:
@@ -50,7 +58,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
                     ended(f"case {case.number}: {result.failure}")
 
             found = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = on_root(comm, lambda: _write(folder, found, bool(scene.output.figures)))
+        files = _write(folder, found, comm, figures=bool(scene.output.figures))
     for text in _summary(found):
         terminal.say(comm, text)
     terminal.show_files(comm, files)
@@ -76,52 +84,100 @@ def slurm_part() -> tuple[int, int]:
     return (task - first) // step + 1, count
 
 
+def _forecast(scene: Scene, vary: dict[str, list[Any]], comm: Any, parts: int) -> str:
+    """Say what the sweep is predicted to take, from the plan of its first case."""
+    cases, ranks = sweep_cases(scene, vary), parts * (1 if comm is None else comm.size)
+    start = f"{len(cases)} cases on {ranks} rank{'s' * (ranks > 1)}"
+    first = cases[0].scene
+    if auto_keys(first) or first.body is not None:  # whose problems are not set up in an instant
+        return start
+    setup = make_setup(first.with_({"output.figures": False, "output.report": False}))
+    cost = predicted_cost(setup)
+    # a decomposed body and the libraries are there for the next case
+    once = cost.seconds.get("block", 0.0) if first.decomposed else 0.0
+    forecast = SweepForecast(
+        cases=len(cases),
+        ranks=ranks,
+        steps=step_count(first.loading.load_history),
+        case_seconds=cost.total - once,
+        set_up_seconds=once,
+        run_bytes=cost.memory,
+    )
+    time, memory = duration(forecast.seconds), f"{forecast.rank_bytes / 1e6:.0f} MB"
+    return f"{start}: about {time}, and {memory} on each"
+
+
 def _remove_results(folder: Path) -> None:
     for path in [*(folder / JOURNAL).glob("*.jsonl"), *(folder / name for name in FILES)]:
         remove(path)
 
 
-def _write(folder: Path, found: SweepResults, figures: bool) -> list[Path]:
-    """Write the tables and the figure of the cases that are done."""
-    tables = {
-        "cases.csv": found.case_records(),
-        "history.csv": found.records(),
-        "ensembles.csv": _ensemble_records(found),
-    }
+def _write(folder: Path, found: SweepResults, comm: Any, *, figures: bool) -> list[Path]:
+    """Write the tables and the figure of the cases that are done; rank 0 writes for all."""
     files = [
-        write_csv(folder / name, list(rows[0]), [list(row.values()) for row in rows])
-        for name, rows in tables.items()
-        if rows
+        *_write_table(folder / "cases.csv", found.case_records(), comm),
+        *_write_table(folder / "history.csv", found.records(), comm),
     ]
-    if figures and tables["ensembles.csv"]:
-        files.append(write_figure(folder / "sweep.png", found.plot()))
+    statistics = _statistics_records(found)
+    files += _write_table(folder / "statistics.csv", iter(statistics), comm)
+    if figures and statistics:
+        pictures = pictures_of("sweep", found.plot())
+        files += on_root(comm, lambda: write_pictures(folder, pictures))
     return files
+
+
+def _write_table(path: Path, records: Iterator[dict[str, Any]], comm: Any) -> list[Path]:
+    """Write records as they come from all ranks; none make no file. All ranks fail together."""
+
+    def write() -> list[Path]:
+        first = next(records, None)
+        if first is None or not (comm is None or comm.rank == 0):
+            return []
+        rows = (list(record.values()) for record in itertools.chain([first], records))
+        return [write_csv(path, list(first), rows)]
+
+    files: list[Path] = []
+    failure: Exception | None = None
+    try:
+        files = write()
+    except Exception as error:  # the other ranks still send what they have
+        failure = error
+    for _ in records:
+        pass
+
+    def outcome() -> list[Path]:
+        if failure is not None:
+            raise failure
+        return files
+
+    return on_root(comm, outcome)
 
 
 def _summary(found: SweepResults) -> Iterator[str]:
     """Yield a line on the last load step of each ensemble."""
     yield f"{len(found) - found.unfinished} of {len(found)} cases are done"
-    for record in _last_steps(_ensemble_records(found))[:MOST_LINES]:
-        values = "".join(f"{key} = {record[key]}, " for key in found.keys if key in record)
-        force, approach = _spread(record, "force_N"), _spread(record, "approach_mm", 1e3)
-        yield f"{values}at last: force {force} N, approach {approach} µm"
+    records = _statistics_records(found)
+    last = max((record["step"] for record in records), default=0)
+    chosen = {
+        name: [one for one in records if one["step"] == last and one["column"] == name]
+        for name in ("force_N", "approach_mm")
+    }
+    pairs = zip(chosen["force_N"], chosen["approach_mm"], strict=True)
+    for force, approach in itertools.islice(pairs, MOST_LINES):
+        values = "".join(f"{key} = {force[key]}, " for key in found.keys if key in force)
+        yield (f"{values}at last: force {_spread(force)} N, approach {_spread(approach, 1e3)} µm")
 
 
-def _spread(record: dict[str, Any], name: str, scale: float = 1.0) -> str:
+def _spread(record: dict[str, Any], scale: float = 1.0) -> str:
     """Return a mean and, where the cases of an ensemble differ, the band about it."""
-    low, middle, high = (scale * record[f"{name}{end}"] for end in ("_low", "", "_high"))
+    low, middle, high = (scale * record[name] for name in ("low", "mean", "high"))
     same = high - low <= 1e-6 * abs(middle)
     return f"{middle:.4g}" if same else f"{middle:.4g} (5 to 95 %: {low:.4g} … {high:.4g})"
 
 
-def _last_steps(records: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    last = max((record["step"] for record in records), default=0)
-    return [record for record in records if record["step"] == last]
-
-
-def _ensemble_records(found: SweepResults) -> list[dict[str, Any]]:
-    """Return means and bands; none before all cases are done, or where steps were halved."""
+def _statistics_records(found: SweepResults) -> list[dict[str, Any]]:
+    """Return the statistics; none before all cases are done, or where steps were halved."""
     try:
-        return [] if found.unfinished else found.ensemble_records()
+        return [] if found.unfinished else found.statistics_records()
     except InputError:
         return []

@@ -140,7 +140,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     sweep = command(
         "sweep",
         "sweep.sweep_scene",
-        "Run a scene for many values of its keys; write all load steps, means and bands.",
+        "Run a scene for many values of its keys; write all load steps and their statistics.",
     )
     _add_scene(sweep, ending=SWEEP_ENDING)
     values = (

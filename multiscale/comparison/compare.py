@@ -29,6 +29,10 @@ Launch: TypeAlias = Callable[[Configuration, float | None], RunResult]
 AUTO_VALUES = "auto_values.json"
 """File of the values that were chosen for the scene's keys that are ``auto``."""
 
+REFERENCE_SHARE, REFERENCE_LIMIT = 0.6, 0.8
+"""Shares of a budget: what a reference may be predicted to take to be run before all others, and
+what it may take in fact; the rest is enough for the quick ways."""
+
 REPEATABLE = ("done", "refused", "not converged")
 """How runs end that would end in the same way again."""
 
@@ -90,12 +94,22 @@ def compare(
         place = Path(temporary) if folder is None else folder
         scene = resolved_scene(scene, place)
         ways = configurations(scene, ranks)
+        first = (
+            None if against in ("concurrent", "half-space") else reference_within(ways, budget_s)
+        )
         for result, is_stored in run_all(
-            ways, place, budget_s=budget_s, launch=launch or launch_process, begin=begin
+            ways,
+            place,
+            budget_s=budget_s,
+            launch=launch or launch_process,
+            begin=begin,
+            first=first,
         ):
             if observe is not None:
                 observe(result, is_stored)
             results.append(result)
+        order = [one.key for one in ways]
+        results.sort(key=lambda result: order.index(result.configuration.key))
     return compared(scene, results, against)
 
 
@@ -123,6 +137,37 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     return provisional(with_resolved(scene, values), auto & {"micro.model"})
 
 
+def reference_within(
+    configurations: Sequence[Configuration], budget_s: float | None
+) -> Configuration | None:
+    """Return the reference with an error bar that a budget is spent on first.
+
+    It is the finest that leaves time for others, or else the cheapest.
+
+    Args:
+        configurations: The configurations.
+        budget_s: Wall time for all of them [s]; None for any.
+
+    Returns:
+        The reference; None where there is no budget, or none within it.
+    """
+    if budget_s is None:
+        return None
+    fitting = [
+        one
+        for one in configurations
+        if one.kind == "reference"
+        and one.content["reference"]["meshes"] > 1
+        and one.scale == 1.0
+        and not one.refusal
+        and one.cost <= REFERENCE_LIMIT * budget_s
+    ]
+    leaving = [one for one in fitting if one.cost <= REFERENCE_SHARE * budget_s]
+    if leaving:
+        return max(leaving, key=lambda one: one.cost)
+    return min(fitting, key=lambda one: one.cost, default=None)
+
+
 def run_all(
     configurations: Sequence[Configuration],
     folder: Path,
@@ -131,6 +176,7 @@ def run_all(
     budget_s: float | None = None,
     begin: Callable[[Configuration], None] | None = None,
     clock: Callable[[], float] = time.monotonic,
+    first: Configuration | None = None,
 ) -> Iterator[tuple[RunResult, bool]]:
     """Run configurations in their order, and yield the result of each when it ends.
 
@@ -145,12 +191,14 @@ def run_all(
         launch: Runs one configuration.
         begin: Called with every configuration that is about to be run.
         clock: Returns the time [s].
+        first: The configuration that is run before all others, in `REFERENCE_LIMIT` of the budget.
 
     Yields:
         The result, and whether it is from an earlier call.
     """
     end = None if budget_s is None else clock() + budget_s
-    for one in configurations:
+    ahead = [] if first is None else [first]
+    for one in [*ahead, *(one for one in configurations if one is not first)]:
         path = folder / f"{one.key}.json"
         stored = read_result(path)
         left = None if end is None else end - clock()
@@ -165,6 +213,7 @@ def run_all(
         else:
             if begin is not None:
                 begin(one)
-            result = launch(one, left)
+            share = REFERENCE_LIMIT if one is first else 1.0
+            result = launch(one, None if left is None else share * left)
             write_result(path, result)
             yield result, False

@@ -22,6 +22,7 @@ from multiscale.comparison.errors import (
 )
 from multiscale.comparison.measure import ranked, refinements
 from multiscale.comparison.scene_content import pressure_grid
+from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 
 BUSY = 0.7
@@ -220,8 +221,8 @@ def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> I
     cpu = sum(row.cpu_s for row in timed)
     if cpu < BUSY * wall:
         yield (
-            f"the processes worked {cpu:.3g} s in {wall:.3g} s of their wall time: the machine was "
-            "busy with something else, and times are too long"
+            f"the processes worked {duration(cpu)} in {duration(wall)} of their wall time: the "
+            "machine was busy with something else, and times are too long"
         )
 
 

@@ -11,9 +11,11 @@ from multiscale.comparison.comparison import Comparison, Row
 from multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
+    FULL_WIDTH,
     MARKERS,
     new_figure,
     panels_above_legend,
+    styled,
 )
 
 PALE = 0.4
@@ -25,17 +27,18 @@ LEAST_ERROR = 1e-5
 LEAST_SHARE = 0.2
 """Errors below this share of the error bar are drawn there: they cannot be told apart."""
 
-NUMBER_SIZE = (14.0, 10.0)
+NUMBER_SIZE = (10.0, 8.0)
 """Width and height that a number takes [pt]."""
 
-_PLAIN: dict[str, Any] = {"ms": 7.0, "zorder": 4, "ls": "none"}
-_RING = _PLAIN | {"mec": "0.1", "mew": 1.4, "ms": 10.0, "zorder": 5}
+_PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
+_RING = _PLAIN | {"mec": "0.1", "mew": 1.1, "ms": 7.5, "zorder": 5}
 _BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
 _EARLY = _PLAIN | {"mfc": "none", "alpha": PALE, "zorder": 3}
-_NUMBER: dict[str, Any] = {"fontsize": 9, "fontweight": "bold", "color": "0.1", "zorder": 6}
+_NUMBER: dict[str, Any] = {"fontsize": 7, "fontweight": "bold", "color": "0.1", "zorder": 6}
 _NUMBER |= {"ha": "center", "va": "center"}
 
 
+@styled()
 def pareto_figure(comparison: Comparison) -> Figure:
     """Draw errors of the response, the contact area and the pressure distribution over time.
 
@@ -52,19 +55,19 @@ def pareto_figure(comparison: Comparison) -> Figure:
         "area_max": "contact area: largest error over the curve",
         "distribution": "distribution of pressures: distance / mean",
     }
-    figure = new_figure(13.2, 6.4)
+    figure = new_figure(FULL_WIDTH, 4.4)
     panels, below = panels_above_legend(figure, 3, 0.16)
     for axes, (error, title) in zip(panels, titles.items(), strict=True):
         _draw_errors(axes, comparison, error)
-        axes.set_title(title, fontsize=10.5)
+        axes.set_title(title, fontsize=7.5)
     panels[0].set_ylabel("relative to the measure")
     _draw_legend(below, comparison)
     ahead = {row.name for error in titles for row in comparison.frontier(error)}
     ahead.add(str(comparison.measure))
     rows = enumerate(comparison.rows, 1)
     names = [f"{number}: {row.name}" for number, row in rows if row.name in ahead]
-    lines = ["      ".join(names[first : first + 3]) for first in range(0, len(names), 3)]
-    figure.supxlabel("\n".join(lines), fontsize=8.5)
+    lines = ["      ".join(names[first : first + 2]) for first in range(0, len(names), 2)]
+    figure.supxlabel("\n".join(lines), fontsize=6.5)
     # Numbers are placed beside the points, whose places are known once the figure is laid out.
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
@@ -94,7 +97,6 @@ def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
         axes.plot(seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
     axes.margins(0.1)
-    axes.grid(alpha=0.25, which="major")
     axes.autoscale_view()
     axes.autoscale(False)
     if np.isfinite(bar) and bar > 0.0:
@@ -115,7 +117,7 @@ def _draw_numbers(axes: Any, comparison: Comparison, error: str) -> None:
         if row not in frontier and not row.is_measure:
             continue
         mark = 72.0 / axes.figure.dpi * axes.transData.transform(point)
-        spot = mark - (10.0, 9.0)
+        spot = mark - (8.0, 7.0)
         while (np.abs(placed - spot) < NUMBER_SIZE).all(axis=1).any():
             spot[1] -= NUMBER_SIZE[1]
         placed = np.vstack([placed, spot])
@@ -134,4 +136,4 @@ def _draw_legend(axes: Any, comparison: Comparison) -> None:
     axes.fill_between([], [], [], label=lowest, **ERROR_BAND)
     if any(row.steps and row.status != "done" for row in comparison.rows):
         axes.plot([], [], "s", label="hollow: ended before the last load step", **black, **_EARLY)
-    axes.legend(loc="center", ncol=4, frameon=False, fontsize=9.5)
+    axes.legend(loc="center", ncol=3)

@@ -10,16 +10,21 @@ from matplotlib.figure import Figure
 from multiscale.comparison.comparison import Comparison, Row
 from multiscale.comparison.configuration import OWN
 from multiscale.comparison.errors import on_grid
+from multiscale.figures.maps import colour_bar, draw_pressures
 from multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
+    FULL_WIDTH,
+    GREY,
+    INK,
     LINE_STYLES,
     MARKERS,
-    PRESSURE_LABEL,
     new_figure,
     panels_above_legend,
+    show_unit,
+    styled,
 )
-from multiscale.output.figures import draw_pressures
+from multiscale.readable import usual_unit
 
 
 def selected_rows(comparison: Comparison, error: str | None = None, *, most: int = 7) -> list[Row]:
@@ -40,21 +45,22 @@ def selected_rows(comparison: Comparison, error: str | None = None, *, most: int
     return list({row.name: row for row in picked}.values())[:most]
 
 
+@styled()
 def curves_figure(comparison: Comparison) -> Figure:
     """Draw force–approach curves, and their differences from the measure with its error bar.
 
     Args:
         comparison: The comparison.
     """
-    figure = new_figure(12.0, 4.8)
-    (curves, differences), below = panels_above_legend(figure, 2, 0.2)
+    figure = new_figure(FULL_WIDTH, 3.9)
+    (curves, differences), below = panels_above_legend(figure, 2, 0.32)
     measure = comparison[comparison.measure].curves if comparison.measure else None
     by_approach, response = comparison.quantity == "approach", comparison.response
     for index, row in enumerate(selected_rows(comparison)):
-        look: dict[str, Any] = {"color": COLOURS[row.kind], "marker": MARKERS[row.kind], "ms": 4.0}
+        look: dict[str, Any] = {"color": COLOURS[row.kind], "marker": MARKERS[row.kind], "ms": 3.5}
         look |= {"lw": 1.4, "ls": LINE_STYLES[index % len(LINE_STYLES)]}
         if row.is_measure or row.name.startswith(OWN):
-            look["color"] = "0.1" if row.is_measure else "0.55"
+            look["color"] = INK if row.is_measure else GREY
         found, approach = row.curves, 1e3 * row.curves.approach
         curves.plot(approach, found.force, label=row.name, **look)
         if measure is not None:
@@ -65,18 +71,19 @@ def curves_figure(comparison: Comparison) -> Figure:
     bar = 100.0 * getattr(comparison.uncertainty, f"{response}_max")
     if np.isfinite(bar):
         differences.axhspan(-bar, bar, **ERROR_BAND)
-    curves.set(xlabel="approach [µm]", ylabel="force [N]")
+    rows = [row.curves for row in selected_rows(comparison)]
+    show_unit(curves.xaxis, "approach", "mm", [row.approach.max() for row in rows], 1e-3)
+    show_unit(curves.yaxis, "force", "N", [row.force.max() for row in rows])
     differences.set(
         xlabel="approach [µm]" if by_approach else "force [N]",
         ylabel=f"{response} minus that of the measure [% of its largest]",
     )
-    for axes in (curves, differences):
-        axes.grid(alpha=0.3)
     entries = curves.get_legend_handles_labels()
-    below.legend(*entries, loc="center", ncol=2, frameon=False, fontsize=8.5)
+    below.legend(*entries, loc="center", ncol=2)
     return figure
 
 
+@styled()
 def maps_figure(comparison: Comparison) -> Figure:
     """Draw pressures at the last load step side by side: on the same patches, on one scale.
 
@@ -89,15 +96,18 @@ def maps_figure(comparison: Comparison) -> Figure:
         on_grid(row.curves.patch_pressure[-1], row.curves.patches, comparison.grid) for row in shown
     ]
     down = 1 + (len(shown) > 3)
-    figure = new_figure(12.5, 3.9 * down)
+    figure = new_figure(FULL_WIDTH, 2.4 * down)
     panels = figure.subplots(down, 3, squeeze=False).ravel()
     top = max((float(pressure.max()) for pressure in pressures), default=1.0)
     for axes, row, pressure in zip(panels, shown, pressures, strict=False):
-        image = draw_pressures(figure, axes, comparison.grid, pressure, top=top)
+        image = draw_pressures(axes, comparison.grid, pressure, top=top, label="")
         title = row.name + " (measure)" * row.is_measure
-        axes.set_title(title.replace(", ", "\n", 1), fontsize=8.5)
-    for axes in panels:
-        axes.axis("off")
-    if shown:
-        figure.colorbar(image, ax=list(panels), label=PRESSURE_LABEL, shrink=0.8)
+        axes.set_title(title.replace(", ", "\n", 1), fontsize=7)
+    for index, axes in enumerate(panels):
+        axes.set(xlabel="", ylabel="", xticks=[], yticks=[])
+        if index >= len(shown):
+            axes.axis("off")
+        elif index % 3 == 2 or index == len(shown) - 1:
+            unit, _ = usual_unit([top], "MPa")
+            colour_bar(image, axes, f"mean pressure of the patch [{unit}]")
     return figure

@@ -23,7 +23,7 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
-from multiscale.readable import Observer
+from multiscale.readable import Detail, Observer, percent
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
@@ -285,15 +285,16 @@ def approximation_notes(
         steps: The load steps.
     """
     if setup.choice is not None:
-        yield f"micro model chosen: {setup.choice.sentence}"
+        yield Detail(f"micro model chosen: {setup.choice.sentence}")
     if table is not None:
         yield from table.notes(setup.table_tolerance)
         planned, taken = newton_choice(setup), newton_choice(setup, table)
         if taken.condensed != planned.condensed:
-            yield f"Newton condensed to the patches, not full: {taken.why}"
+            yield Detail(f"Newton condensed to the patches, not full: {taken.why}")
     imbalances = [abs(step.imbalance) for step in steps if step.imbalance is not None]
     if imbalances:
-        yield f"force against the support's reaction: equal to {max(imbalances):.1e}"
+        equal = percent(max(imbalances))
+        yield Detail(f"force against the support's reaction: equal to {equal}")
     yield from range_notes(steps, table)
 
 

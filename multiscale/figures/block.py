@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import LightSource, ListedColormap, Normalize, PowerNorm
+from matplotlib.colors import LightSource, Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
@@ -15,11 +14,10 @@ from numpy.typing import NDArray
 from geometry import Surface
 from geometry.materials import von_mises
 from micro.half_space.stresses_below import stresses_below
+from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
 
 Array = NDArray[np.float64]
 
-_PRESSURES = ListedColormap(colormaps["YlOrRd"](np.linspace(0.2, 1.0, 256)))
-_STRESSES = colormaps["GnBu"]
 _TURN, _ELEVATION = np.radians(24.0), np.radians(32.0)
 _MOST_CELLS = 256
 """Cells a side that are drawn; of more, the mean height and the largest pressure are shown."""
@@ -29,6 +27,7 @@ _RELIEF = 0.12
 """Height of the drawn relief over the shorter side, which the heights are exaggerated to."""
 
 
+@styled()
 def block_figure(
     surface: Surface, pressure: Array, poisson_ratio: float, *, title: str = ""
 ) -> Figure:
@@ -43,7 +42,8 @@ def block_figure(
         title: What the figure shows.
     """
     view = BlockView(surface, pressure, poisson_ratio)
-    figure = Figure(figsize=(7.6, 4.9), dpi=200)
+    figure = new_figure(FULL_WIDTH, 4.65)
+    figure.set_layout_engine("none")  # axes are placed by hand
     axes = figure.add_axes((0.01, 0.0, 0.83, 0.93))
     axes.set_aspect("equal")
     axes.axis("off")
@@ -52,13 +52,13 @@ def block_figure(
     view.draw_top(axes)
     view.draw_edges(axes)
     for at, scale, colours, label in (
-        (0.56, view.pressures, _PRESSURES, "contact pressure [MPa]"),
-        (0.10, view.stresses, _STRESSES, "von Mises stress on the cut [MPa]"),
+        (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
+        (0.10, view.stresses, STRESSES, "von Mises stress [MPa]"),
     ):
         bar = figure.add_axes((0.86, at, 0.02, 0.32))
-        figure.colorbar(ScalarMappable(scale, colours), cax=bar).set_label(label, fontsize=8)
-        bar.tick_params(labelsize=7)
-    figure.text(0.03, 0.95, title, fontsize=10)
+        bar.grid(False)
+        figure.colorbar(ScalarMappable(scale, colours), cax=bar).set_label(label)
+    figure.text(0.03, 0.95, title, fontsize=9)
     times = view.exaggeration
     drawn = "to scale" if times == 1.0 else f"heights exaggerated {times:g} times"
     said = f"cut along the row that carries most, half-space stresses; undeformed, {drawn}"
@@ -122,7 +122,7 @@ class BlockView:
         grey = 0.45 + 0.5 * shade
         colour = np.stack([grey, grey, grey * 0.98, np.ones_like(grey)], axis=-1)
         loaded = self.pressure > 0.0
-        colour[loaded] = _PRESSURES(self.pressures(self.pressure[loaded]))
+        colour[loaded] = PRESSURES(self.pressures(self.pressure[loaded]))
         self._draw(axes, self.x[:, None], y, self.relief, colour)
 
     def draw_cut(self, axes: Any) -> None:
@@ -133,7 +133,7 @@ class BlockView:
         top = np.interp(x, self.x, self.relief[:, 0])
         places = self.seen(x[:, None], self.y[self.row], -self.layers + top[:, None] * share)
         mesh = axes.pcolormesh(
-            *np.broadcast_arrays(*places), self.stress, cmap=_STRESSES, norm=self.stresses,
+            *np.broadcast_arrays(*places), self.stress, cmap=STRESSES, norm=self.stresses,
             shading="gouraud",
         )  # fmt: skip
         mesh.set_rasterized(True)

@@ -7,12 +7,21 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+from multiscale.figures.style import (
+    BLUE,
+    COLOURS,
+    FULL_WIDTH,
+    add_legend,
+    new_figure,
+    show_unit,
+    styled,
+)
 
 MOST_MARKED = 500
 """Load steps that have a symbol each; more of them are drawn as lines alone."""
 
 
+@styled()
 def history_figure(history: Any, kind: str) -> Figure:
     """Draw force, contact area and mean separation of a run.
 
@@ -20,12 +29,12 @@ def history_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History`.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    figure = new_figure(11.0, 3.6)
+    figure = new_figure(FULL_WIDTH, 2.4)
     force, area, gap = figure.subplots(1, 3)
-    colour = COLOURS.get(kind, COLOURS["analytic"])
+    colour = COLOURS.get(kind, BLUE)
     look: dict[str, Any] = {"color": colour, "label": kind}
     if len(history) <= MOST_MARKED:
-        look |= {"marker": "o", "ms": 3.5}
+        look |= {"marker": "o", "ms": 3.0}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at zero approach of the middle.
     level = not any(any(step.tilt) for step in history.steps)
@@ -35,10 +44,12 @@ def history_figure(history: Any, kind: str) -> Figure:
     gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
-    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
-    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
-    gap.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]")
-    add_grid_and_legend(figure)
+    area.set(ylabel="contact area fraction [%]")
+    for axis in (force.yaxis, area.xaxis, gap.yaxis):
+        show_unit(axis, "mean pressure", "MPa", history.mean_pressure_MPa)
+    show_unit(force.xaxis, "approach", "mm", history.approach_mm, 1e-3)
+    show_unit(gap.xaxis, "mean separation", "mm", history.mean_separation_mm, 1e-3)
+    add_legend(figure)
     return figure
 
 

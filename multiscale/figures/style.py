@@ -1,54 +1,178 @@
-"""The style of all figures: colours, markers, grid, legend."""
+"""The style of all figures: palette, sizes, fonts, and how they are written.
+
+Functions that draw are decorated by ``@styled()``; scripts call `use_style` once. All figures are
+made by `new_figure`, in one of two widths, and written by `save`.
+"""
 
 from __future__ import annotations
 
-from typing import Any
+from contextlib import AbstractContextManager, ContextDecorator
+from io import BytesIO
+from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
+from matplotlib import colormaps, cycler, rc_context, rcParams
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
+from multiscale.readable import number, usual_unit
+
+BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
+PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"
+"""Colours of Okabe and Ito (2008), which people who confuse red and green tell apart, and greys."""
+
+PALETTE = (BLUE, VERMILLION, GREEN, ORANGE, PURPLE, SKY, INK)
+"""Colours of curves without a meaning of their own, in their order."""
+
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
-COLOURS = dict(zip(KINDS, ("#0b3c5d", "#d1495b", "#1b998b", "#edae49", "#6a4c93"), strict=True))
+COLOURS = dict(zip(KINDS, (SKY, VERMILLION, GREEN, BLUE, INK), strict=True))
 """Colour of each coupling."""
 
 MARKERS = dict(zip(KINDS, "osD^*", strict=True))
 """Marker of each coupling."""
 
+MODELS: dict[str, dict[str, Any]] = {
+    "half-space": {"color": BLUE, "ls": "-", "marker": "^"},
+    "islands": {"color": GREEN, "ls": "-", "marker": "D"},
+    "elliptic": {"color": VERMILLION, "ls": "-", "marker": "s"},
+    "circular": {"color": ORANGE, "ls": "-", "marker": "o"},
+    "elliptic-independent": {"color": VERMILLION, "ls": "--", "marker": "s", "mfc": "white"},
+    "circular-independent": {"color": ORANGE, "ls": "--", "marker": "o", "mfc": "white"},
+}
+"""Look of each micro model; those without interaction are dashed, with hollow markers."""
+
 LINE_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
 """Line styles of curves that are drawn over each other."""
+
+HEIGHTS = colormaps["cividis"]
+"""Colours of heights."""
+PRESSURES = ListedColormap(colormaps["YlOrRd"](np.linspace(0.12, 1.0, 256)), name="pressures")
+"""Colours of contact pressures, from pale yellow; what carries none is `NO_CONTACT`."""
+GAPS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.85, 256)), name="gaps")
+"""Colours of gaps, white where the sides nearly touch."""
+STRESSES = colormaps["GnBu"]
+"""Colours of stresses inside a body."""
+NO_CONTACT = "white"
+"""Colour of open patches and of what bears no pressure."""
 
 ERROR_BAND = {"color": "#e8eaed", "zorder": 0}
 """Look of the band within an error bar, behind everything else."""
 
-PRESSURE_LABEL = "mean pressure of the patch [MPa]"
-"""Label of the colour bars of pressure maps."""
+ONE_COLUMN, FULL_WIDTH = 3.5, 7.2
+"""Widths of figures [inch]: of one column of a paper, and of its page."""
+
+DOTS_PER_INCH = 200
+"""Resolution of PNG files."""
+
+STYLE: dict[str, Any] = {
+    "font.size": 8.0, "axes.titlesize": 8.5, "axes.labelsize": 8.0, "legend.fontsize": 7.5,
+    "xtick.labelsize": 7.5, "ytick.labelsize": 7.5, "figure.titlesize": 9.0,
+    "axes.prop_cycle": cycler(color=PALETTE), "text.color": INK, "axes.labelcolor": INK,
+    "axes.edgecolor": "0.35", "xtick.color": "0.35", "ytick.color": "0.35",
+    "xtick.labelcolor": INK, "ytick.labelcolor": INK,
+    "axes.linewidth": 0.7, "xtick.major.width": 0.7, "ytick.major.width": 0.7,
+    "axes.spines.top": False, "axes.spines.right": False,
+    "axes.grid": True, "axes.axisbelow": True, "grid.color": "0.88", "grid.linewidth": 0.6,
+    "lines.linewidth": 1.4, "lines.markersize": 4.0, "legend.frameon": False,
+    "image.interpolation": "nearest", "image.cmap": "cividis",
+    "savefig.dpi": DOTS_PER_INCH, "svg.hashsalt": "patchlaw", "pdf.fonttype": 42,
+}  # fmt: skip
+"""Parameters of matplotlib, as ``matplotlib.rcParams`` has them."""
+
+
+def styled() -> Any:
+    """Return a decorator, or context, in which matplotlib draws in this style."""
+    return cast("AbstractContextManager[None] | ContextDecorator", rc_context(STYLE))
+
+
+def use_style() -> None:
+    """Draw in this style from now on; for scripts, which own matplotlib's parameters."""
+    rcParams.update(STYLE)
+
+
+class StyledFigure(Figure):
+    """A figure that is laid out and written in this style, whoever draws it."""
+
+    def draw(self, renderer: Any) -> None:
+        """Draw the figure."""
+        with styled():
+            super().draw(renderer)
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Write the figure, by default in `DOTS_PER_INCH`."""
+        with styled():
+            super().savefig(fname, **options)
 
 
 def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure, which shares no global state of matplotlib.
 
     Args:
-        width: Width [inch].
+        width: Width [inch], `ONE_COLUMN` or `FULL_WIDTH`.
         height: Height [inch].
     """
-    return Figure(figsize=(width, height), layout="constrained")
+    return StyledFigure(figsize=(width, height), layout="constrained")
 
 
-def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
-    """Return the unit of x and y on maps, µm below 1 mm, and its number in a mm.
+def encoded(figure: Figure) -> dict[str, bytes]:
+    """Return a figure as the content of a PNG and of an SVG file; equal figures give equal bytes.
+
+    Both have one layout, which the figure keeps from then on.
 
     Args:
-        lengths: Sides of the map [mm].
+        figure: The figure.
+
+    Returns:
+        The contents by kind, ``"png"`` with `DOTS_PER_INCH` and ``"svg"``.
     """
-    return (1e3, "µm") if max(lengths) < 1.0 else (1.0, "mm")
+    found = {}
+    for kind, metadata in (("png", {}), ("svg", {"Date": None})):
+        content = BytesIO()
+        with styled():
+            figure.savefig(content, format=kind, dpi=DOTS_PER_INCH, metadata=metadata)
+        figure.set_layout_engine("none")  # a second layout would take as long as the drawing
+        found[kind] = content.getvalue()
+    return found
 
 
-def add_grid_and_legend(figure: Figure) -> None:
-    """Draw a grid in every panel, and a legend in the first when it has more than one line."""
-    for axes in figure.axes:
-        axes.grid(alpha=0.3)
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG, and as SVG beside it; for scripts.
+
+    Args:
+        figure: The figure.
+        path: The PNG file; its folder is made when missing.
+
+    Returns:
+        The PNG file.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for kind, content in encoded(figure).items():
+        path.with_suffix(f".{kind}").write_bytes(content)
+    return path
+
+
+def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) -> None:
+    """Label an axis in the unit that suits its values, whatever unit they are drawn in.
+
+    Args:
+        axis: The x or y axis.
+        text: What it shows, without the unit.
+        unit: Unit of the values, mm, N or MPa.
+        values: The values.
+        drawn: Size of the unit that they are drawn in.
+    """
+    name, size = usual_unit(np.ravel(values).tolist(), unit)
+    axis.set_label_text(f"{text} [{name}]")
+    if size != drawn:
+        axis.set_major_formatter(lambda place, _: number(place * drawn / size))
+
+
+def add_legend(figure: Figure) -> None:
+    """Draw a legend in the first panel when it has more than one line."""
     first = figure.axes[0]
     if len(first.get_legend_handles_labels()[0]) > 1:
-        first.legend(frameon=False)
+        first.legend()
 
 
 def panels_above_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:

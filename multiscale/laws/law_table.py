@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import PlanePath
+from multiscale.readable import Caution, Detail, number, percent, quantity
 
 Array = NDArray[np.float64]
 
@@ -76,22 +77,22 @@ class LawTable:
             tolerance: Error of the force that was asked for.
         """
         largest = max(law.interpolation_error for law in self.laws)
-        yield (
-            f"interpolation error of the laws between their rows: {self.force_error:.1e} of the "
-            f"force, {largest:.1e} of a patch's pressure or the mean, if more"
+        yield Detail(
+            f"interpolation error of the laws between their rows: {percent(self.force_error)} of "
+            f"the force, {percent(largest)} of a patch's pressure or the mean, if more"
         )
         reached = max(self.force_error, largest / PATCH_FACTOR)
         if reached > tolerance:
-            yield (
+            yield Caution(
                 f"the laws miss coupling.table_tolerance = {tolerance:g} with all the rows that "
-                f"are solved at most; what they reach is a tolerance of {reached:.1e}"
+                f"are solved at most; what they reach is a tolerance of {number(reached, 2)}"
             )
         changes = [law.repaired for law in self.laws if law.repaired > _REPORTED_REPAIR]
         if changes:
-            yield (
+            yield Detail(
                 f"monotone repair: in the laws of {len(changes)} of {len(self.laws)} patches "
                 "pressure or closure fell as the plane came nearer; evened out, by up to "
-                f"{max(changes):.1e} of their largest"
+                f"{percent(max(changes))} of their largest"
             )
         if isinstance(self.patches, Regions):
             yield from filter(None, map(_scatter_note, self.patches.names, self.laws))
@@ -120,8 +121,8 @@ def _scatter_note(region: str, law: PatchLaw) -> str | None:
         row = int(np.searchsorted(rows.pressure, share * rows.pressure[-1]))
         scatter, stiffness = rows.pressure_scatter[row], law.along(rows.approach[row]).stiffness
         found.append(
-            f"{scatter / rows.pressure[row]:.1%} at {rows.pressure[row]:.3g} MPa "
-            f"({1e3 * scatter / float(stiffness):.2g} µm of closure)"
+            f"{scatter / rows.pressure[row]:.1%} at {quantity(rows.pressure[row], 'MPa', 3)} "
+            f"({quantity(scatter / float(stiffness), 'mm', 2)} of closure)"
         )
     return (
         f"{region}: the pressure of single samples scatters about that of their mean by "

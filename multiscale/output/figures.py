@@ -1,133 +1,103 @@
-"""Figures of a run: surface, pressure maps, laws, the block in contact."""
+"""The figures of a run: each from its results, in the style of `multiscale.figures`."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
-from geometry.surface import Surface
 from multiscale.figures.block import block_figure
-from multiscale.figures.style import PRESSURE_LABEL, add_grid_and_legend, map_unit, new_figure
+from multiscale.figures.contact import draw_contact
+from multiscale.figures.maps import colour_bar, draw_pressures, map_axes, place_colours
+from multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    NO_CONTACT,
+    ONE_COLUMN,
+    PALETTE,
+    PRESSURES,
+    new_figure,
+    show_unit,
+    styled,
+)
+from multiscale.figures.surface import draw_surface, surface_figure
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import quantity, usual_unit
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 
-MOST_NUMBERED_PATCHES = 100
-"""A map of more patches shows colours alone; the numbers would cover each other."""
-
 MOST_POINTS = 40_000
 """Points of a face that are drawn at most."""
 
-
-def surface_figure(surface: Surface, asperities: Asperities | None, patches: PatchGrid) -> Figure:
-    """Draw heights above the mean plane with summits, border maxima and patch borders.
-
-    Args:
-        surface: The heights.
-        asperities: The summits of the surface; None leaves them out.
-        patches: The partition of the interface.
-    """
-    figure = new_figure(6.4, 5.4)
-    draw_surface(figure, figure.add_subplot(), surface, asperities, patches)
-    return figure
+MOST_MARKED_LAWS = 36
+"""Laws whose rows are marked; the dots of more would hide the curves."""
 
 
-def draw_surface(
-    figure: Figure,
-    axes: Any,
-    surface: Surface,
-    asperities: Asperities | None,
-    patches: PatchGrid,
-) -> None:
-    """Draw one surface into given axes.
+def surface_figure_of(setup: ProblemSetup) -> Figure:
+    """Draw the surface of a scene, with its summits where the micro model uses them.
 
     Args:
-        figure: The figure of the axes; a colour bar is added to it.
-        axes: Axes to draw into.
-        surface: The heights.
-        asperities: The summits of the surface; None leaves them out.
-        patches: The partition of the interface.
+        setup: The problem set up from the scene.
     """
-    scale, unit = map_unit(surface.lengths)
-    heights = 1e3 * (surface.heights - surface.mean_height).T
-    extent = (0, scale * surface.lengths[0], 0, scale * surface.lengths[1])
-    image = axes.imshow(heights, origin="lower", extent=extent, cmap="cividis")
-    figure.colorbar(image, ax=axes, label="height over the mean plane [µm]")
-    _draw_patch_borders(axes, patches, colour="white")
-    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
-    title = f"{patches.grid[0]} × {patches.grid[1]} patches"
-    if asperities is None:
-        axes.set_title(f"{heights.shape[1]} × {heights.shape[0]} heights, {title}")
-        return
-    summits: dict[str, Any] = {"marker": "o", "ms": 5, "mfc": "#d1495b", "mec": "white"}
-    cut: dict[str, Any] = {"marker": "x", "ms": 6, "color": "black"}
-    for x, y, look, label in (
-        (asperities.x, asperities.y, summits, "summits"),
-        (asperities.border_x, asperities.border_y, cut, "border maxima (unused)"),
-    ):
-        if x.size:
-            axes.plot(scale * x, scale * y, ls="none", label=label, clip_on=False, **look)
-    axes.set_title(f"{len(asperities)} summits, {title}")
-    if len(asperities) or asperities.border_x.size:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncol=2, frameon=False)
+    summits = setup.asperities if setup.uses_summits else None
+    target = setup.scene.surface.spectrum
+    return surface_figure(setup.surface, summits, setup.patches, target)
 
 
+@styled()
 def pressure_figure(history: History) -> Figure:
     """Draw the patch pressures of the last load step as a map, with their values."""
-    figure = new_figure(5.6, 4.8)
+    figure = new_figure(ONE_COLUMN, 2.9)
     axes = figure.add_subplot()
-    last, record = history.steps[-1], history.reference
+    last = history.steps[-1]
     assert isinstance(history.patches, PatchGrid)
-    draw_pressures(figure, axes, history.patches, last.patches.pressure_MPa)
-    error = "" if record is None else f" ({record.label})"
-    axes.set_title(f"approach {1e3 * last.approach_mm:.3g} µm, force {last.force_N:.4g} N{error}")
+    draw_pressures(axes, history.patches, last.patches.pressure_MPa)
+    bar = f" ({history.reference.label})" if history.reference else ""
+    axes.set_title(load_text(last) + bar)
     return figure
 
 
-def draw_pressures(
-    figure: Figure,
-    axes: Any,
-    patches: PatchGrid,
-    pressure: NDArray[np.float64],
-    *,
-    top: float | None = None,
-) -> Any:
-    """Draw one map of patch pressures into given axes.
+def load_text(step: LoadStep) -> str:
+    """Return approach and force of a load step, as titles say them."""
+    return f"approach {quantity(step.approach_mm, 'mm')}, force {quantity(step.force_N, 'N')}"
+
+
+@styled()
+def overview_figure(
+    setup: ProblemSetup, history: History, face: NDArray[np.float64] | None
+) -> Figure:
+    """Draw the surface beside the pressures on it: of cells, spots, the face or patches.
 
     Args:
-        figure: The figure of the axes; a colour bar is added to it unless `top` is given.
-        axes: Axes to draw into.
-        patches: The partition of the interface.
-        pressure: Mean pressure of each patch, shape (N,) [MPa].
-        top: End of the colour scale, for maps that share one [MPa].
-
-    Returns:
-        The map, for a colour bar.
+        setup: The problem set up from the scene.
+        history: The load steps.
+        face: Pressures on a face with laws of samples, see `face_figure`; None without.
     """
-    values, (scale, unit) = pressure.reshape(patches.grid), map_unit(patches.lengths)
-    borders = scale * patches.borders_x, scale * patches.borders_y
-    image = axes.pcolormesh(*borders, values.T, cmap="magma_r", vmin=0.0, vmax=top)
-    if top is None:
-        figure.colorbar(image, ax=axes, label=PRESSURE_LABEL)
-    _draw_patch_borders(axes, patches, colour="0.7")
-    if patches.count <= MOST_NUMBERED_PATCHES:
-        dark = 0.55 * max(top or values.max(), 1e-300)
-        for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
-            number = f"{value:.2g}" if value < 100.0 else f"{value:.0f}"
-            text = number if value > 0.0 else "open"
-            colour = "white" if value > dark else "black"
-            axes.text(x, y, text, ha="center", va="center", color=colour)
-    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")
-    return image
+    figure = new_figure(FULL_WIDTH, 2.8)
+    left, right = figure.subplots(1, 2)
+    draw_surface(left, setup.surface, None)
+    left.set_title("surface" + " of a sample" * bool(setup.samples))
+    record, last = history.contact, history.steps[-1]
+    if record is not None:
+        draw_contact(right, record)
+    elif face is not None:
+        draw_face(right, face)
+        right.set_title("contact pressure, averaged over the roughness")
+    elif isinstance(history.patches, PatchGrid):
+        draw_pressures(right, history.patches, last.patches.pressure_MPa)
+        right.set_title("mean pressure of every patch; open ones white")
+    else:
+        right.axis("off")
+    return figure
 
 
+@styled()
 def face_figure(points: NDArray[np.float64], step: LoadStep) -> Figure:
     """Draw the pressures on a contact face of any outline at a load step.
 
@@ -135,19 +105,37 @@ def face_figure(points: NDArray[np.float64], step: LoadStep) -> Figure:
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
         step: The load step.
     """
-    figure = new_figure(6.4, 4.8)
+    figure = new_figure(FULL_WIDTH, 4.2)
     axes = figure.add_subplot()
-    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
-    scale, unit = map_unit((float(np.ptp(x)), float(np.ptp(y))))
-    size = max(1.0, 5e4 / len(x))
-    dots = axes.scatter(scale * x, scale * y, size, pressure, marker="s", lw=0, cmap="magma_r")
-    figure.colorbar(dots, ax=axes, label="pressure [MPa]")
-    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]", aspect="equal")
-    axes.set_title(
-        f"approach {1e3 * step.approach_mm:.3g} µm, force {step.force_N:.4g} N, "
-        f"mean pressure {step.mean_pressure_MPa:.3g} MPa"
-    )
+    draw_face(axes, points)
+    mean = quantity(step.mean_pressure_MPa, "MPa", 3)
+    axes.set_title(f"{load_text(step)}, mean pressure {mean}")
     return figure
+
+
+def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
+    """Draw the pressures on a contact face of any outline.
+
+    What bears no pressure is pale grey, so that the outline is seen.
+
+    Args:
+        axes: Axes to draw into.
+        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+    """
+    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
+    lengths = float(np.ptp(x)), float(np.ptp(y))
+    scale = map_axes(axes, lengths)
+    axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
+    inches = axes.get_position().width * axes.figure.get_figwidth()
+    size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
+    look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
+    loaded = pressure > 0.0
+    axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
+    place = scale * x[loaded], scale * y[loaded]
+    name, unit = usual_unit([float(pressure.max())], "MPa")
+    dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)
+    dots.set_clim(0.0, float(pressure.max()) / unit or 1.0)
+    colour_bar(dots, axes, f"contact pressure [{name}]")
 
 
 def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
@@ -159,32 +147,69 @@ def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
     """
     pressure = np.asarray(record.pressure_MPa)
     title = (
-        f"load step {record.step}: approach {1e3 * record.approach_mm:.3g} µm, "
-        f"force {record.force_N:.4g} N, {len(record.spots)} spots"
+        f"load step {record.step}: approach {quantity(record.approach_mm, 'mm')}, "
+        f"force {quantity(record.force_N, 'N')}, {len(record.spots)} spots"
     )
     poisson_ratio = setup.materials.first.poisson_ratio
     return block_figure(setup.surface, pressure, poisson_ratio, title=title)
 
 
+@styled()
 def law_figure(table: LawTable) -> Figure:
-    """Draw pressure and area fraction of every patch law over closure, with the table's rows."""
-    figure = new_figure(9.0, 3.8)
-    pressure, area = figure.subplots(1, 2)
-    closing = [law for law in table.laws if not law.is_open]
-    for law in closing:
+    """Draw pressure and area fraction of every law over closure, coloured by place on the face.
+
+    Args:
+        table: The laws of patches, with a key of their colours, or of regions, with their names.
+    """
+    figure = new_figure(FULL_WIDTH, 2.7)
+    on_grid = isinstance(table.patches, PatchGrid) and table.patches.count > 1
+    pressure, area, *key = figure.subplots(1, 2 + on_grid)
+    colours, names = _law_colours(table)
+    closing = [index for index, law in enumerate(table.laws) if not law.is_open]
+    few = len(closing) <= MOST_MARKED_LAWS
+    for index in closing:
+        law, look = table.laws[index], {"color": colours[index], "lw": 1.2 if few else 0.6}
         closure = np.linspace(*law.range, 200)
-        (line,) = pressure.plot(1e3 * closure, law.at(closure).pressure, lw=1.2)
-        pressure.plot(1e3 * law.rows.closure, law.rows.pressure, ".", ms=3, color=line.get_color())
-        area.plot(1e3 * closure, 100 * law.at(closure).contact_area_fraction, lw=1.2)
-    pressure.set(xlabel="closure [µm]", ylabel="mean pressure of the patch [MPa]")
-    area.set(xlabel="closure [µm]", ylabel="contact area fraction [%]")
-    add_grid_and_legend(figure)
-    figure.suptitle(f"{len(closing)} patch laws of {len(table.laws)} patches (dots: table rows)")
+        pressure.plot(1e3 * closure, law.at(closure).pressure, label=names[index], **look)
+        area.plot(1e3 * closure, 100 * law.at(closure).contact_area_fraction, **look)
+        if few:
+            dots = 1e3 * law.rows.closure, law.rows.pressure
+            pressure.plot(*dots, ".", ms=3, color=colours[index])
+    ends = [table.laws[index].range[1] for index in closing]
+    tops = [table.laws[index].rows.pressure[-1] for index in closing]
+    area.set(ylabel="contact area fraction [%]")
+    show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
+    for axes in (pressure, area):
+        show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
+    if key:
+        _draw_places(key[0], table, colours)
+    elif len(closing) > 1:
+        pressure.legend()
+    what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
+    rows = "; dots are their rows" if few else ""
+    figure.suptitle(f"laws of {len(closing)} of {table.patches.count} {what}{rows}")
     return figure
 
 
-def _draw_patch_borders(axes: Any, patches: PatchGrid, colour: str) -> None:
-    scale, _ = map_unit(patches.lengths)
-    for draw, borders in ((axes.axvline, patches.borders_x), (axes.axhline, patches.borders_y)):
-        for border in borders[1:-1]:
-            draw(scale * border, color=colour, lw=0.8, alpha=0.9)
+def _law_colours(table: LawTable) -> tuple[Any, list[str]]:
+    """Return the colour of each law, by its place on the face or its region, and its name."""
+    patches = table.patches
+    if not isinstance(patches, PatchGrid):
+        return [PALETTE[i % len(PALETTE)] for i in range(patches.count)], list(patches.names)
+    if patches.count == 1:
+        return [BLUE], [""]
+    return place_colours(patches.centres / np.array(patches.lengths)), [""] * patches.count
+
+
+def _draw_places(axes: Any, table: LawTable, colours: Any) -> None:
+    """Draw the face with its patches in the colours of their laws; open ones are white."""
+    patches = table.grid
+    scale = map_axes(axes, patches.lengths)
+    is_open = np.array([law.is_open for law in table.laws])
+    shown = np.where(is_open[:, None], np.array(to_rgb(NO_CONTACT)), colours)
+    borders = scale * patches.borders_x, scale * patches.borders_y
+    mesh = axes.pcolormesh(*borders, np.zeros(patches.grid[::-1]))
+    mesh.set_array(None)
+    by_rows = shown.reshape(*patches.grid, 3).swapaxes(0, 1).reshape(-1, 3)
+    mesh.set(facecolor=by_rows, edgecolor="0.8", linewidth=0.4)
+    axes.set_title("colours by place; open: white")

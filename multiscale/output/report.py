@@ -1,181 +1,121 @@
-"""What a run says of itself: a report to read, and its provenance for programs."""
+"""The report of a run: its results, then its pictures, inputs and, folded, the solver's work."""
 
 from __future__ import annotations
 
 import os
-import platform
-import sys
-from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
-from typing import Any
+from importlib.metadata import version
 
-from pydantic_core import to_jsonable_python
-
-from multiscale.couplings.reference import ReferenceCoupling
+from geometry.patches import PatchGrid
 from multiscale.loading.load_step import LoadStep
-from multiscale.machine import peak_memory
+from multiscale.output.citation import citations
+from multiscale.output.provenance import library_versions
 from multiscale.planning import plan
-from multiscale.readable import quantity
-from multiscale.results.history import History, with_error
+from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
 from multiscale.run import Run
-from multiscale.setup.mesh_bodies import FaceFacts
 from multiscale.setup.problem import ProblemSetup
 
-LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
-"""Libraries whose versions are recorded."""
+_OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
+"""Topics of the plan that say what was computed; the others say how, and are folded."""
+
+_MORE = {
+    "stiffness_N_per_mm": ("interfacial stiffness", "N/mm"),
+    "plastic_depth_mm": ("plastic depth", "mm"),
+    "thermal_conductance_W_per_K": ("thermal conductance", "W/K"),
+    "electrical_conductance_S": ("electrical conductance", "S"),
+}
+"""What some runs know of their load steps: attribute, name and unit."""
 
 
-def report_html(run: Run, pictures: Mapping[str, bytes]) -> str:
+def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) -> str:
     """Return the report of a run: a complete HTML document that needs no network.
 
     Args:
         run: The run, finished or stopped.
-        pictures: PNG images by name, see `multiscale.output.results.write_results`.
+        pictures: Files of the figures by name, see `multiscale.output.results.pictures_of`.
+        options: PETSc options given by the user.
     """
-    history = run.history()
+    history, setup = run.history(), run.setup
+    statements = dict(plan.statements(setup))
+    folded = [(topic, text) for topic, text in statements.items() if topic not in _OF_INPUTS]
+    cautions = [note for note in history.notes if isinstance(note, Caution)]
     return filled(
         "output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
-        headline=f"{_headline(history)} {plan.inputs_statement(run.setup)}.",
-        warnings=list(plan.warnings(run.setup)),
-        statements=list(plan.statements(run.setup)),
         history=history,
+        results=list(results(history.steps[-1], setup, run)) if len(history) else [],
+        reference=history.reference.sentence if history.reference else "",
+        finished=run.finished,
+        warnings=[*cautions, *plan.warnings(setup)],
+        notes=[note for note in history.notes if not isinstance(note, Caution | Detail)],
+        details=[note for note in history.notes if isinstance(note, Detail)],
+        inputs=[
+            *_inputs(setup),
+            *((name, statements[name]) for name in _OF_INPUTS[1:] if name in statements),
+        ],
+        folded=[pair for pair in folded if pair[0] != "inputs"],
         measured=next((step for step in reversed(history.steps) if step.errors), None),
         pictures=pictures,
+        made=_made(run, options),
+        citations=citations(),
+        percent=percent,
+        quantity=quantity,
     )
 
 
-def _headline(history: History) -> str:
-    if not len(history):
-        return "No load step was accepted."
-    last, record = history.steps[-1], history.reference
-    error = "" if record is None else f" Discretisation error: {record.label}."
-    approach = History.approach_mm.text(last)
-    force = with_error(last.force_N, last.force_error_N, shown=".5g")
-    return (
-        f"At an approach of {approach} µm the plane carries {force} N "
-        f"({last.mean_pressure_MPa:.4g} MPa) on {last.contacts} contacts covering "
-        f"{100 * last.contact_area_fraction:.3g} % of the nominal area{_peak(last)}.{error}"
-    )
-
-
-def _peak(step: LoadStep) -> str:
-    """Say the largest pressure and the stiffness of a load step, as far as they are known."""
-    text = ""
-    if step.peak_pressure_MPa:
-        text += f", with pressures up to {quantity(step.peak_pressure_MPa, 'MPa')}"
-    if step.stiffness_N_per_mm:
-        text += f"; its interfacial stiffness is {quantity(step.stiffness_N_per_mm, 'N')}/mm"
-    return text
-
-
-def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
-    """Collect versions, scene, options, times and convergence of a run.
+def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str, str, str]]:
+    """Yield name, value and a remark of what a run found at its last load step.
 
     Args:
-        run: The run, finished or stopped.
-        options: PETSc options given by the user.
-
-    Returns:
-        A dictionary that JSON can hold; what is unknown or infinite is None.
+        last: The load step.
+        setup: The problem set up from the scene.
+        run: The run.
     """
-    history, setup = run.history(), run.setup
-    content = {
-        "patchlaw": version("patchlaw"),
-        "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "scene_file": run.scene.file,
-        "scene": run.scene,
-        "scene_given": run.given,
-        "units": "mm, N, MPa",
-        "surface": {
-            "source": setup.surface.source,
-            "notes": list(setup.surface.notes),
-            "lengths_mm": list(setup.surface.lengths),
-            "heights_sha256": run.heights,
-            "highest_mm": setup.surface.highest,
-            "summits": setup.asperities.count,
-            "summits_in_reach": int(setup.interfering_summits.sum()),
-            "border_maxima_in_reach": setup.interfering_border_maxima,
-        },
-        "patches": None if setup.samples else list(setup.patches.grid),
-        "regions": list(setup.regions.names) if setup.regions else None,
-        "bodies": [_body(face) for face in (setup.face, setup.counter_face) if face is not None],
-        "contact_modulus_MPa": setup.materials.contact_modulus,
-        "micro_model": _micro_model(setup),
-        "ranks": 1 if run.comm is None else run.comm.size,
-        "threads": os.environ.get("OMP_NUM_THREADS"),
-        "petsc_options": options,
-        "unknowns": run.unknowns,
-        "reference": _reference(run),
-        "seconds": history.seconds,
-        "memory_bytes": peak_memory(),
-        "errors_N": [dict(step.errors) for step in history],
-        "decision": setup.decision and {**asdict(setup.decision), "kept": setup.decision.kept},
-        "steps": len(history),
-        "finished": run.finished,
-        "contacts": [{"step": record.step, "spots": len(record.spots)} for record in run.contacts],
-        "reasons": sorted({step.reason for step in history}),
-        "notes": list(history.notes),
-        "versions": _versions(),
-        "machine": platform.platform(),
-    }
-    known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
-    return known
+    forced = setup.scene.loading.load_history.quantity == "force"
+    for name, value, error, unit, given in (
+        ("force", last.force_N, last.force_error_N, "N", forced),
+        ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
+    ):
+        remark = "prescribed" if given else "" if error else "error not measured"
+        yield name, measured(value, None if given else error, unit), remark
+    face = setup.patches.area * setup.patches.count
+    if not isinstance(run.history().patches, PatchGrid) and setup.face is not None:
+        face = setup.face.area
+    share = last.contact_area_fraction
+    yield "real contact area", percent(share, 3), f"{quantity(share * face, 'mm²', 3)} of the face"
+    if last.peak_pressure_MPa:
+        yield "peak pressure", quantity(last.peak_pressure_MPa, "MPa", 3), ""
+    record = run.history().contact
+    spots = len(record.spots) if record and record.step == last.step else last.contacts
+    if spots:
+        yield "contact spots", number(spots, 9), ""
+    yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
+    for name, (text, unit) in _MORE.items():
+        if value := getattr(last, name):
+            yield text, quantity(value, unit), ""
 
 
-def _body(face: FaceFacts) -> dict[str, Any]:
-    """Return what is known of a body and its contact face."""
-    return {
-        "mesh_sha256": face.digest or None,
-        "cells": face.cells,
-        "element": face.element,
-        "unknowns": face.unknowns,
-        "contact_area_mm2": face.area,
-        "contact_lengths_mm": list(face.lengths),
-        "depth_mm": face.depth,
-        "above_contact_plane": face.above,
-    }
+def _inputs(setup: ProblemSetup) -> Iterator[tuple[str, str]]:
+    """Yield what the user gave, with its topic."""
+    yield "material", plan.material_statement(setup)
+    yield "dimensions", plan.dimension_statement(setup)
+    yield "surface", plan.surface_statement(setup)
+    if setup.scene.micro.hardness is not None:
+        yield "hardness", quantity(setup.scene.micro.hardness, "MPa")
 
 
-def _reference(run: Run) -> dict[str, Any] | None:
-    """Return the meshes of a reference and its errors; None with other couplings."""
-    record, coupling = run.history().reference, run.coupling
-    if record is None or not isinstance(coupling, ReferenceCoupling):
-        return None
-    return {
-        "method": run.scene.reference.method,
-        "sizes_mm": record.sizes.tolist(),
-        "unknowns": record.unknowns,
-        "active_sets": [step.newton_iterations for step in run.steps],
-        "force_rate": record.force.rate.tolist(),
-        "area_rate": record.area.rate.tolist(),
-        "error": record.label,
-        "mesh_quality": coupling.qualities,
-    }
-
-
-def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
-    """Return the micro model and, where it was chosen, the candidates; None without one."""
-    if setup.micro is None:
-        return None
-    choice = setup.choice
-    chosen = {} if choice is None else {"chosen": choice.taken, "candidates": choice.candidates}
-    return {"name": setup.model.name, **chosen}
-
-
-def _versions() -> dict[str, str]:
-    """Return the versions of Python and of the libraries that took part."""
-    loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
-    found = {name: _version(name, module) for name, module in loaded.items()}
-    return {"python": platform.python_version(), **found}
-
-
-def _version(name: str, module: Any) -> str:
-    """Return the version of a library, whose attribute some packagings leave out."""
-    with suppress(PackageNotFoundError):
-        return str(getattr(module, "__version__", None) or version(name))
-    return str(getattr(getattr(module, "version", None), "version", "unknown"))
+def _made(run: Run, options: list[str]) -> list[tuple[str, str]]:
+    """Return what made the report: version, date, scene, processes, options, libraries."""
+    threads = os.environ.get("OMP_NUM_THREADS", "all")
+    versions = ", ".join(f"{name} {number}" for name, number in library_versions().items())
+    return [
+        ("patchlaw", version("patchlaw")),
+        ("written", f"{datetime.now(UTC):%d %B %Y, %H:%M} UTC"),
+        ("scene", run.scene.file or "made in Python"),
+        ("heights, SHA-256", run.heights),
+        ("processes", f"{1 if run.comm is None else run.comm.size}, threads: {threads}"),
+        ("PETSc options", " ".join(options) or "none given"),
+        ("libraries", versions),
+    ]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from io import BytesIO
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 from geometry.collective import on_root, shared
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
-from multiscale.output.report import provenance, report_html
+from multiscale.output.provenance import provenance
+from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
@@ -31,19 +31,18 @@ from multiscale.storage import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
+
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
-    "contacts.csv", "contact.h5", "surface.png", "curves.png", "pressures.png", "contact.png",
-    "laws.png", "block.png", "fields.xdmf", "fields.h5", "fields.bp",
-    "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp", "face.png",
+    "contacts.csv", "contact.h5", "fields.xdmf", "fields.h5", "fields.bp",
+    "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
+    *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")),
 )  # fmt: skip
 """All files that a run may write."""
 
 _COMPRESSION = 1
 """Level of gzip for maps: most of a map of pressures is zero."""
-
-DOTS_PER_INCH = 130
-"""Resolution of the figures, unless they need more."""
 
 
 def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
@@ -62,16 +61,18 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     pictures: dict[str, bytes] = {}
     if run.scene.output.figures and run.steps:
-        names = ["surface", "curves"] + ["pressures"] * (not run.setup.samples)
+        names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
         face = _face_pressures(run)
         names += ["face"] * (face is not None)
         names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
         names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
         with run.phase("output"):
             drawn = shared(
-                run.comm, len(names), lambda index: png(_figure(run, names[index], face))
+                run.comm,
+                len(names),
+                lambda index: pictures_of(names[index], _figure(run, names[index], face)),
             )
-        pictures = dict(zip(names, drawn, strict=True))
+        pictures = {name: content for files in drawn for name, content in files.items()}
     with run.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
@@ -84,10 +85,12 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
-    files += [write_bytes(folder / f"{name}.png", image) for name, image in pictures.items()]
+    files += write_pictures(folder, pictures)
     files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
     if run.scene.output.report:
-        files.append(write_text(folder / "report.html", report_html(run, pictures)))
+        files.append(
+            write_text(folder / "report.html", report_html(run, pictures, options=options))
+        )
     return files
 
 
@@ -150,16 +153,29 @@ def has_block_figure(run: Run) -> bool:
     return pressure is not None and pressure.shape == run.setup.surface.grid
 
 
-def png(figure: Figure) -> bytes:
-    """Return a matplotlib figure as a PNG image."""
-    content = BytesIO()
-    figure.savefig(content, dpi=max(figure.dpi, DOTS_PER_INCH))
-    return content.getvalue()
+def pictures_of(name: str, figure: Figure) -> dict[str, bytes]:
+    """Return the files of a figure by name: PNG, and SVG beside it.
+
+    Args:
+        name: Name of the files without an ending.
+        figure: The figure.
+    """
+    from multiscale.figures.style import encoded  # loads matplotlib
+
+    return {f"{name}.{kind}": content for kind, content in encoded(figure).items()}
 
 
-def write_figure(path: Path, figure: Figure) -> Path:
-    """Write a matplotlib figure as a PNG file."""
-    return write_bytes(path, png(figure))
+def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
+    """Write pictures by the names of their files.
+
+    Args:
+        folder: Folder of the results; made when missing.
+        pictures: The content of each file, see `pictures_of`.
+
+    Returns:
+        The files written.
+    """
+    return [write_bytes(folder / name, content) for name, content in pictures.items()]
 
 
 def _face_pressures(run: Run) -> NDArray[np.float64] | None:
@@ -174,9 +190,10 @@ def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
     from multiscale.output import figures
 
     setup = run.setup
+    if name == "overview":
+        return figures.overview_figure(setup, run.history(), face)
     if name == "surface":
-        summits = setup.asperities if setup.uses_summits else None
-        return figures.surface_figure(setup.surface, summits, setup.patches)
+        return figures.surface_figure_of(setup)
     if name == "curves":
         return run.history().plot(run.scene.kind)
     if name == "block":

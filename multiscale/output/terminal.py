@@ -216,7 +216,7 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    header, rows = history.table(MOST_ROWS)
+    header, rows = history.table(most=MOST_ROWS)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")
@@ -237,5 +237,8 @@ def show_files(comm: Any, files: Sequence[Path]) -> None:
         files: The files written, all in one folder.
     """
     if files:
-        names = ", ".join(path.name for path in files)
-        say(comm, f"results in {files[0].parent}: {names}")
+        pictures = {path.stem for path in files if path.suffix == ".png"}
+        beside = {path for path in files if path.suffix == ".svg" and path.stem in pictures}
+        names = ", ".join(path.name for path in files if path not in beside)
+        also = "; pictures also as .svg" if beside else ""
+        say(comm, f"results in {files[0].parent}: {names}{also}")

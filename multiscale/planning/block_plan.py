@@ -8,6 +8,7 @@ from geometry.meshes.block import BlockShape, misalignment
 from multiscale.machine import ClusterNodes
 from multiscale.planning.body_plan import LOCKING_FROM, body_statement, body_warnings
 from multiscale.planning.costs import run_memory_requests
+from multiscale.readable import quantity
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes
 from multiscale.setup.surface_and_block import block_section
@@ -31,7 +32,8 @@ def block_statement(setup: ProblemSetup) -> str:
         return body_statement(setup)
     if setup.meshes is not None:
         return f"{_meshes(setup.meshes)}; {block_section(setup.scene).sides} sides"
-    (lx, ly), shape = setup.surface.lengths, setup.shape
+    shape = setup.shape
+    sizes = [quantity(side, "mm") for side in (*setup.surface.lengths, shape.height)]
     sides, modulus = block_section(setup.scene).sides, setup.materials.contact_modulus
     text = (
         "decomposed: the half-space's own near field, and what the finite block adds to it in "
@@ -46,8 +48,8 @@ def block_statement(setup: ProblemSetup) -> str:
             f"{margin if shape.margin else ''}"
         )
     return (
-        f"{text}, {lx:g} × {ly:g} mm and {shape.height:g} mm high, "
-        f"{sides} sides, contact modulus {modulus:.6g} MPa"
+        f"{text}, {sizes[0]} × {sizes[1]} and {sizes[2]} high, "
+        f"{sides} sides, contact modulus {quantity(modulus, 'MPa')}"
     )
 
 

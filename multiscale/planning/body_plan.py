@@ -26,7 +26,9 @@ def body_statement(setup: ProblemSetup) -> str:
         setup: The problem, with a body on a mesh or with laws of samples.
     """
     assert setup.face is not None
-    text = f"{_mesh(setup.face)}, contact modulus {setup.materials.contact_modulus:.6g} MPa"
+    text = (
+        f"{_mesh(setup.face)}, contact modulus {quantity(setup.materials.contact_modulus, 'MPa')}"
+    )
     if setup.counter_face is not None:
         text += f"; counter-body {_mesh(setup.counter_face)}; unknowns of both are one problem"
     return text

@@ -53,7 +53,7 @@ _IMPORT, _BODY = 0.7, 0.065
 take several times longer."""
 _MESH, _REFERENCE_MESH, _ACTIVE_SETS = 0.026, 0.052, 0.013
 """Times of meshing a block, of meshing a rough block, and of a load step by active sets."""
-_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.21, 0.16, 0.9
+_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.21, 0.28, 0.9
 """Times of importing matplotlib, of a figure, and of that in three dimensions."""
 _NEWTON_STEPS = 2.7
 """Newton steps of a load step of laws whose compliance is condensed to the patches."""

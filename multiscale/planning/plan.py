@@ -12,7 +12,7 @@ from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.body_plan import body_term_statement, sample_statement
 from multiscale.planning.costs import Cost
-from multiscale.readable import duration, quantity
+from multiscale.readable import duration, number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.setup.problem import ProblemSetup
 
@@ -66,9 +66,9 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     if excess > 0.1 * setup.largest_interference:
         x, y = setup.surface.highest_point
         yield (
-            f"the approach counts from the interpolant's highest point, {1e3 * excess:.3g} µm "
-            f"above the highest of the given heights, at x = {x:.4g} mm, y = {y:.4g} mm: the "
-            "heights are too coarse or too noisy there"
+            "the approach counts from the interpolant's highest point, "
+            f"{quantity(excess, 'mm', 3)} above the highest of the given heights, at "
+            f"x = {x:.4g} mm, y = {y:.4g} mm: the heights are too coarse or too noisy there"
         )
     if not setup.interfering_patches:
         yield "nothing lies within the largest approach: no force will act"
@@ -108,15 +108,32 @@ def inputs_statement(setup: ProblemSetup) -> str:
     Args:
         setup: The problem.
     """
-    lx, ly = (quantity(side, "mm") for side in setup.surface.lengths)
-    high = setup.face.depth if setup.face else setup.shape.height
-    what, second = "block" if setup.block_shape else "body", setup.materials.second
-    solid = f"a {what} {quantity(high, 'mm')} high" if setup.has_block else "a half-space"
+    return f"{material_statement(setup)}; a surface of {dimension_statement(setup)}"
+
+
+def material_statement(setup: ProblemSetup) -> str:
+    """Say the elastic constants of both sides.
+
+    Args:
+        setup: The problem.
+    """
+    second = setup.materials.second
     other = "a half-space" if setup.both_give_way else "a body"
     against = f", against {other} with {_constants(second)}" if second else ""
-    if setup.samples:
-        solid = f"{solid} as sample"
-    return f"{_constants(setup.materials.first)}; a surface of {lx} × {ly} on {solid}{against}"
+    return f"{_constants(setup.materials.first)}{against}"
+
+
+def dimension_statement(setup: ProblemSetup) -> str:
+    """Say the dimensions of the surface and of what it lies on.
+
+    Args:
+        setup: The problem.
+    """
+    lx, ly = (quantity(side, "mm") for side in setup.surface.lengths)
+    high = setup.face.depth if setup.face else setup.shape.height
+    what = "block" if setup.block_shape else "body"
+    solid = f"a {what} {quantity(high, 'mm')} high" if setup.has_block else "a half-space"
+    return f"{lx} × {ly} on {solid}{' as sample' if setup.samples else ''}"
 
 
 def _constants(material: Material) -> str:
@@ -131,11 +148,12 @@ def surface_statement(setup: ProblemSetup) -> str:
     """
     surface, spectrum = setup.surface, setup.scene.surface.spectrum
     rough = roughness(surface)
+    lx, ly = (quantity(side, "mm") for side in surface.lengths)
     continued = ", continued periodically" if setup.scene.surface.periodic else ""
     text = (
         f"{surface.source}; {surface.grid[0]} × {surface.grid[1]} heights on "
-        f"{surface.lengths[0]:g} × {surface.lengths[1]:g} mm{continued}, "
-        f"rms height {1e3 * rough.sq:.3g} µm, rms gradient {rough.sdq:.3g}"
+        f"{lx} × {ly}{continued}, "
+        f"rms height {quantity(rough.sq, 'mm', 3)}, rms gradient {number(rough.sdq, 3)}"
     )
     if spectrum is None:
         return text
@@ -158,7 +176,9 @@ def _two_sides(setup: ProblemSetup) -> str:
     if section is not None and section.rotation:
         text += f", turned by {section.rotation:g}°"
     if section is not None and any(section.shift):
-        text += f", moved by {1e3 * section.shift[0]:.4g} and {1e3 * section.shift[1]:.4g} µm"
+        text += (
+            f", moved by {quantity(section.shift[0], 'mm')} and {quantity(section.shift[1], 'mm')}"
+        )
     if not setup.finite_slopes or setup.samples:
         return f"{text}; the heights of both add"
     if setup.materials.second is None:
@@ -231,8 +251,8 @@ def _load(setup: ProblemSetup) -> str:
     elif any(load_history.tilt):
         text += f", tilted by {_slopes(load_history.tilt)}"
     if forced:
-        approach = 1e3 * setup.plane_at_largest_load.approach
-        text += f"; on a half-space its approach is about {approach:.3g} µm"
+        approach = quantity(setup.plane_at_largest_load.approach, "mm", 3)
+        text += f"; on a half-space its approach is about {approach}"
     return text
 
 

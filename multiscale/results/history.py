@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, overload
@@ -15,6 +14,7 @@ from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -38,12 +38,13 @@ class Column:
     Args:
         meaning: What the column holds; with the unit it is the column's documentation.
         unit: Unit of the values; empty for plain numbers.
-        heading: Heading in the table of reports, terminals and notebooks; empty for a column
+        heading: Heading in the tables of reports, terminals and notebooks; empty for a column
             that stands in the file alone.
-        scale: Factor between the unit of the file and the unit of the heading.
-        shown: Format of the numbers in that table.
+        digits: Significant digits in those tables.
         error: Name of the load step's attribute that holds the error of the value; shown beside
             it. Empty for none.
+        table: The table that the column stands in: ``"curve"``, ``"more"`` for what some runs
+            alone know, ``"solver"``.
 
     Attributes:
         name: Name of the column and of the attribute of `History`.
@@ -53,9 +54,9 @@ class Column:
     unit: str = ""
     _: KW_ONLY
     heading: str = ""
-    scale: float = 1.0
-    shown: str = ".0f"
+    digits: int = 4
     error: str = ""
+    table: str = "curve"
     name: str = field(init=False)
 
     def __post_init__(self) -> None:
@@ -80,10 +81,31 @@ class Column:
         """Return the value of a load step, its attribute of this name; None if not measured."""
         return getattr(step, self.name)
 
-    def text(self, step: LoadStep) -> str:
-        """Return the value of a load step as it is shown in tables, with its error."""
-        error = getattr(step, self.error, None) or 0.0
-        return with_error(self.scale * self.of(step), self.scale * error, shown=self.shown)
+    def shown(self, steps: Sequence[LoadStep]) -> tuple[str, list[str]]:
+        """Return the heading with the unit that suits all load steps, and the value of each.
+
+        Shares are shown in per cent, and values with their errors.
+
+        Args:
+            steps: The load steps.
+        """
+        values = [self.of(step) for step in steps]
+        errors = [getattr(step, self.error, None) or 0.0 for step in steps]
+        known = [value for value in values if value is not None]
+        name, size = self.unit, 1.0
+        if self.name.endswith("_fraction"):
+            name, size = "%", 0.01
+        elif self.unit in SCALED_UNITS:
+            name, size = usual_unit(known, self.unit)
+        texts = [
+            "–"
+            if value is None
+            else with_error(value / size, error / size, self.digits)
+            if isinstance(value, float)
+            else str(value)
+            for value, error in zip(values, errors, strict=True)
+        ]
+        return f"{self.heading} [{name}]" if name else self.heading, texts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,25 +126,24 @@ class History:
     step = Column("Number of the load step, from 1", heading="step")
     approach_mm = Column(
         "Approach of the rigid plane, counted from the first touch", "mm",
-        heading="approach [µm]", scale=1e3, shown=".4g", error="approach_error_mm",
+        heading="approach", error="approach_error_mm",
     )  # fmt: skip
     force_N = Column(
-        "Normal force on the plane", "N", heading="force [N]", shown=".6g", error="force_error_N"
+        "Normal force on the plane", "N", heading="force", digits=6, error="force_error_N"
     )
     mean_pressure_MPa = Column(
-        "Force over the nominal contact area", "MPa", heading="pressure [MPa]", shown=".5g"
+        "Force over the nominal contact area", "MPa", heading="pressure", digits=5
     )
-    contact_area_fraction = Column(
-        "Real over nominal contact area", heading="area [%]", scale=100, shown=".4g"
-    )
+    contact_area_fraction = Column("Real over nominal contact area", heading="area")
     mean_separation_mm = Column(
-        "Mean gap between the plane and the deformed surface", "mm",
-        heading="separation [µm]", scale=1e3, shown=".4g",
-    )  # fmt: skip
+        "Mean gap between the plane and the deformed surface", "mm", heading="separation"
+    )
     contacts = Column("Number of asperities in contact", heading="contacts")
-    newton_iterations = Column("Newton steps, those of halved load steps too", heading="Newton")
-    linear_iterations = Column("Iterations of the linear solver", heading="linear")
-    wall_s = Column("Wall time", "s", heading="time [s]", shown=".2f")
+    newton_iterations = Column(
+        "Newton steps, those of halved load steps too", heading="Newton", table="solver"
+    )
+    linear_iterations = Column("Iterations of the linear solver", heading="linear", table="solver")
+    wall_s = Column("Wall time", "s", heading="time", digits=3, table="solver")
     reason = Column("Name of the reason for which the iteration stopped")
     tilt_x = Column("Slope of the approach along x", "mm/mm")
     tilt_y = Column("Slope of the approach along y", "mm/mm")
@@ -130,16 +151,40 @@ class History:
     moment_y_N_mm = Column("First moment Σ P (y − yc) of the forces P", "N mm")
     force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
     approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
-    peak_pressure_MPa = Column("Largest contact pressure", "MPa")
-    stiffness_N_per_mm = Column("Interfacial stiffness dF/dδ, force over approach", "N/mm")
-    elastic_energy_mJ = Column("Energy of the elastic deformation", "mJ")
-    plastic_work_mJ = Column("Work of the hardness on the plastic depth", "mJ")
+    peak_pressure_MPa = Column(
+        "Largest contact pressure", "MPa", heading="peak pressure", table="more"
+    )
+    stiffness_N_per_mm = Column(
+        "Interfacial stiffness dF/dδ, force over approach", "N/mm",
+        heading="stiffness", table="more",
+    )  # fmt: skip
+    elastic_energy_mJ = Column(
+        "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
+    )
+    plastic_work_mJ = Column(
+        "Work of the hardness on the plastic depth", "mJ", heading="plastic work", table="more"
+    )
     work_mJ = Column("Work of the forces on the plane", "mJ")
-    yielding_area_fraction = Column("Area that bears the hardness over nominal contact area")
-    plastic_depth_mm = Column("Largest plastic depth that the loads so far have left", "mm")
-    thermal_conductance_W_per_K = Column("Thermal conductance of contacts and gaps", "W/K")
-    gap_conductance_W_per_K = Column("What of it passes through gas and radiation", "W/K")
-    electrical_conductance_S = Column("Electrical conductance of the contacts", "S")
+    yielding_area_fraction = Column(
+        "Area that bears the hardness over nominal contact area",
+        heading="yielding area", table="more",
+    )  # fmt: skip
+    plastic_depth_mm = Column(
+        "Largest plastic depth that the loads so far have left", "mm",
+        heading="plastic depth", table="more",
+    )  # fmt: skip
+    thermal_conductance_W_per_K = Column(
+        "Thermal conductance of contacts and gaps", "W/K",
+        heading="thermal conductance", table="more",
+    )  # fmt: skip
+    gap_conductance_W_per_K = Column(
+        "What of it passes through gas and radiation", "W/K",
+        heading="of it through gaps", table="more",
+    )  # fmt: skip
+    electrical_conductance_S = Column(
+        "Electrical conductance of the contacts", "S",
+        heading="electrical conductance", table="more",
+    )  # fmt: skip
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
@@ -211,19 +256,31 @@ class History:
         """
         return data_frame(self.records())
 
-    def table(self, most: int = MOST_SHOWN) -> Table:
-        """Return headings and rows of the table that reports and terminals show.
+    def table(self, *names: str, most: int = MOST_SHOWN) -> Table:
+        """Return headings and rows of the tables that reports and terminals show.
 
-        A reference has one more column, with its values at mesh size zero.
+        Units have the prefixes that suit the largest value of their column. A reference has one
+        more column, with its values at mesh size zero.
 
         Args:
+            *names: The tables, see `Column.table`, each with the number of the load step; by
+                default the curve and the solver's work.
             most: Load steps that are shown; of more the middle is left out, and a row says so.
         """
-        columns = [column for column in COLUMNS if column.heading]
+        names = names or ("curve", "solver")
         whole, half = len(self.steps) <= most, most // 2
         shown = self.steps if whole else self.steps[:half] + self.steps[-half:]
-        texts = {column.heading: [column.text(step) for step in shown] for column in columns}
-        if self.reference is not None:
+        columns = [
+            column
+            for column in COLUMNS
+            if column.heading and (column.table in names or column.name == "step")
+        ]
+        texts = dict(
+            column.shown(shown)
+            for column in columns
+            if column.table != "more" or any(column.of(step) for step in shown)
+        )
+        if self.reference is not None and "curve" in names:
             heading, cells = self.reference.cells
             texts[heading] = list(cells) if whole else [*cells[:half], *cells[-half:]]
         rows = list(zip(*texts.values(), strict=True))
@@ -274,20 +331,6 @@ def data_frame(records: list[dict[str, Any]]) -> Any:
     return DataFrame(records)
 
 
-def with_error(value: float, error: float | None, *, shown: str) -> str:
-    """Return a number with its error, both rounded to the second digit of the error.
-
-    Args:
-        value: The number.
-        error: Its error; 0 or None for none.
-        shown: Format of a number without an error.
-    """
-    if not error:
-        return f"{value:{shown}}"
-    places = max(1 - math.floor(math.log10(error)), 0)
-    return f"{value:.{places}f} ± {error:.{places}f}"
-
-
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:
     """Yield a sentence when load steps lie outside the range of validity of the micro model.
 
@@ -307,7 +350,7 @@ def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[s
                 )
     if outside:
         first = min(outside)
-        yield (
+        yield Caution(
             f"load steps outside the micro model's range of validity: {len(outside)} of "
             f"{len(steps)}; first step {first}: {outside[first]}; micro.model = 'half-space' has "
             "no such range"

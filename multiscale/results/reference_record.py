@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import measured, percent, usual_unit, with_error
 from multiscale.results.extrapolation import Estimate, extrapolated
 
 Array = NDArray[np.float64]
@@ -49,9 +50,9 @@ class ReferenceRecord:
         return bool(np.any(spread > 1e-12 * np.abs(self.approach_mm).max(axis=0)))
 
     @property
-    def _response(self) -> tuple[Estimate, float, str]:
-        """Return force or approach, whichever is not prescribed, with the scale to its unit."""
-        return (self.approach, 1e3, "µm") if self.by_force else (self.force, 1.0, "N")
+    def _response(self) -> tuple[Estimate, str]:
+        """Return force or approach, whichever is not prescribed, with its unit."""
+        return (self.approach, "mm") if self.by_force else (self.force, "N")
 
     @property
     def _at_largest_force(self) -> tuple[float, float, float]:
@@ -65,7 +66,7 @@ class ReferenceRecord:
         value, error, _ = self._at_largest_force if self.force_N.any() else (0.0, np.nan, 0.0)
         if not np.isfinite(error):
             return "no error bar"
-        return f"± {100.0 * error / (abs(value) or 1.0):.2g} %"
+        return f"± {percent(error / (abs(value) or 1.0))}"
 
     @property
     def sentence(self) -> str:
@@ -77,7 +78,7 @@ class ReferenceRecord:
         if not self.force_N.any():
             return "no contact on any mesh, no error bar"
         value, error, rate = self._at_largest_force
-        _, scale, unit = self._response
+        _, unit = self._response
         if np.isnan(rate):
             meshes = "meshes that show no rate: the value is that of the finest"
         elif len(self.sizes) == 2:
@@ -86,19 +87,20 @@ class ReferenceRecord:
             meshes = f"three meshes, with the rate {rate:.2g} that they show"
         return (
             f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
-            f"{scale * value:.5g} ± {scale * error:.2g} {unit} ({self.label}), from {meshes}; "
+            f"{measured(value, error, unit)} ({self.label}), from {meshes}; "
             "the table holds the finest mesh"
         )
 
     @property
     def cells(self) -> tuple[str, list[str]]:
         """Heading and cells of a table's column that holds the values at mesh size zero."""
-        found, scale, unit = self._response
+        found, unit = self._response
         if len(self.sizes) == 1:
             return "at size zero", ["no error bar"] * found.value.size
-        return f"at size zero [{unit}]", [
-            "no error bar" if np.isnan(error) else f"{value:.5g} ± {error:.2g}"
-            for value, error in zip(scale * found.value, scale * found.error, strict=True)
+        name, size = usual_unit(found.value, unit)
+        return f"at size zero [{name}]", [
+            "no error bar" if np.isnan(error) else with_error(value, error) if error else "0 ± 0"
+            for value, error in zip(found.value / size, found.error / size, strict=True)
         ]
 
     def without_bars(self, steps: NDArray[np.bool_]) -> ReferenceRecord:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import quantity
+from multiscale.readable import Caution, number, percent, quantity
 
 HARDNESS_OVER_YIELD = (2.8, 3.0)
 """Hardness over yield strength of metals: Tabor 1951, The Hardness of Metals, ch. 3."""
@@ -35,11 +35,12 @@ def yielding_notes(steps: Sequence[LoadStep], hardness: float | None) -> Iterato
     last = known[-1]
     volume = (last.plastic_work_mJ or 0.0) / hardness
     most = max(known, key=lambda step: step.yielding_area_fraction or 0.0)
+    depth = quantity(last.plastic_depth_mm or 0.0, "mm")
     yield (
         f"hardness {quantity(hardness, 'MPa')}: after load step {last.step} a plastic volume of "
-        f"{volume:.4g} mm³ and a depth of up to {1e3 * (last.plastic_depth_mm or 0.0):.4g} µm are "
-        f"left; at most {100 * (most.yielding_area_fraction or 0.0):.3g} % of the nominal area "
-        f"bears the hardness, at load step {most.step}"
+        f"{number(1e9 * volume)} µm³ and a depth of up to {depth} are left; at most "
+        f"{percent(most.yielding_area_fraction or 0.0, 3)} of the nominal area bears the "
+        f"hardness, at load step {most.step}"
     )
 
 
@@ -70,17 +71,19 @@ def energy_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     known = [step for step in steps if step.elastic_energy_mJ is not None]
     if not known:
         return
-    last = known[-1]
-    plastic = f", plastic work {last.plastic_work_mJ:.4g} mJ" if last.plastic_work_mJ else ""
-    work = "" if last.work_mJ is None else f", work of the plane {last.work_mJ:.4g} mJ"
+    last, elastic = known[-1], known[-1].elastic_energy_mJ or 0.0
+    plastic = (
+        f", plastic work {quantity(last.plastic_work_mJ, 'mJ')}" if last.plastic_work_mJ else ""
+    )
+    work = "" if last.work_mJ is None else f", work of the plane {quantity(last.work_mJ, 'mJ')}"
     yield (
-        f"energies at load step {last.step}: elastic {last.elastic_energy_mJ:.4g} mJ{plastic}"
+        f"energies at load step {last.step}: elastic {quantity(elastic, 'mJ')}{plastic}"
         f"{work} (trapezoidal rule between load steps)"
     )
     missing = missing_energy(known)
     if missing > BALANCE:
-        yield (
-            f"warning: energies are not balanced: {100 * missing:.2g} % of the largest is missing "
+        yield Caution(
+            f"warning: energies are not balanced: {percent(missing)} of the largest is missing "
             "between two load steps; finite slopes of steep surfaces may be the cause "
             "(micro.finite_slopes = false leaves them out)"
         )

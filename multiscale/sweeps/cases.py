@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import itertools
 import json
+import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, overload
 
 from geometry.errors import InputError
 from multiscale.scene.scene import Scene
@@ -27,12 +27,21 @@ class Case:
     Attributes:
         number: Position in the sweep, from 0.
         values: The values of the varied keys, by dotted key.
-        scene: The scene with these values.
+        base: The scene that all cases start from.
     """
 
     number: int
     values: dict[str, Any]
-    scene: Scene
+    base: Scene
+
+    @property
+    def scene(self) -> Scene:
+        """The scene with these values, made anew at every access.
+
+        Raises:
+            InputError: When the scene is wrong.
+        """
+        return self.base.with_(self.values)
 
     @property
     def name(self) -> str:
@@ -40,7 +49,85 @@ class Case:
         return json.dumps(self.values, sort_keys=True, default=str)
 
 
-def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> list[Case]:
+class SweepCases(Sequence[Case]):
+    """Every combination of the varied values, or some of them; the last key varies fastest.
+
+    Cases are made when they are looked at: a sweep of a million takes no memory for them.
+
+    Args:
+        base: The scene that all cases start from.
+        values: Lists of values by dotted key.
+        numbers: The cases among all combinations, ascending; all of them when not given.
+    """
+
+    def __init__(
+        self, base: Scene, values: Mapping[str, list[Any]], numbers: Sequence[int] | None = None
+    ) -> None:
+        self.base, self.values = base, dict(values)
+        count = math.prod(len(each) for each in self.values.values())
+        self.numbers: Sequence[int] = range(count) if numbers is None else numbers
+        self._places = {
+            key: {_text(value): place for place, value in enumerate(each)}
+            for key, each in self.values.items()
+        }
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @overload
+    def __getitem__(self, index: int) -> Case: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> SweepCases: ...
+
+    def __getitem__(self, index: int | slice) -> Case | SweepCases:
+        if isinstance(index, slice):
+            return SweepCases(self.base, self.values, self.numbers[index])
+        number = left = self.numbers[index]
+        found: dict[str, Any] = {}
+        for key, values in reversed(self.values.items()):
+            left, place = divmod(left, len(values))
+            found[key] = values[place]
+        return Case(number=number, values=dict(reversed(found.items())), base=self.base)
+
+    def number_of(self, name: str) -> int | None:
+        """Return the number of the case of a name; None where it is not of this sweep."""
+        values, number = json.loads(name), 0
+        if values.keys() != self.values.keys():
+            return None
+        for key, each in self.values.items():
+            place = self._places[key].get(_text(values[key]))
+            if place is None:
+                return None
+            number = number * len(each) + place
+        return number
+
+    def where(self, chosen: Mapping[str, Any]) -> SweepCases:
+        """Return the cases whose keys have given values."""
+        kept = [case.number for case in self if chosen.items() <= case.values.items()]
+        return SweepCases(self.base, self.values, kept)
+
+    def groups(self) -> list[list[int]]:
+        """Return the cases by number, in groups whose load steps differ by a factor alone.
+
+        The body is linearly elastic: at given approaches, pressures and forces are proportional to
+        its Young's modulus, if nothing else is elastic and no hardness bounds them. At given forces
+        they are not, as the contact area grows less than the force. All load steps of a group
+        follow from those of its first case.
+        """
+        if _LINEAR not in self.values:
+            return [[number] for number in self.numbers]
+        groups: dict[str, list[int]] = {}
+        for case in self:
+            scene = case.scene
+            elastic = scene.counter_body is None and scene.micro.hardness is None
+            linear = elastic and scene.loading.approach is not None
+            differing = {key: case.values[key] for key in self.values if key != _LINEAR}
+            groups.setdefault(_text(differing if linear else case.values), []).append(case.number)
+        return list(groups.values())
+
+
+def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> SweepCases:
     """Return every combination of the varied values; the last key varies fastest.
 
     Args:
@@ -48,27 +135,24 @@ def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> list[Case]:
         vary: Values by dotted key.
 
     Raises:
-        InputError: When nothing is varied, a key has no values or one twice, there are too many
-            cases, or a scene with some of the values is wrong.
+        InputError: When nothing is varied, a key has no values or one twice, or there are too many
+            cases. Scenes are not made.
     """
     lists = {key: [_plain(value) for value in values] for key, values in vary.items()}
     if not lists:
         raise InputError("varies nothing", key="--vary", allowed="KEY=VALUES, at least once")
-    count = 1
     for key, values in lists.items():
-        texts = [json.dumps(value, default=str) for value in values]
-        if not values or len(set(texts)) < len(texts):
+        if not values or len({_text(value) for value in values}) < len(values):
             problem = "has no values" if not values else "takes a value twice"
             raise InputError(problem, key=key, value=values, allowed="different values")
-        count *= len(values)
+    count = math.prod(map(len, lists.values()))
     if count > MOST_CASES:
         raise InputError(f"make {count} cases", key=" × ".join(lists), allowed=f"≤ {MOST_CASES}")
-    combinations = itertools.product(*lists.values())
-    changes = [dict(zip(lists, values, strict=True)) for values in combinations]
-    return [
-        Case(number=number, values=values, scene=scene.with_(values))
-        for number, values in enumerate(changes)
-    ]
+    return SweepCases(scene, lists)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, sort_keys=True, default=str)
 
 
 def _plain(value: Any) -> Any:
@@ -116,27 +200,3 @@ def _array(array: str, text: str, plain: str | None = None) -> list[Any]:
         if plain:
             return [plain]
     raise InputError("is no list of values", key="--vary", value=text, allowed="KEY=[…, …]")
-
-
-def grouped(cases: Sequence[Case]) -> list[list[Case]]:
-    """Group the cases whose load steps differ by a factor alone.
-
-    The body is linearly elastic: at given approaches, pressures and forces are proportional to its
-    Young's modulus, if nothing else is elastic and no hardness bounds them. At given forces they
-    are not, as the contact area grows less than the force.
-
-    Args:
-        cases: The cases of a sweep.
-
-    Returns:
-        Groups of cases; all load steps of a group follow from those of its first case.
-    """
-    groups: dict[str, list[Case]] = {}
-    for case in cases:
-        others = {key: value for key, value in case.values.items() if key != _LINEAR}
-        scene = case.scene
-        elastic = scene.counter_body is None and scene.micro.hardness is None
-        linear = elastic and scene.loading.approach is not None
-        key = json.dumps(others if linear else case.values, sort_keys=True, default=str)
-        groups.setdefault(key, []).append(case)
-    return list(groups.values())

@@ -1,4 +1,4 @@
-"""The figure of a sweep: the curves of all cases, with mean and band of every ensemble."""
+"""The figure of a sweep: curves of cases, with mean, median and band of every ensemble."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
+from multiscale.figures.style import FULL_WIDTH, PALETTE, add_legend, new_figure, styled
+from multiscale.sweeps.statistics import Statistics
 
 MOST_CURVES = 200
 """Cases that are drawn as curves; bands show those beyond."""
@@ -18,49 +19,61 @@ MOST_CURVES = 200
 MOST_ENSEMBLES = 8
 """Ensembles that are drawn; more of them cannot be told apart."""
 
-_BAND = (0.05, 0.95)  # quantiles
-
 
 class Ensemble(NamedTuple):
-    """The curves of cases that differ in seed or file alone; arrays of shape (cases, steps).
+    """Cases that differ in seed or file alone: statistics of all, and the curves of some.
 
     Attributes:
         label: What the cases have in common; empty for nothing.
-        approach: Approaches [mm].
-        pressure: Mean pressures [MPa].
-        area_fraction: Real over nominal contact areas.
+        total: Number of all cases.
+        statistics: Of all cases that ended well.
+        approach: Approaches of some cases, shape (cases, steps) [mm].
+        pressure: Their mean pressures [MPa].
+        area_fraction: Their real over nominal contact areas.
     """
 
     label: str
+    total: int
+    statistics: Statistics
     approach: NDArray[np.float64]
     pressure: NDArray[np.float64]
     area_fraction: NDArray[np.float64]
 
 
+CURVES = "approach_mm", "mean_pressure_MPa", "contact_area_fraction"
+"""Columns of the curves of an `Ensemble`."""
+
+
+@styled()
 def sweep_figure(ensembles: Sequence[Ensemble]) -> Figure:
     """Draw mean pressure over approach, and contact area over mean pressure.
 
-    Thin curves are single cases. A thick curve is the mean of an ensemble, and the band about it
-    holds the middle 90 % of its cases where all were pressed to the same approaches.
+    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one its median,
+    and the band about them holds the middle 90 % of its cases where all were pressed to the same
+    approaches.
 
     Args:
         ensembles: The curves; those beyond `MOST_ENSEMBLES` are left out.
     """
-    figure = new_figure(9.0, 4.0)
+    figure = new_figure(FULL_WIDTH, 3.0)
     force, area = figure.subplots(1, 2)
-    shown = ensembles[:MOST_ENSEMBLES]
-    for colour, ensemble in zip(cycle(COLOURS.values()), shown, strict=False):
+    for colour, ensemble in zip(cycle(PALETTE), ensembles[:MOST_ENSEMBLES], strict=False):
         x, y, a = 1e3 * ensemble.approach, ensemble.pressure, 100 * ensemble.area_fraction
-        for row in range(min(len(x), MOST_CURVES // len(shown))):
+        for row in range(len(x)):
             force.plot(x[row], y[row], color=colour, lw=0.5, alpha=0.4)
             area.plot(y[row], a[row], color=colour, lw=0.5, alpha=0.4)
-        label = ", ".join(filter(None, (ensemble.label, f"mean of {len(x)}" * (len(x) > 1))))
-        force.plot(x.mean(axis=0), y.mean(axis=0), color=colour, lw=2.0, label=label)
-        area.plot(y.mean(axis=0), a.mean(axis=0), color=colour, lw=2.0)
-        if len(x) > 1 and np.ptp(x, axis=0).max() < 1e-9 * x.max():
-            low, high = np.quantile(y, _BAND, axis=0)
-            force.fill_between(x[0], low, high, color=colour, alpha=0.2)
+        of, many = ensemble.statistics.of, ensemble.total > 1
+        approach, pressure, fraction = (of(name, "mean") for name in CURVES)
+        label = ", ".join(filter(None, (ensemble.label, f"mean of {ensemble.total}" * many)))
+        force.plot(1e3 * approach, pressure, color=colour, lw=2.0, label=label)
+        area.plot(pressure, 100 * fraction, color=colour, lw=2.0)
+        low, high = of(CURVES[0], "smallest"), of(CURVES[0], "largest")
+        if many and (high - low).max() < 1e-9 * high.max():
+            name = CURVES[1]
+            force.plot(1e3 * approach, of(name, "median"), color=colour, lw=1.2, ls="--")
+            band = of(name, "low"), of(name, "high")
+            force.fill_between(1e3 * approach, *band, color=colour, alpha=0.2)
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
-    add_grid_and_legend(figure)
+    add_legend(figure)
     return figure

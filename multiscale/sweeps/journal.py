@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -43,24 +43,26 @@ class Journal:
     def __init__(self, folder: Path | None, scene: str) -> None:
         self._folder, self._header = folder, {"scene": scene}
 
-    def read(self) -> dict[str, CaseResult]:
-        """Return the cases that are done, by name.
+    def files(self) -> list[Path]:
+        """Return the files that are there, in the order of their names."""
+        return sorted(self._folder.glob("*.jsonl")) if self._folder else []
+
+    def read(self, paths: Iterable[Path]) -> Iterator[CaseResult]:
+        """Yield the cases that are done, from some of the files.
 
         Raises:
             InputError: When they are cases of another scene.
         """
-        found: dict[str, CaseResult] = {}
-        for path in self._files():
-            lines = path.read_bytes().splitlines(keepends=True)
-            # A process that was killed leaves its last line without an end.
-            contents = [json.loads(line) for line in lines if line.endswith(b"\n")]
-            if contents and contents[0] != self._header:
-                raise InputError(
-                    "holds the cases of another scene", key="--out", value=str(path.parent.parent),
-                    allowed="another folder, or --overwrite",
-                )  # fmt: skip
-            found |= {content["case"]: CaseResult(**content) for content in contents[1:]}
-        return found
+        for path in paths:
+            with path.open("rb") as file:
+                # A process that was killed leaves its last line without an end.
+                contents = (json.loads(line) for line in file if line.endswith(b"\n"))
+                if next(contents, self._header) != self._header:
+                    raise InputError(
+                        "holds the cases of another scene", key="--out",
+                        value=str(path.parent.parent), allowed="another folder, or --overwrite",
+                    )  # fmt: skip
+                yield from (CaseResult(**content) for content in contents)
 
     @contextmanager
     def appending(self, process: str) -> Iterator[Callable[[CaseResult], None]]:
@@ -79,19 +81,11 @@ class Journal:
         with written(path):
             self._folder.mkdir(parents=True, exist_ok=True)
             with path.open("ab") as file:
-                content = path.read_bytes()
-                file.truncate(content.rfind(b"\n") + 1)
-                if not file.tell():
+                whole = path.read_bytes().rfind(b"\n") + 1
+                file.truncate(whole)
+                if not whole:
                     file.write(_line(self._header))
                 yield lambda result: _append(file, result)
-
-    def remove(self) -> None:
-        """Remove what is stored."""
-        for path in self._files():
-            path.unlink()
-
-    def _files(self) -> list[Path]:
-        return sorted(self._folder.glob("*.jsonl")) if self._folder else []
 
 
 def _append(file: BinaryIO, result: CaseResult) -> None:

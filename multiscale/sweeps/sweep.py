@@ -13,9 +13,10 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.results.history import COLUMNS
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.sweeps.cases import Case, grouped, sweep_cases
+from multiscale.sweeps.cases import Case, SweepCases, sweep_cases
 from multiscale.sweeps.journal import CaseResult, Journal
 from multiscale.sweeps.sweep_results import SweepResults
+from multiscale.sweeps.tasks import TaskCounter
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a sweep."""
@@ -32,21 +33,23 @@ def sweep(
 ) -> SweepResults:
     """Run a scene for all combinations of values of its keys.
 
-    Each rank runs cases of its own; the results do not depend on the number of ranks. Cases that
-    differ in ``block.young_modulus`` alone, under given approaches, are solved once: the body is
-    linearly elastic. A case that does not converge is recorded and does not end the sweep.
+    Each rank takes the next case as soon as it is free. No case starts from another one, so that
+    the results do not depend on the number of ranks, to the last bit. Cases that differ in
+    ``block.young_modulus`` alone, under given approaches, are solved once: the body is linearly
+    elastic. A case that does not converge is recorded and does not end the sweep.
 
     Args:
         scene: The scene that all cases start from.
         vary: Values by dotted key, as ``{"surface.spectrum.seed": range(20)}``.
         comm: MPI communicator (mpi4py); None runs on this process alone.
-        folder: Folder where cases that are done are stored, so that the next call goes on from
-            them; None stores nothing.
+        folder: Folder where cases that are done are stored, in one file for each rank, so that the
+            next call goes on from them, on any number of ranks; None stores nothing.
         part: This call runs the k-th of n parts of the cases, as one job of many; from 1.
         observe: Called on its rank with every case that is done now.
 
     Returns:
-        The results of all cases that are done, those of other parts too, the same on every rank.
+        The results of all cases that are done, those of other parts too. They stay on the ranks
+        that have found or read them.
 
     Raises:
         InputError: When a case's scene is wrong, or the folder holds cases of another scene.
@@ -58,52 +61,99 @@ def sweep(
     if not 1 <= which <= parts:
         raise InputError("is no part of a sweep", value=f"{which}/{parts}", allowed="1/n … n/n")
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    cases = together(comm, lambda: sweep_cases(scene, vary))
-    stored = None if folder is None else Path(folder) / JOURNAL
-    journal = Journal(stored, _identity(scene))
-    done = on_root(comm, journal.read)
-    own = grouped(cases)[which - 1 :: parts]
-    ahead = [group for group in own if any(case.name not in done for case in group)]
+    cases = together(comm, lambda: _checked_cases(scene, vary, rank, size))
+    journal = Journal(None if folder is None else Path(folder) / JOURNAL, _identity(scene))
+    mine, done = _read(journal, cases, comm)
+    own = cases.groups()[which - 1 :: parts]
+    ahead = [group for group in own if not done.issuperset(group)]
+    counter = TaskCounter(comm, len(ahead))
 
-    def work() -> dict[str, CaseResult]:
-        found = {}
+    def work() -> None:
         with journal.appending(f"{which}-of-{parts}-rank-{rank}") as store:
-            for case, result in _run_groups(ahead[rank::size], done):
-                store(result)
-                found[result.case] = result
-                if observe is not None:
-                    observe(case, result)
+            for task in counter:
+                group = [cases[number] for number in ahead[task]]
+                for case, result in _run_group(group, done, counter.progress):
+                    store(result)
+                    mine[case.number] = result
+                    if observe is not None:
+                        observe(case, result)
+
+    try:
+        together(comm, work)
+    except Exception:  # on all ranks alike; a signal ends one of them, and `close` would wait
+        counter.close()
+        raise
+    counter.close()
+    if parts > 1:
+        known = done | _of_all(comm, mine)
+        others, _ = _read(journal, cases, comm)
+        mine |= {number: result for number, result in others.items() if number not in known}
+    return SweepResults(cases=cases, mine=mine, comm=comm)
+
+
+def _checked_cases(
+    scene: Scene, vary: Mapping[str, Iterable[Any]], rank: int, size: int
+) -> SweepCases:
+    """Return the cases; each rank makes the scenes of some, so that wrong ones are found."""
+    cases = sweep_cases(scene, vary)
+    for number in range(rank, len(cases), size):
+        _ = cases[number].scene
+    return cases
+
+
+def _read(journal: Journal, cases: SweepCases, comm: Any) -> tuple[dict[int, CaseResult], set[int]]:
+    """Read what is done, each rank from some of the files; return its own, and the numbers of all.
+
+    A case that several files hold belongs to the rank that has the first of them.
+    """
+    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    files = on_root(comm, journal.files)
+
+    def read() -> dict[int, CaseResult]:
+        found: dict[int, CaseResult] = {}
+        for result in journal.read(files[rank::size]):
+            number = cases.number_of(result.case)
+            if number is not None:
+                found.setdefault(number, result)
         return found
 
-    mine = together(comm, work)
-    for found in [mine] if comm is None else comm.allgather(mine):
-        done |= found
-    if parts > 1:
-        done |= on_root(comm, journal.read)
-    return SweepResults(cases=cases, results=[done.get(case.name) for case in cases])
+    mine = together(comm, read)
+    if size == 1:
+        return mine, set(mine)
+    held: list[list[int]] = comm.allgather(sorted(mine))
+    before = {number for numbers in held[:rank] for number in numbers}
+    first = {number: one for number, one in mine.items() if number not in before}
+    return first, set().union(*held)
 
 
-def _run_groups(
-    groups: Sequence[Sequence[Case]], done: Mapping[str, CaseResult]
+def _of_all(comm: Any, mine: Mapping[int, CaseResult]) -> set[int]:
+    """Return the numbers of the cases that any rank holds."""
+    held = [list(mine)] if comm is None else comm.allgather(list(mine))
+    return {number for numbers in held for number in numbers}
+
+
+def _run_group(
+    group: Sequence[Case], done: set[int], progress: Callable[[], None]
 ) -> Iterator[tuple[Case, CaseResult]]:
-    """Yield the results of groups of cases that are not done yet."""
-    for group in groups:
-        first = group[0]
-        steps, notes, failure = _load_steps(first.scene)
-        for case in group:
-            if case.name not in done:
-                ratio = _modulus(case.scene) / _modulus(first.scene)
-                scaled = steps if ratio == 1.0 else [step.with_modulus(ratio) for step in steps]
-                rows = [[_plain(column.of(step)) for column in COLUMNS] for step in scaled]
-                yield case, CaseResult(case=case.name, rows=rows, notes=notes, failure=failure)
+    """Yield the results of those cases of a group that are not done yet."""
+    scene = group[0].scene
+    steps, notes, failure = _load_steps(scene, progress)
+    for case in group:
+        if case.number not in done:
+            ratio = _modulus(case.scene) / _modulus(scene) if len(group) > 1 else 1.0
+            scaled = steps if ratio == 1.0 else [step.with_modulus(ratio) for step in steps]
+            rows = [[_plain(column.of(step)) for column in COLUMNS] for step in scaled]
+            yield case, CaseResult(case=case.name, rows=rows, notes=notes, failure=failure)
 
 
-def _load_steps(scene: Scene) -> tuple[list[LoadStep], tuple[str, ...], str]:
+def _load_steps(
+    scene: Scene, progress: Callable[[], None]
+) -> tuple[list[LoadStep], tuple[str, ...], str]:
     """Run a scene on this process; return its load steps, notes, and why it ended early."""
     run, failure = Run(scene), ""
     try:
         for _ in run.load_steps():
-            pass
+            progress()
     except NotConverged as error:
         failure = str(error)
     history = run.history()

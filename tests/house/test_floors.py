@@ -19,7 +19,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "geometry": [
-        "blocked_spline cores errors legendre_modes slope_search",
+        "blocked_spline cores errors legendre_modes slope_search small_caches",
         "checks collective interpolant materials missing packages regions",
         "face_frame filters spectrum surface",
         "facing mirroring patches statistics summits synthesis",

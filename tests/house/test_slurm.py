@@ -154,13 +154,14 @@ def test_a_run_on_two_ranks_finishes(slurm, reference):
     np.testing.assert_allclose(forces(out), reference("load.steps=2"), rtol=1e-8)
 
 
-def test_an_array_makes_a_folder_for_each_seed(slurm, reference):
+def test_the_tasks_of_an_array_share_the_seeds(slurm, reference):
     out, changes = slurm.folder / "seeds", ["load.steps=2", "coupling.kind=analytic"]
-    job = slurm.submit("--array=1-2", SCRIPTS / "seeds.sbatch", SCENE, out, *SMALL[:3], *changes)
+    script = SCRIPTS / "seeds.sbatch"
+    job = slurm.submit("--array=1-2", script, SCENE, out, "1..3", *SMALL[:3], *changes)
     assert slurm.finish(job, 120) == {"COMPLETED"}, slurm.logs()
-    for seed in (1, 2):
-        expected = reference(*changes, f"surface.spectrum.seed={seed}")
-        np.testing.assert_allclose(forces(out / f"seed-{seed}"), expected, rtol=1e-12)
+    assert len(list((out / "cases").glob("*.jsonl"))) == 2  # one for each task
+    expected = [reference(*changes, f"surface.spectrum.seed={seed}") for seed in (1, 2, 3)]
+    np.testing.assert_allclose(forces(out), np.concatenate(expected), rtol=1e-12)
 
 
 def test_slurm_itself_can_start_the_ranks(slurm):

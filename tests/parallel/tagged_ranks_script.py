@@ -24,6 +24,7 @@ from macro.mesh.neighbours import parts
 from macro.mesh.planar_face import planar_face
 from macro.mesh.supports import free_motions
 from macro.mesh.tagged import TaggedMesh
+from macro.mesh.to_file import write_mesh
 
 COMM = MPI.COMM_WORLD
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
@@ -138,6 +139,8 @@ if __name__ == "__main__":
             COMM, lambda: [write_boxes(folder / f"{v}.msh", v, v > 3) for v in (2.2, 4.1)] and 0
         )
         found = {str(v): measures(read_mesh(folder / f"{v}.msh", COMM)) for v in (2.2, 4.1)}
+        write_mesh(read_mesh(folder / "4.1.msh", COMM), folder / "written.xdmf")
+        found["written"] = measures(read_mesh(folder / "written.xdmf", COMM))
         found["xdmf"] = xdmf(folder)
         found["errors"] = errors(folder)
         found["pushed"] = pushed()

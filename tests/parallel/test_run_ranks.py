@@ -144,7 +144,9 @@ def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
         done = mpirun(ranks, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
         assert done.returncode == 0, done.stderr
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
-    assert set(drawn[0]) == {"surface.png", "curves.png", "pressures.png", "contact.png"}
+    assert set(drawn[0]) == {
+        "overview.png", "surface.png", "curves.png", "pressures.png", "contact.png",
+    }  # fmt: skip
     assert drawn[0] == drawn[1]
 
 

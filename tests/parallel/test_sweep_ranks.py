@@ -1,4 +1,4 @@
-"""A sweep gives the same numbers on any number of ranks."""
+"""A sweep gives the same numbers on any number of ranks, bit by bit, and after a kill."""
 
 import csv
 
@@ -8,22 +8,56 @@ from small_scene import SMALL_SCENE
 
 from multiscale.cli import main
 
+CHEAP = ("--set", "coupling.kind=analytic", "output.check=none", "load.steps=2")
+"""Cases do not know their sweep: what they solve does not matter here."""
 
-@pytest.mark.parametrize("ranks", RANKS)
-def test_ranks_share_the_cases(mpirun, tmp_path, ranks):
+
+@pytest.fixture
+def words(tmp_path):
     scene = tmp_path / "scene.toml"
     scene.write_text(SMALL_SCENE)
-    found, vary = [], ("--vary", "surface.spectrum.seed=0..4")
-    for count in (1, ranks):
-        out = tmp_path / str(count)
-        words = list(map(str, ("sweep", scene, *vary, "--out", out)))
-        if count == 1:
-            assert main(words) == 0
-        else:
-            done = mpirun(count, "-m", "multiscale", *words)
-            assert done.returncode == 0, done.stderr
-        with (out / "history.csv").open(newline="") as file:
+    return ["sweep", str(scene), "--vary", "surface.spectrum.seed=0..6", *CHEAP]
+
+
+def tables(out):
+    """Return the rows of all tables without times."""
+    found = []
+    for name in ("cases", "history", "statistics"):
+        with (out / f"{name}.csv").open(newline="") as file:
             rows = [{**row, "wall_s": None} for row in csv.DictReader(file)]
-        found.append(rows)
-        assert len(list((out / "cases").glob("*.jsonl"))) == count
-    assert found[0] == found[1]  # bit by bit: cases do not know the ranks
+        found.append([row for row in rows if row.get("column") != "wall_s"])
+    return found
+
+
+def journals(out):
+    return sorted((out / "cases").iterdir())
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_ranks_share_the_cases(mpirun, tmp_path, words, ranks):
+    one, many = tmp_path / "one", tmp_path / "many"
+    assert main([*words, "--out", str(one)]) == 0
+    done = mpirun(ranks, "-m", "multiscale", *words, "--out", str(many))
+    assert done.returncode == 0, done.stderr
+    assert tables(one) == tables(many)
+    assert len(tables(one)[2]) > 10
+    assert len(journals(one)) == 1
+    assert len(journals(many)) == ranks  # one entry for each rank, and none for cases
+
+
+@pytest.mark.long
+def test_a_killed_sweep_goes_on_with_other_ranks(mpirun, tmp_path, words):
+    one, out = tmp_path / "one", tmp_path / "out"
+    assert main([*words, "--out", str(one)]) == 0
+    assert mpirun(3, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    first, second, third = journals(out)
+    lines = first.read_bytes().splitlines(keepends=True)
+    first.write_bytes(b"".join(lines[:2]) + lines[2][:30])  # as a kill leaves it
+    second.write_bytes(second.read_bytes()[:20])  # not even its header is whole
+    third.rename(third.with_name("1-of-1-rank-9.jsonl"))  # of a job with more ranks
+    for table in out.glob("*.csv"):
+        table.unlink()
+    assert mpirun(2, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    assert tables(out) == tables(one)
+    kept = [line for path in journals(out) for line in path.read_text().splitlines()[1:]]
+    assert len(kept) == 7  # no case is run twice

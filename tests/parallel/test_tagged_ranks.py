@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from on_ranks import OnRanks
 
-CASES = ("2.2", "4.1", "xdmf")
+CASES = ("2.2", "4.1", "written", "xdmf")
 MORE = [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 4))]
 EXPECTED = {
     "apart.msh": "the mesh is in 2 parts that share no facets, of 5, 5 cells",

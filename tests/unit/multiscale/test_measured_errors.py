@@ -15,8 +15,8 @@ from multiscale import Run, Scene, run
 from multiscale.couplings.contact import on_body
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
+from multiscale.readable import quantity, with_error
 from multiscale.restart.checkpoint import checkpoint_of
-from multiscale.results.history import with_error
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):
@@ -52,7 +52,10 @@ def test_the_last_load_step_has_its_errors_by_cause(kind):
     assert 0.0 < last.force_error_N < 0.5 * last.force_N
     assert last.approach_error_mm == 0.0  # it is prescribed
     assert "check" in history.seconds
-    assert f"at its approach the force is within {last.force_error_N:.2g} N" in history.notes[-1]
+    assert (
+        f"at its approach the force is within {quantity(last.force_error_N, 'N', 2)}"
+        in history.notes[-1]
+    )
 
 
 @pytest.mark.parametrize(("check", "measured"), [("none", 0), ("last", 1), ("all", 2)])
@@ -191,7 +194,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     assert kept["memory_bytes"] > 1e6
     assert kept["decision"] is None
     page = (tmp_path / "report.html").read_text()
-    assert "<h2>What it took</h2>" in page
+    assert "<h2>Error of the force by cause" in page
     assert f"measured at load step {len(run.steps)}</h2>" in page
     assert " ± " in page
 
@@ -207,4 +210,4 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     ],
 )
 def test_values_are_rounded_to_their_errors(value, error, stated):
-    assert with_error(value, error, shown=".6g") == stated
+    assert with_error(value, error, 6) == stated

@@ -1,10 +1,12 @@
 """Times and quantities as people say them, and that they mean the number that they stand for."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from multiscale.readable import duration, quantity
+from multiscale.readable import duration, measured, number, percent, quantity, usual_unit
 from multiscale.scene.quantities import parse_quantity
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
@@ -49,3 +51,43 @@ def test_quantities(value, unit, text):
 def test_quantity_is_read_back(value, unit, digits):
     again = parse_quantity(quantity(value, unit, digits), unit)
     assert again == pytest.approx(value, rel=0.51 * 10.0 ** (1 - digits))  # its last digit
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"), (0.00012, "0.00012"), (41000.0, "41000"), (123456.0, "123500"), (-2.5, "-2.5"),
+        (1.2347e-9, "1.235·10⁻⁹"), (4.2e12, "4.2·10¹²"), (math.nan, "–"), (math.inf, "∞"),
+    ],
+)  # fmt: skip
+def test_numbers_have_no_power_of_ten_of_code(value, text):
+    assert number(value) == text
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "found"),
+    [
+        ([0.01, 20.0], "N", ("N", 1.0)), ([3e-5, 2e-4], "N", ("µN", 1e-6)),
+        ([2e5], "N", ("kN", 1e3)), ([5.9e-4], "mm", ("µm", 1e-3)), ([2e-5], "mm", ("nm", 1e-6)),
+        ([math.nan, 0.0], "MPa", ("MPa", 1.0)),
+        ([12.0, -30.0], "mm", ("mm", 1.0)), ([], "S", ("S", 1.0)),
+    ],
+)  # fmt: skip
+def test_columns_have_one_unit_that_suits_their_largest_value(values, unit, found):
+    assert usual_unit(values, unit) == found
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "unit", "text"),
+    [
+        (5.8987e-4, 6.5e-7, "mm", "0.58987 ± 0.00065 µm"),
+        (1.3e-3, 4e-6, "N", "1.3000 ± 0.0040 mN"),
+        (2.5e-4, None, "N", "250 µN"), (20.0, 0.0, "N", "20 N"), (14100.0, None, "MPa", "14.1 GPa"),
+    ],
+)  # fmt: skip
+def test_measured_quantities_have_value_and_error_in_one_unit(value, error, unit, text):
+    assert measured(value, error, unit) == text
+
+
+def test_shares_are_in_per_cent():
+    assert [percent(share) for share in (0.5, 0.0123, 1.2e-6)] == ["50 %", "1.2 %", "0.00012 %"]

@@ -69,7 +69,8 @@ def test_vertices_of_hexahedra_give_the_nodes_trilinear_displacements():
     body = make("flange", "hex", 8.0, degree=2)
     free = body.free
     free.set(1.0)
-    transfer, points = vertex_transfer(body.space, free)
+    linear = body.linear.space
+    transfer, points = vertex_transfer(body.space, linear, free), linear.tabulate_dof_coordinates()
     slopes = np.array([[1.0, 2.0, 0.5], [-0.3, 0.7, 4.0], [2.0, 0.0, -1.0]])
     here = PETSc.Vec().createWithArray((points @ slopes + 1.0).ravel(), comm=PETSc.COMM_SELF)
     there = transfer.createVecLeft()

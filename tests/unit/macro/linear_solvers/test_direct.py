@@ -23,7 +23,7 @@ def factorised(block, *margins):
     """Return a solver by a factorisation that may take these margins of memory."""
     solver = PETSc.KSP().create(block.stiffness.comm)
     solver.setOptionsPrefix("patchlaw_")
-    solver.setOperators(block.solver.getOperators()[1])
+    solver.setOperators(block.stiffness.convert("aij", PETSc.Mat()))
     with default_options("patchlaw_", {"ksp_type": "cg", "ksp_rtol": 1e-10, **DIRECT_DEFAULTS}):
         solver.setFromOptions()
         set_up(solver, *margins)

@@ -12,6 +12,7 @@ from macro import compat
 from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
+from macro.mesh.to_file import write_mesh
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
@@ -87,6 +88,32 @@ def test_xdmf_brings_tags_back(tmp_path, kind):
         face = planar_face(tagged, tag)
         assert face.frame.normal.tolist() == normal.tolist()
         assert face.area == pytest.approx(1e6, rel=1e-13)  # sums of products
+
+
+def test_a_mesh_that_was_written_is_read_again_with_its_names(tmp_path):
+    first = read_mesh(write_boxes(tmp_path / "part.msh"), COMM, unit=25.4)
+    write_mesh(first, tmp_path / "part.xdmf")
+    again = read_mesh(tmp_path / "part.xdmf", COMM)
+    assert (again.facet_names, again.cell_names) == (first.facet_names, first.cell_names)
+    assert np.array_equal(*(of.bounding_box() for of in (first, again)))
+    above = middles(again)[:, 2] > 25.4
+    assert (again.cell_tags.values == np.where(above, 11, 10)).all()
+    for name in first.facet_names:
+        one, other = (planar_face(of, of.facet_tag(name)) for of in (first, again))
+        assert one.facets == other.facets
+        assert one.frame.normal.tolist() == other.frame.normal.tolist()
+        assert one.area == pytest.approx(other.area, rel=1e-14)  # of sums
+
+
+def test_what_cannot_be_written_or_read_back_is_said(tmp_path):
+    box = tagged_box(COMM)
+    with pytest.raises(InputError, match=r"'\.msh': .* \(allowed: \.xdmf\)"):
+        write_mesh(box, tmp_path / "box.msh")
+    path = tmp_path / "box.xdmf"
+    write_mesh(box, path)
+    path.write_text(path.read_text().replace("&quot;cells&quot;", "cells"))
+    with pytest.raises(InputError, match="its names of tags cannot be read"):
+        read_mesh(path, COMM)
 
 
 def test_xdmf_may_lack_tags_and_have_some(tmp_path):

@@ -50,7 +50,8 @@ def test_run_writes_everything(capsys, tmp_path):
     names = {path.name for path in out.iterdir()}
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
-        "surface.png", "curves.png", "pressures.png", "laws.png",
+        "overview.png", "surface.png", "curves.png", "pressures.png", "laws.png",
+        "overview.svg", "surface.svg", "curves.svg", "pressures.svg", "laws.svg",
     }  # fmt: skip
     with (out / "history.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -59,7 +60,7 @@ def test_run_writes_everything(capsys, tmp_path):
     assert facts["scene"]["surface"]["spectrum"]["seed"] == 1
     assert facts["steps"] == 2
     report = (out / "report.html").read_text(encoding="utf-8")
-    assert report.count("data:image/png;base64,") == 4
+    assert report.count("data:image/png;base64,") == 5
     assert "://" not in report  # it needs no network
 
 

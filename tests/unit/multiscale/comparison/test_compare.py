@@ -224,7 +224,7 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path):
     names = {path.name for path in tmp_path.iterdir()}
     assert names == {
         "compare.csv", "pareto.png", "curves.png", "pressures.png", "report.html",
-        "configurations",
+        "pareto.svg", "curves.svg", "pressures.svg", "configurations",
     }  # fmt: skip
     with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -235,6 +235,11 @@ def test_command_writes_table_figures_and_report(capsys, tmp_path):
     assert report.count("data:image/png;base64,") == 3
     assert "://" not in report  # it needs no network
     assert "Configurations without a result" in report
+    # the table that all look at has six columns, a page's width; the others are folded
+    visible, _, folded = report.partition("<details>")
+    first = visible[visible.index("<h2>Configurations</h2>") :]
+    assert first[: first.index("</tr>")].count("<th>") == 6
+    assert "memory [MB]" in folded and "memory" not in visible
 
     def none_again(one, seconds):
         assert not one.is_own and not one.name.startswith(PICKED)

@@ -10,7 +10,7 @@ import pytest
 
 from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.compare import run_all
+from multiscale.comparison.compare import reference_within, run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
 from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.comparison.process import run_here
@@ -84,6 +84,39 @@ def test_configurations_beyond_the_budget_are_left_out_with_a_word(some, tmp_pat
     assert found[1][0].message == told
     # nothing is kept of it: with more time it is run
     assert fake.all([dear], tmp_path) == [(dear.name, "done", False)]
+
+
+def reference(one, name, meshes, cost, **changes):
+    content = one.content | {"coupling": {"kind": "reference"}, "reference": {"meshes": meshes}}
+    return replace(one, name=name, content=content, cost=cost, **changes)
+
+
+@pytest.mark.parametrize(
+    ("budget", "first"),
+    [(None, None), (1000.0, "three"), (300.0, "two"), (150.0, "two"), (110.0, None), (5.0, None)],
+)
+def test_the_finest_reference_with_an_error_bar_that_leaves_time_is_run_first(some, budget, first):
+    found = [
+        *some,
+        reference(some[0], "one mesh", 1, 10.0),
+        reference(some[0], "low", 2, 20.0, scale=0.1),
+        reference(some[0], "no memory", 3, 30.0, refusal="needs about 70 GB of memory"),
+        reference(some[0], "two", 2, 100.0),
+        reference(some[0], "three", 3, 400.0),
+    ]
+    chosen = reference_within(found, budget)
+    assert (chosen and chosen.name) == first
+
+
+def test_the_first_configuration_leaves_a_part_of_the_budget(some, tmp_path):
+    fake = Fake(seconds=4.0)  # more than 0.8 · 4.5 s
+    found = list(
+        run_all(some, tmp_path, budget_s=4.5, launch=fake, clock=fake.clock, first=some[2])
+    )
+    assert fake.run == [some[2].name, some[0].name]
+    statuses = [(result.configuration.name, result.status) for result, _ in found]
+    assert statuses[0] == (some[2].name, "over budget")
+    assert fake.now == pytest.approx(4.5)
 
 
 def test_configurations_beyond_the_memory_are_refused_with_a_word(some, tmp_path):

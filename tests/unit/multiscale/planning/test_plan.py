@@ -36,7 +36,8 @@ def test_the_micro_model_is_half_space_when_not_given():
 @pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
 def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
     setup = setup_of((size, size))
-    assert f"{size:g} × {size:g} mm and {size:g} mm high" in dict(statements(setup))["block"]
+    side = f"{1e3 * size:g} µm" if size < 1.0 else f"{size:g} mm"
+    assert f"{side} × {side} and {side} high" in dict(statements(setup))["block"]
     assert not list(warnings(setup))
 
 

@@ -92,6 +92,16 @@ def test_wrong_cases_are_refused_before_any_runs(scene, vary, problem):
         sweep(scene, vary)
 
 
+def test_cases_are_found_by_their_names(scene):
+    cases = sweep_cases(scene, VARY)
+    assert [cases.number_of(case.name) for case in cases] == list(range(6))
+    assert cases[4].values == {MODULUS: "4 GPa", SEED: 1}
+    other = sweep_cases(scene, {SEED: range(9), MODULUS: ["4 GPa"]})
+    assert [cases.number_of(case.name) for case in other][:4] == [3, 4, 5, None]
+    assert sweep_cases(scene, {SEED: [1]}).number_of(cases[0].name) is None
+    assert [case.number for case in cases.where({SEED: 2})] == [2, 5]
+
+
 def test_cases_are_what_runs_of_their_own_are(scene):
     found = sweep(scene, VARY)
     for case, forces in zip(found.cases, found.force_N, strict=True):
@@ -193,16 +203,20 @@ def test_command_says_which_cases_failed(file, tmp_path, capsys, monkeypatch):
     assert all("LOST" in case["status"] for case in rows(out / "cases.csv"))
 
 
-def test_command_writes_cases_histories_and_ensembles(file, tmp_path, capsys, monkeypatch):
+def test_command_writes_cases_histories_and_statistics(file, tmp_path, capsys, monkeypatch):
     out = tmp_path / "out"
     words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(out)]
     assert main([*words, "--set", "output.figures=true"]) == 0
-    assert "3 of 3 cases are done" in capsys.readouterr().out
-    cases, steps, bands = (rows(out / f"{name}.csv") for name in ("cases", "history", "ensembles"))
+    shown = capsys.readouterr().out
+    assert "3 cases on 1 rank: about " in shown
+    assert "3 of 3 cases are done" in shown
+    cases, steps, found = (rows(out / f"{name}.csv") for name in ("cases", "history", "statistics"))
     assert [case["status"] for case in cases] == 3 * ["done"]
     assert len(steps) == 6
     mean = np.mean([float(case["force_N"]) for case in cases])
-    assert float(bands[-1]["force_N"]) == pytest.approx(mean, rel=1e-14)
+    (last,) = (one for one in found if (one["step"], one["column"]) == ("2", "force_N"))
+    assert float(last["mean"]) == pytest.approx(mean, rel=1e-14)
+    assert sum(map(int, last["histogram"].split())) == int(last["cases"]) == 3
     assert (out / "sweep.png").read_bytes().startswith(b"\x89PNG")
     assert main(words) == 0  # whether figures are drawn makes no other scene of it
     capsys.readouterr()

@@ -1,0 +1,36 @@
+"""Caches of what many problems have in common, as long as it is small.
+
+The cases of a sweep have the same lengths, cells and body. What depends on these alone is made
+once in each process. What is large is made anew: it takes long to use, and is not held for it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from typing import ParamSpec, TypeVar
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def cached_where_small(
+    is_small: Callable[P, bool], *, most: int
+) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """Return a decorator that caches the results of a function for some of its arguments.
+
+    Args:
+        is_small: Tells from the arguments, which are hashable, whether the result is cached.
+        most: Results that are cached, those used last. They must not be changed.
+    """
+
+    def decorated(make: Callable[P, T]) -> Callable[P, T]:
+        cached = lru_cache(maxsize=most)(make)
+
+        @wraps(make)
+        def made(*args: P.args, **kwargs: P.kwargs) -> T:
+            return (cached if is_small(*args, **kwargs) else make)(*args, **kwargs)  # type: ignore[arg-type]
+
+        return made
+
+    return decorated

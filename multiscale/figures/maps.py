@@ -1,0 +1,163 @@
+"""Maps of a face: their axes and units, colour bars, borders of patches, colours by place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import Normalize, to_rgb
+from numpy.typing import NDArray
+
+from geometry.patches import PatchGrid
+from multiscale.figures.style import BLUE, NO_CONTACT, ORANGE, PRESSURES
+from multiscale.readable import number, usual_unit
+
+Array = NDArray[np.float64]
+
+MOST_NUMBERED_PATCHES = 36
+"""A map of more patches shows colours alone; the numbers would cover each other."""
+
+MOST_POINTS = 420
+"""Cells a side of a map that is drawn; of more, blocks of cells are shown."""
+
+
+def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
+    """Return the number of units in a mm and the unit of x and y on maps, µm below 1 mm.
+
+    Args:
+        lengths: Sides of the map [mm].
+    """
+    return (1e3, "µm") if max(lengths) < 1.0 else (1.0, "mm")
+
+
+def map_axes(axes: Any, lengths: tuple[float, float]) -> float:
+    """Turn axes into those of a map that starts at the origin: to scale, framed, without a grid.
+
+    Args:
+        axes: The axes.
+        lengths: Sides of the map [mm].
+
+    Returns:
+        The number of the map's units in a mm.
+    """
+    scale, unit = map_unit(lengths)
+    axes.set(xlim=(0.0, scale * lengths[0]), ylim=(0.0, scale * lengths[1]), aspect="equal")
+    axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
+    axes.spines[:].set_visible(True)
+    axes.grid(False)
+    return scale
+
+
+def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither") -> Any:
+    """Draw a colour bar to the right of axes, exactly as tall as they are.
+
+    Args:
+        mappable: What the colours belong to.
+        axes: The axes.
+        label: What the colours show, with its unit.
+        extend: ``"max"`` where values beyond the scale are drawn in its last colour.
+
+    Returns:
+        The colour bar.
+    """
+    beside = axes.inset_axes((1.04, 0.0, 0.05, 1.0))
+    beside.grid(False)
+    bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
+    bar.set_label(label)
+    return bar
+
+
+def draw_patch_borders(axes: Any, patches: PatchGrid, colour: str = "0.7") -> None:
+    """Draw the borders between patches.
+
+    Args:
+        axes: Axes of a map.
+        patches: The partition of the interface.
+        colour: Colour of the lines.
+    """
+    scale, _ = map_unit(patches.lengths)
+    for draw, borders in ((axes.axvline, patches.borders_x), (axes.axhline, patches.borders_y)):
+        for border in borders[1:-1]:
+            draw(scale * border, color=colour, lw=0.6, alpha=0.9)
+
+
+def draw_pressures(
+    axes: Any,
+    patches: PatchGrid,
+    pressure: Array,
+    *,
+    top: float | None = None,
+    label: str = "mean pressure of the patch",
+) -> Any:
+    """Draw one map of patch pressures; patches that carry nothing are white.
+
+    Args:
+        axes: Axes to draw into.
+        patches: The partition of the interface.
+        pressure: Mean pressure of each patch, shape (N,) [MPa].
+        top: End of the colour scale, for maps that share one [MPa].
+        label: Label of the colour bar, without the unit; empty draws none.
+
+    Returns:
+        The map, for a colour bar.
+    """
+    scale = map_axes(axes, patches.lengths)
+    largest = float(pressure.max(initial=0.0)) if top is None else top
+    unit, size = usual_unit([largest], "MPa")
+    pressure, norm = pressure / size, Normalize(0.0, largest / size or 1.0)
+    shown = np.ma.masked_less_equal(pressure, 0.0).reshape(patches.grid)
+    axes.set_facecolor(NO_CONTACT)
+    borders = scale * patches.borders_x, scale * patches.borders_y
+    image = axes.pcolormesh(*borders, shown.T, cmap=PRESSURES, norm=norm)
+    image.set_rasterized(patches.count > MOST_NUMBERED_PATCHES)
+    draw_patch_borders(axes, patches)
+    if patches.count <= MOST_NUMBERED_PATCHES:
+        for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
+            colour = "white" if value > 0.6 * norm.vmax else "black"
+            axes.text(x, y, _number(value), ha="center", va="center", color=colour, fontsize=7)
+    if label:
+        colour_bar(image, axes, f"{label} [{unit}]")
+    return image
+
+
+def _number(value: float) -> str:
+    """Return a pressure in few digits and without a power of ten; nothing for an open patch."""
+    if value <= 0.0:
+        return ""
+    return f"{value:.0f}" if value >= 99.5 else number(value, 2)
+
+
+def place_colours(shares: Array) -> Array:
+    """Return colours by place on a face: from blue to orange along x, from dark to light along y.
+
+    Args:
+        shares: Places as shares of the face's sides, shape (n, 2), from 0 to 1.
+
+    Returns:
+        Red, green and blue, shape (n, 3).
+    """
+    x, y = np.clip(np.asarray(shares, float), 0.0, 1.0).T[:, :, None]
+    colour = (1.0 - x) * np.array(to_rgb(BLUE)) + x * np.array(to_rgb(ORANGE))
+    dark, light = np.clip(0.5 - y, 0.0, 0.5), np.clip(y - 0.5, 0.0, 0.5)
+    found: Array = colour * (1.0 - 1.1 * dark) + (1.0 - colour) * 1.1 * light
+    return found
+
+
+def coarsened(values: Any, *, largest: bool, most: int = MOST_POINTS) -> Any:
+    """Return a field on few enough cells to draw; what lies beyond whole blocks is left out.
+
+    Args:
+        values: The field, possibly masked, shape (nx, ny).
+        largest: Whether a block shows its largest value, so that the smallest spots stay visible;
+            else its mean, masked where one of its cells is.
+        most: Largest number of cells a side.
+    """
+    step = -(-max(values.shape) // most)
+    if step == 1:
+        return values
+    nx, ny = (n // step * step for n in values.shape)
+    blocks = values[:nx, :ny].reshape(nx // step, step, ny // step, step)
+    if largest:
+        return blocks.max(axis=(1, 3))
+    hidden = np.ma.getmaskarray(blocks).any(axis=(1, 3))
+    return np.ma.masked_where(hidden, blocks.mean(axis=(1, 3)))

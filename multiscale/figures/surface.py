@@ -1,0 +1,182 @@
+"""A surface: its map with summits and patches, heights, spectrum and bearing ratio."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from geometry.asperities import Asperities
+from geometry.patches import PatchGrid
+from geometry.spectrum import Spectrum
+from geometry.statistics import power_spectrum, roughness
+from geometry.surface import Surface
+from geometry.synthesis import random_waves
+from multiscale.figures.maps import coarsened, colour_bar, draw_patch_borders, map_axes
+from multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    GREY,
+    HEIGHTS,
+    INK,
+    VERMILLION,
+    new_figure,
+    styled,
+)
+from multiscale.readable import quantity, usual_unit
+
+Array = NDArray[np.float64]
+
+MOST_SUMMITS = 200
+"""Summits that are marked on a map; of more, the highest, which come into contact first."""
+
+MOST_PATCHES = 1024
+"""Patches whose borders are drawn; more would hide the heights."""
+
+_LEAST_POWER = 1e-8
+"""Spectral densities below this share of the largest are rounding, or none, and not drawn."""
+
+
+@styled()
+def surface_figure(
+    surface: Surface,
+    asperities: Asperities | None,
+    patches: PatchGrid,
+    target: Spectrum | None = None,
+) -> Figure:
+    """Draw a surface: map, histogram of heights, power spectrum and bearing ratio.
+
+    Args:
+        surface: The heights.
+        asperities: The summits of the surface; None leaves them out.
+        patches: The partition of the interface.
+        target: The spectrum that the surface was synthesised from; None for another surface.
+    """
+    figure = new_figure(FULL_WIDTH, 5.4)
+    (map_, heights), (spectrum, bearing) = figure.subplots(2, 2)
+    draw_surface(map_, surface, asperities, patches)
+    draw_heights(heights, surface)
+    draw_spectrum(spectrum, surface, target)
+    draw_bearing_ratio(bearing, surface)
+    return figure
+
+
+def draw_surface(
+    axes: Any, surface: Surface, asperities: Asperities | None, patches: PatchGrid | None = None
+) -> None:
+    """Draw the map of the heights, with the highest summits and the borders of patches.
+
+    Args:
+        axes: Axes to draw into.
+        surface: The heights.
+        asperities: The summits of the surface; None leaves them out.
+        patches: The partition of the interface; None draws none.
+    """
+    scale = map_axes(axes, surface.lengths)
+    unit, centred = _centred(surface)
+    heights = coarsened(centred, largest=False)
+    extent = (0.0, scale * surface.lengths[0], 0.0, scale * surface.lengths[1])
+    image = axes.imshow(heights.T, origin="lower", extent=extent, cmap=HEIGHTS)
+    colour_bar(image, axes, f"height over the mean plane [{unit}]")
+    if patches is not None and 1 < patches.count <= MOST_PATCHES:
+        draw_patch_borders(axes, patches, colour="white")
+    title = f"{surface.grid[0]} × {surface.grid[1]} heights"
+    if asperities is not None:
+        title = _draw_summits(axes, asperities, scale)
+    axes.set_title(title)
+
+
+def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
+    """Mark the highest summits and maxima of the border, and return a title that says so."""
+    highest = np.argsort(-asperities.z, kind="stable")[:MOST_SUMMITS]
+    lowest = asperities.z[highest].min() if len(highest) < len(asperities) else -np.inf
+    edge = np.flatnonzero(asperities.border_z >= lowest)
+    dot: dict[str, Any] = {"marker": "o", "ms": 3.0, "mfc": VERMILLION, "mec": "white", "mew": 0.4}
+    cross: dict[str, Any] = {"marker": "x", "ms": 3.0, "mew": 0.8, "color": "black"}
+    for x, y, chosen, look, label in (
+        (asperities.x, asperities.y, highest, dot, "summits"),
+        (asperities.border_x, asperities.border_y, edge, cross, "maxima on the border, unused"),
+    ):
+        if chosen.size:
+            place = scale * x[chosen], scale * y[chosen]
+            axes.plot(*place, ls="none", label=label, clip_on=False, **look)
+    if highest.size or edge.size:
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncol=2, handletextpad=0.2)
+    if len(highest) < len(asperities):
+        return f"the {len(highest)} highest of {len(asperities):,} summits".replace(",", " ")
+    return f"{len(asperities)} summits"
+
+
+def draw_heights(axes: Any, surface: Surface) -> None:
+    """Draw the histogram of the heights beside a normal distribution of the same rms height.
+
+    Args:
+        axes: Axes to draw into.
+        surface: The heights.
+    """
+    unit, centred = _centred(surface)
+    heights, rough = centred.ravel(), roughness(surface)
+    sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
+    axes.hist(heights, bins, density=True, color=BLUE, alpha=0.55, label="heights")
+    if sq > 0.0:
+        h = np.linspace(float(heights.min()), float(heights.max()), 200)
+        normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)
+        axes.plot(h, normal, "--", color=INK, lw=1.1, label="normal distribution")
+        axes.set_title(
+            f"Sq {quantity(rough.sq, 'mm', 3)}, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}"
+        )
+    axes.set(xlabel=f"height over the mean plane [{unit}]", ylabel=f"share of heights per {unit}")
+    axes.legend(loc="upper left")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
+
+
+def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -> None:
+    """Draw the radially averaged power spectral density.
+
+    Args:
+        axes: Axes to draw into.
+        surface: The heights.
+        target: The spectrum that the surface was synthesised from; None draws none.
+    """
+    found = power_spectrum(surface)
+    kept = found.density > _LEAST_POWER * found.density.max()
+    few = dict(marker="o", ms=2.5) if kept.sum() <= 40 else {}
+    axes.loglog(found.wavenumber[kept], found.density[kept], color=BLUE, label="surface", **few)
+    if target is not None:
+        waves, cell = random_waves(target, surface.lengths), 4.0 * np.pi**2 / surface.area
+        q = 2.0 * np.pi * np.hypot(waves.kx / surface.lengths[0], waves.ky / surface.lengths[1])
+        ends = [q.argmin(), q.argmax()]
+        density = waves.amplitude[ends] ** 2 / cell
+        axes.loglog(q[ends], density, "--", color=VERMILLION, lw=1.1, label="target")
+        axes.legend()
+    axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
+    axes.minorticks_off()  # drawing them takes as long as all the rest
+    axes.set_title(f"rms gradient {roughness(surface).sdq:.3g}")
+
+
+def draw_bearing_ratio(axes: Any, surface: Surface) -> None:
+    """Draw the bearing ratio of Abbott and Firestone: the share of the surface above a height.
+
+    Args:
+        axes: Axes to draw into.
+        surface: The heights.
+
+    Source: ISO 25178-2, areal material ratio.
+    """
+    share = np.linspace(0.0, 100.0, 401)
+    unit, heights = _centred(surface)
+    axes.plot(share, np.percentile(heights, 100.0 - share), color=BLUE)
+    axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
+    axes.set(xlabel="bearing ratio: share of the surface above [%]", xlim=(0.0, 100.0))
+    axes.set(
+        ylabel=f"height over the mean plane [{unit}]", title="bearing ratio (Abbott–Firestone)"
+    )
+
+
+def _centred(surface: Surface) -> tuple[str, Array]:
+    """Return the unit that suits the heights, and the heights over their mean in it."""
+    heights = surface.heights - surface.mean_height
+    name, size = usual_unit([float(np.abs(heights).max())], "mm")
+    return name, heights / size

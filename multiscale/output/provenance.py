@@ -1,0 +1,131 @@
+"""The provenance of a run, for programs: versions, scene, options, times, convergence."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from contextlib import suppress
+from dataclasses import asdict
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from pydantic_core import to_jsonable_python
+
+from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.machine import peak_memory
+from multiscale.run import Run
+from multiscale.setup.mesh_bodies import FaceFacts
+from multiscale.setup.problem import ProblemSetup
+
+LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
+"""Libraries whose versions are recorded."""
+
+
+def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
+    """Collect versions, scene, options, times and convergence of a run.
+
+    Args:
+        run: The run, finished or stopped.
+        options: PETSc options given by the user.
+
+    Returns:
+        A dictionary that JSON can hold; what is unknown or infinite is None.
+    """
+    history, setup = run.history(), run.setup
+    content = {
+        "patchlaw": version("patchlaw"),
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "scene_file": run.scene.file,
+        "scene": run.scene,
+        "scene_given": run.given,
+        "units": "mm, N, MPa",
+        "surface": {
+            "source": setup.surface.source,
+            "notes": list(setup.surface.notes),
+            "lengths_mm": list(setup.surface.lengths),
+            "heights_sha256": run.heights,
+            "highest_mm": setup.surface.highest,
+            "summits": setup.asperities.count,
+            "summits_in_reach": int(setup.interfering_summits.sum()),
+            "border_maxima_in_reach": setup.interfering_border_maxima,
+        },
+        "patches": None if setup.samples else list(setup.patches.grid),
+        "regions": list(setup.regions.names) if setup.regions else None,
+        "bodies": [_body(face) for face in (setup.face, setup.counter_face) if face is not None],
+        "contact_modulus_MPa": setup.materials.contact_modulus,
+        "micro_model": _micro_model(setup),
+        "ranks": 1 if run.comm is None else run.comm.size,
+        "threads": os.environ.get("OMP_NUM_THREADS"),
+        "petsc_options": options,
+        "unknowns": run.unknowns,
+        "reference": _reference(run),
+        "seconds": history.seconds,
+        "memory_bytes": peak_memory(),
+        "errors_N": [dict(step.errors) for step in history],
+        "decision": setup.decision and {**asdict(setup.decision), "kept": setup.decision.kept},
+        "steps": len(history),
+        "finished": run.finished,
+        "contacts": [{"step": record.step, "spots": len(record.spots)} for record in run.contacts],
+        "reasons": sorted({step.reason for step in history}),
+        "notes": list(history.notes),
+        "versions": library_versions(),
+        "machine": platform.platform(),
+    }
+    known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
+    return known
+
+
+def _body(face: FaceFacts) -> dict[str, Any]:
+    """Return what is known of a body and its contact face."""
+    return {
+        "mesh_sha256": face.digest or None,
+        "cells": face.cells,
+        "element": face.element,
+        "unknowns": face.unknowns,
+        "contact_area_mm2": face.area,
+        "contact_lengths_mm": list(face.lengths),
+        "depth_mm": face.depth,
+        "above_contact_plane": face.above,
+    }
+
+
+def _reference(run: Run) -> dict[str, Any] | None:
+    """Return the meshes of a reference and its errors; None with other couplings."""
+    record, coupling = run.history().reference, run.coupling
+    if record is None or not isinstance(coupling, ReferenceCoupling):
+        return None
+    return {
+        "method": run.scene.reference.method,
+        "sizes_mm": record.sizes.tolist(),
+        "unknowns": record.unknowns,
+        "active_sets": [step.newton_iterations for step in run.steps],
+        "force_rate": record.force.rate.tolist(),
+        "area_rate": record.area.rate.tolist(),
+        "error": record.label,
+        "mesh_quality": coupling.qualities,
+    }
+
+
+def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
+    """Return the micro model and, where it was chosen, the candidates; None without one."""
+    if setup.micro is None:
+        return None
+    choice = setup.choice
+    chosen = {} if choice is None else {"chosen": choice.taken, "candidates": choice.candidates}
+    return {"name": setup.model.name, **chosen}
+
+
+def library_versions() -> dict[str, str]:
+    """Return the versions of Python and of the libraries that took part."""
+    loaded = {name: sys.modules[name] for name in LIBRARIES if name in sys.modules}
+    found = {name: _version(name, module) for name, module in loaded.items()}
+    return {"python": platform.python_version(), **found}
+
+
+def _version(name: str, module: Any) -> str:
+    """Return the version of a library, whose attribute some packagings leave out."""
+    with suppress(PackageNotFoundError):
+        return str(getattr(module, "__version__", None) or version(name))
+    return str(getattr(getattr(module, "version", None), "version", "unknown"))

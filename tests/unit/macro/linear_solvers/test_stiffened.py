@@ -1,0 +1,45 @@
+"""A stiffness with springs at few nodes, without a second matrix: the same as the sum assembled."""
+
+import numpy as np
+import pytest
+from body_meshes import box, standing
+from petsc4py import PETSc
+
+from geometry.patches import PatchGrid
+from macro import Material
+from macro.linear_solvers.stiffened import Stiffened
+
+SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
+WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+
+
+@pytest.fixture(scope="module")
+def face():
+    return standing(box((0, 0, -0.5), (1, 1, 0), (2, 2, 1), "tetrahedron"), SOFT, WHOLE, 2)
+
+
+@pytest.fixture(scope="module")
+def stiffened(face):
+    points = face.points_by_dofs
+    springs = points.transposeMatMult(points)
+    springs.scale(1e6)
+    return Stiffened(face.body.stiffness, springs)
+
+
+def test_products_are_those_of_the_sum(face, stiffened):
+    stiffness = face.body.stiffness
+    x, y = stiffness.createVecs()
+    x.array[:] = np.random.default_rng(3).standard_normal(x.local_size)
+    stiffened.product.mult(x, y)
+    np.testing.assert_allclose(y.array_r, (stiffened.assembled() * x).array_r, rtol=1e-12)
+    assert abs((stiffness * x).array_r - y.array_r).max() > 1e-3 * abs(y.array_r).max()
+
+
+def test_diagonal_blocks_are_those_of_the_sum(stiffened):
+    every = np.arange(stiffened.product.size[0], dtype=PETSc.IntType)
+    blocks, whole = (
+        of.convert("aij", PETSc.Mat()).getValues(every, every)
+        for of in (stiffened.diagonal_blocks(), stiffened.assembled())
+    )
+    same_node = every[:, None] // 3 == every // 3
+    np.testing.assert_allclose(blocks, np.where(same_node, whole, 0.0), atol=1e-11 * whole.max())
