@@ -236,18 +236,14 @@ class SweepResults:
         Raises:
             InputError: When no case is finished, or they took different numbers of load steps.
         """
-<<<<<<< HEAD
         with optional_packages():
-            from multiscale.sweeps.figure import Ensemble, sweep_figure  # loads matplotlib
-=======
-        from multiscale.sweeps.figure import (  # loads matplotlib
-            CURVES,
-            MOST_CURVES,
-            MOST_ENSEMBLES,
-            Ensemble,
-            sweep_figure,
-        )
->>>>>>> main
+            from multiscale.sweeps.figure import (  # loads matplotlib
+                CURVES,
+                MOST_CURVES,
+                MOST_ENSEMBLES,
+                Ensemble,
+                sweep_figure,
+            )
 
         if self.unfinished == len(self):
             raise InputError("no case is finished, so there is nothing to draw")
