@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         Control,
         InputError,
         NotConverged,
+        NotInstalled,
         PatchGrid,
         RigidPlane,
         Spectrum,
@@ -45,8 +46,8 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
     )
 
 _NAMES = {
-    "geometry": "Control InputError NotConverged PatchGrid RigidPlane Spectrum Surface "
-    "read_surface synthesise",
+    "geometry": "Control InputError NotConverged NotInstalled PatchGrid RigidPlane Spectrum "
+    "Surface read_surface synthesise",
     "macro": "ContactProblem Interface LawOperator vector_space",
     "micro": "HalfSpaceModel",
     "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
@@ -59,7 +60,10 @@ __all__ = ["main", *_HOMES]
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        return getattr(import_module(_HOMES[name]), name)
+        from geometry.packages import optional_packages  # loads numpy
+
+        with optional_packages():
+            return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module 'patchlaw' has no attribute '{name}'")
 
 

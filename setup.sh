@@ -62,7 +62,7 @@ wanted="$PWD $("$python" --version) $(sha256sum pyproject.toml) ${instruments:+$
 if [ ! -x .venv/bin/patchlaw ] || [ "$(cat "$stamp" 2>/dev/null)" != "$wanted" ]; then
   say "making .venv"
   "$python" -m venv --clear --system-site-packages .venv || fail "could not make .venv with $python"
-  .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[test${docs:+,docs}]" ||
+  .venv/bin/python -m pip install --quiet --disable-pip-version-check --editable ".[beside-dolfinx,test${docs:+,docs}]" ||
     fail "pip could not install patchlaw and its pure-Python requirements (is a package index reachable?)"
   .venv/bin/python -c 'import dolfinx, petsc4py, mpi4py, gmsh, h5py, scipy, matplotlib, filelock, jinja2, pint, pydantic, rich, threadpoolctl' ||
     fail "the installed packages cannot be imported together; see the message above"

@@ -6,7 +6,7 @@ contact modulus, and block shapes the mesh of the body under the surface.
 """
 
 from geometry.asperities import Asperities, find_asperities
-from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.errors import InputError, NotConverged, NotInstalled, PatchlawError
 from geometry.facing import facing, laid_on, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
@@ -31,6 +31,7 @@ __all__ = [
     "Material",
     "MaterialPair",
     "NotConverged",
+    "NotInstalled",
     "Partition",
     "PatchGrid",
     "PatchlawError",

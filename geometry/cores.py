@@ -12,11 +12,9 @@ import platform
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import cache
 from typing import Any, NamedTuple, TypeVar
-
-from threadpoolctl import ThreadpoolController
 
 Result = TypeVar("Result")
 
@@ -195,15 +193,21 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
 def blas_threads(count: int) -> AbstractContextManager[object]:
     """Set how many threads BLAS takes, at once; on leaving the context as many as before.
 
-    Threads of BLAS keep a core busy for a while after their work, which then lacks to ours.
+    Threads of BLAS keep a core busy for a while after their work, which then lacks to ours. Without
+    threadpoolctl, which contacts do not require, BLAS keeps the number it has.
 
     Args:
         count: The number.
     """
-    return _blas().limit(limits=count)
+    blas = _blas()
+    return nullcontext() if blas is None else blas.limit(limits=count)
 
 
 @cache
-def _blas() -> ThreadpoolController:
+def _blas() -> Any:
     """Return what sets the threads of BLAS; most work needs none, and BLAS is loaded by then."""
+    try:
+        from threadpoolctl import ThreadpoolController
+    except ModuleNotFoundError:
+        return None
     return ThreadpoolController().select(user_api="blas")

@@ -78,6 +78,12 @@ class InputError(PatchlawError, ValueError):
         return f"{text} (allowed: {self.allowed})" if self.allowed else text
 
 
+class NotInstalled(PatchlawError, ImportError):
+    """A package is missing that only a part of patchlaw needs; see `geometry.packages`."""
+
+    exit_code = 2
+
+
 class NotConverged(PatchlawError, RuntimeError):
     """An iteration ended without a solution; accepted load steps before it remain.
 

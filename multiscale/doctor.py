@@ -21,6 +21,7 @@ import threadpoolctl
 
 from geometry.cores import place
 from geometry.errors import InputError, PatchlawError
+from geometry.packages import optional_packages
 from multiscale.installation import removal, shadows, versions
 from multiscale.machine import control_group_memory, cores_statement, detached_processes
 
@@ -66,7 +67,8 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> dict[str, CheckResult]:
 
     def made(check: Check) -> CheckResult:
         try:
-            return check(comm)
+            with optional_packages():
+                return check(comm)
         except PatchlawError as failure:  # its text holds the remedy
             return CheckResult("fail", str(failure))
         except Exception as failure:

@@ -72,8 +72,10 @@ def world() -> Any:
             key="HOME",
             allowed="set it to any folder",
         ) from None
-    from mpi4py import MPI
-
+    try:
+        from mpi4py import MPI
+    except ModuleNotFoundError:  # scenes without finite elements need none
+        return None
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
 
 
@@ -133,7 +135,8 @@ def refuse_detached_processes() -> None:
     """Refuse several processes that are no MPI job, each of which would compute the whole scene.
 
     Raises:
-        InputError: When the launcher is not that of the MPI that mpi4py was built with.
+        InputError: When the launcher is not that of the MPI that mpi4py was built with, or there is
+            no mpi4py.
     """
     if found := detached_processes():
         name, count = found

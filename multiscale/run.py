@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
+from geometry.packages import optional_packages
 from micro import HalfSpaceModel, MicroModel
 from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
@@ -330,6 +331,7 @@ class Run:
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
 
 
+@optional_packages()
 def run(
     scene: Scene, comm: Any = None, *, observe: Callable[[LoadStep], None] | None = None
 ) -> History:
@@ -346,6 +348,7 @@ def run(
     Raises:
         InputError: When the scene cannot be made.
         NotConverged: When a load step fails for good.
+        NotInstalled: When the scene needs a package that is missing.
 
     Note:
         Collective.

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
+from geometry.packages import optional_packages
+
 _OPTIONS = {
     "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
     "General.Verbosity": 0,
@@ -68,7 +70,7 @@ def gmsh_session(name: str) -> Iterator[Any]:
     Yields:
         The gmsh module.
     """
-    with sigint_untouched():
+    with sigint_untouched(), optional_packages():
         import gmsh  # here, so that everything without a mesh works without gmsh
 
         owned = not is_initialised(gmsh)

@@ -79,8 +79,15 @@ def _run(words: list[str]) -> int:
 
     if not works_together():
         return _WRONG_INPUT
-    from multiscale.cli.execution import execute
+    from geometry.errors import NotInstalled
+    from geometry.packages import optional_packages
 
+    try:
+        with optional_packages():
+            from multiscale.cli.execution import execute
+    except NotInstalled as error:  # what other errors are written with may be missing
+        print(f"patchlaw: {error}", file=sys.stderr)
+        return error.exit_code
     return execute(choice, words[cut + 1 :])
 
 

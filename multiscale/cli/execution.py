@@ -15,6 +15,7 @@ from typing import Any
 from geometry.collective import on_root
 from geometry.cores import hold_blas
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
+from geometry.packages import optional_packages
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -52,8 +53,9 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        command = getattr(import_module(f"multiscale.cli.{module}"), function)
-        command(choice, _start_petsc(options), comm)
+        with optional_packages():
+            command = getattr(import_module(f"multiscale.cli.{module}"), function)
+            command(choice, _start_petsc(options), comm)
     except PatchlawError as error:
         if _all_arrive(meeting):
             terminal.complain(comm, error)

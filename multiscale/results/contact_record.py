@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.packages import optional_packages
 from micro.contact_detail import ContactDetail
 from multiscale.loading.load_step import LoadStep
 
@@ -110,6 +111,7 @@ class ContactRecord:
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        from multiscale.figures.contact import contact_figure  # loads matplotlib
+        with optional_packages():
+            from multiscale.figures.contact import contact_figure  # loads matplotlib
 
         return contact_figure(self)

@@ -9,6 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.packages import optional_packages
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
@@ -297,7 +298,8 @@ class History:
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        from multiscale.figures.curves import history_figure  # loads matplotlib
+        with optional_packages():
+            from multiscale.figures.curves import history_figure  # loads matplotlib
 
         return history_figure(self, label)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
+from geometry.packages import optional_packages
 from multiscale.results.history import COLUMNS, data_frame
 from multiscale.sweeps.cases import SweepCases
 from multiscale.sweeps.journal import CaseResult
@@ -235,13 +236,14 @@ class SweepResults:
         Raises:
             InputError: When no case is finished, or they took different numbers of load steps.
         """
-        from multiscale.sweeps.figure import (  # loads matplotlib
-            CURVES,
-            MOST_CURVES,
-            MOST_ENSEMBLES,
-            Ensemble,
-            sweep_figure,
-        )
+        with optional_packages():
+            from multiscale.sweeps.figure import (  # loads matplotlib
+                CURVES,
+                MOST_CURVES,
+                MOST_ENSEMBLES,
+                Ensemble,
+                sweep_figure,
+            )
 
         if self.unfinished == len(self):
             raise InputError("no case is finished, so there is nothing to draw")

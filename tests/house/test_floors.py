@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline cores errors legendre_modes slope_search small_caches",
-        "checks collective interpolant materials missing regions",
+        "checks collective interpolant materials missing packages regions",
         "face_frame filters spectrum surface",
         "facing mirroring patches statistics summits synthesis",
         "plausibility preparation rigid_plane",

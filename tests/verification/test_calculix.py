@@ -45,17 +45,16 @@ class Lines:
         return slopes[np.searchsorted(self._closure, closure, side="right")]
 
 
-@pytest.fixture(scope="module", params=[(1, 1), (2, 1)], ids=["one law", "two laws"])
-def exported(request, tmp_path_factory):
-    """Laws of a rough surface, the file that CalculiX reads, and its lines as laws."""
+def exported_laws(patches, folder):
+    """Return laws of a rough surface, the file that CalculiX reads, and its lines as laws."""
     scene = tomllib.loads(SMALL_SCENE)
     scene["coupling"]["kind"] = "isolated"
-    scene["patches"]["grid"] = list(request.param)
+    scene["patches"]["grid"] = list(patches)
     scene["surface"]["spectrum"]["rms_slope"] = 2e-4
     scene["block"]["young_modulus"] = 4.0 * LOAD
     scene["load"]["approach"] = 1.2 * APPROACH
     table = Run(Scene.from_dict(scene)).make_laws()
-    (path,) = export_laws(table, tmp_path_factory.mktemp("laws"), "calculix")
+    (path,) = export_laws(table, folder, "calculix")
     rows, error = [], []
     for line in path.read_text(encoding="ascii").splitlines():
         if line.startswith("*SURFACE BEHAVIOR"):
@@ -66,6 +65,11 @@ def exported(request, tmp_path_factory):
             error.append(float(line.split(":")[1]))
     assert len(rows) == table.patches.count and max(error) < 1.1e-4
     return table, path, [Lines(*np.transpose(one)) for one in rows]
+
+
+@pytest.fixture(scope="module", params=[(1, 1), (2, 1)], ids=["one law", "two laws"])
+def exported(request, tmp_path_factory):
+    return exported_laws(request.param, tmp_path_factory.mktemp("laws"))
 
 
 def faces_of(table, element, cells):

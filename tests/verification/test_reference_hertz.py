@@ -118,19 +118,24 @@ def test_bias_of_the_areas_at_quadrature_points():
     assert abs(state.contact_area_fine / exact - 1.0) < 0.08
 
 
-@pytest.mark.parametrize("exponent", [6, 12])
-def test_towards_the_flat_punch(exponent):
-    """C rⁿ tends to a flat punch of its contact's radius: F = 2 E* a δ n / (n + 1)."""
-    radius, approach = 0.1, 1e-4
-    coefficient = approach / (radius**exponent * 3.0)
+def towards_a_punch(exponent, approach):
+    """Return a block that is C rⁿ on a mesh, C, and Sneddon's force and contact radius."""
+    coefficient = approach / (0.1**exponent * 3.0)
 
     def profile(x, y):  # levels off at 30 approaches, which changes 1e-6 of it in the contact
         rise = coefficient * (x**2 + y**2) ** (exponent / 2)
         return rise / (1.0 + (rise / (30.0 * approach)) ** 4) ** 0.25
 
-    surface = body(profile, points=257)
     force, contact = power_law(exponent, coefficient, approach)
-    (block,) = meshed(surface, approach, fine=contact / 3.0)
+    (block,) = meshed(body(profile, points=257), approach, fine=contact / 3.0)
+    return block, coefficient, force, contact
+
+
+@pytest.mark.parametrize("exponent", [6, 12])
+def test_towards_the_flat_punch(exponent):
+    """C rⁿ tends to a flat punch of its contact's radius: F = 2 E* a δ n / (n + 1)."""
+    approach = 1e-4
+    block, coefficient, force, contact = towards_a_punch(exponent, approach)
     near = [block.solve(Control(approach=factor * approach)) for factor in (0.9, 1.0, 1.1)]
     # measured +0.2 and +0.7 %, with twice the edges −0.02 and −0.1 %
     assert near[1].force == pytest.approx(force, rel=1e-2)

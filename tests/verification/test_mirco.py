@@ -1,0 +1,77 @@
+"""The half-space model against MIRCO (imcs-compsim/MIRCO, commit de05a25): sup7, sup9.
+
+MIRCO solves the contact conditions by non-negative least squares on a dense matrix (Bonari et al.
+2020, doi 10.1007/s00466-019-01791-3). Pressures and contact areas are those that its own tests
+expect; shape factors those that it was given for a flat punch on n × n cells. The surfaces are
+drawn anew by `random_midpoint.py`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from random_midpoint import random_midpoint
+
+from geometry import Surface
+from micro import HalfSpaceModel
+
+LENGTH, E_STAR = 1000.0, 1.0 / (2.0 * (1.0 - 0.3**2))
+SHAPE_FACTORS = {
+    8: 0.9037519877715218,
+    32: 0.8770287405762021,
+    129: 0.8701463093314787,
+    513: 0.8684174965138375,
+}
+
+
+class Case(NamedTuple):
+    """What sup7 and sup9 are given, and what is expected of them."""
+
+    generations: int
+    deviation: float
+    approach: float
+    pressure: float
+    area_fraction: float
+
+
+SUP7 = Case(7, 20.0, 10.0, 4.526213923013545e-4, 6.970734931794964e-3)
+SUP9 = Case(9, 100.0, 40.0, 1.181045297945221e-3, 2.352100741348715e-3)
+
+
+def shape_factor(cells):
+    """Return E* δ L / F of a flat punch on n × n cells of pressure."""
+    flat = Surface(heights=np.zeros((cells, cells)), lengths=(LENGTH, LENGTH))
+    model = HalfSpaceModel(flat, contact_modulus=E_STAR, tolerance=1e-12)
+    return E_STAR * LENGTH / model.solve(1.0).force
+
+
+def pressed(case):
+    """Return mean pressure and contact area fraction.
+
+    The patch lies on a body: what its mean pressure indents a half-space by as a flat punch is
+    added to the approach, until the force changes by less than one per cent.
+    """
+    heights = random_midpoint(case.generations, hurst=0.7, deviation=case.deviation, seed=95)
+    surface = Surface(heights=heights, lengths=(LENGTH, LENGTH))
+    model = HalfSpaceModel(surface, contact_modulus=E_STAR, highest=heights.max(), tolerance=1e-10)
+    stiffness = LENGTH * E_STAR / SHAPE_FACTORS[len(heights)]
+    state, change = model.solve(case.approach), np.inf
+    while change > 0.01:
+        before = state
+        state = model.solve(case.approach + before.force / stiffness, start=before)
+        change = abs(state.force - before.force) / state.force
+    return state.force / surface.area, state.counted_area / surface.area
+
+
+# their numbers agree with ours to 3e-12; 1e-9 leaves room for other libraries' rounding
+@pytest.mark.parametrize("case", [SUP7, pytest.param(SUP9, marks=pytest.mark.long)])
+def test_rough_patches(case):
+    pressure, area_fraction = pressed(case)
+    assert pressure == pytest.approx(case.pressure, rel=1e-9)
+    assert area_fraction == pytest.approx(case.area_fraction, rel=1e-12)  # the same cells
+
+
+@pytest.mark.parametrize("cells", [8, 32, 129, pytest.param(513, marks=pytest.mark.long)])
+def test_flat_punches(cells):
+    # theirs is 1.2e-10 off on 513² cells, 5e-13 on fewer
+    assert shape_factor(cells) == pytest.approx(SHAPE_FACTORS[cells], rel=5e-10)
