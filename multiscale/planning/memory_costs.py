@@ -1,0 +1,119 @@
+"""Predicts the largest memory of the first process of a run, part by part."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from micro import HalfSpaceModel
+from multiscale.loading.stepper import LoadHistory
+from multiscale.machine import MemoryRequest, peak_memory
+from multiscale.planning.contact_costs import checks_finer, solved_boxes
+from multiscale.setup.memory import body_request, memory_requests
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.reference_meshes import reference_requests
+
+_LIBRARIES = {"dolfinx": 85e6, "matplotlib": 50e6}
+"""Memory of libraries that runs import when they need them [B]."""
+_SURFACE, _CONTACT, _ON_BOX = 37.0, 115.0, 70.0
+"""Memory per height of the surface with its spline, of the contact problem with kernel, work array
+and maps, and of it per cell of the box that is solved [B]: 141 where the box was 3/8 of 512² cells,
+155 where it was 9/16 of 1024²."""
+_SLOPES, _BODY = 80.0, 60.0
+"""Memory per cell of finite slopes, and of free sides and body [B]."""
+_FIGURES = 25.0
+"""Memory per height of figures and of the maps of a contact that are written [B]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Launch:
+    """How a run is started.
+
+    Attributes:
+        ranks: Processes of the MPI job.
+        memory: Memory of a process before anything of the scene is in it [B].
+        imported: Tells whether a library has been imported by then.
+    """
+
+    ranks: int = 1
+    memory: float = field(default_factory=peak_memory)
+    imported: Callable[[str], bool] = sys.modules.__contains__
+
+    @classmethod
+    def anew(cls, memory: float, ranks: int = 1) -> Launch:
+        """Return the start of a program of its own, in which no library has been imported.
+
+        Args:
+            memory: Memory of this process when it had imported the same [B].
+            ranks: Processes of the MPI job.
+        """
+        return cls(ranks=ranks, memory=memory, imported=lambda _: False)
+
+
+def step_count(load_history: LoadHistory) -> int:
+    """Return the number of load steps, as far as it is known before the run.
+
+    Args:
+        load_history: The loads, whose steps may be halved by a largest change of the force.
+    """
+    change = load_history.force_change or math.inf
+    return max(load_history.count, math.ceil(len(load_history.points) / change))
+
+
+def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
+    """Return what a run needs memory for, key by key of its scene.
+
+    Args:
+        setup: The problem.
+    """
+    meshes, scene = setup.meshes, setup.scene
+    steps = step_count(scene.loading.load_history)
+    of_bodies = [
+        body_request(key, face.element, face.unknowns, steps)
+        for key, face in (("body", setup.face), ("counter_body", setup.counter_face))
+        if face is not None and face.digest
+    ]
+    of_meshes = reference_requests(scene, meshes) if meshes else ()
+    return [*memory_requests(scene), *of_bodies, *of_meshes]
+
+
+def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:
+    """Return the memory of the parts of the first process that are held at its largest [B].
+
+    Args:
+        setup: The problem.
+        launch: How the run is started.
+    """
+    output, heights = setup.scene.output, setup.surface.heights.size
+    program = launch.memory
+    for library, needed in (("dolfinx", setup.has_block), ("matplotlib", bool(output.figures))):
+        if needed and not launch.imported(library):
+            program += _LIBRARIES[library]
+    asked = 0.0
+    for request in run_memory_requests(setup):
+        if not request.key.startswith("surface"):
+            asked += request.shared / launch.ranks + request.per_rank + request.root_only
+    parts = {
+        "program": program,
+        "surface": _SURFACE * heights,
+        "contact problem": _contact_memory(setup),
+        "figures": (bool(output.figures) + 1) * _FIGURES * heights,
+        "meshes and laws": asked,
+    }
+    return {part: size for part, size in parts.items() if size}
+
+
+def _contact_memory(setup: ProblemSetup) -> float:
+    """Return the memory of the contact problem, with that of an error check on a finer grid [B]."""
+    if not isinstance(setup.micro, HalfSpaceModel):
+        return 0.0
+    cells, box = setup.micro.surface.heights.size, solved_boxes(setup)[-1]
+    flat = _CONTACT + _ON_BOX * box
+    if setup.scene.kind == "isolated":
+        return flat * cells / setup.patches.count
+    flat += _BODY if setup.has_block and not setup.samples else 0.0
+    run = (flat + (_SLOPES if setup.finite_slopes else 0.0)) * cells
+    checks = setup.scene.output.check != "none" and not setup.samples
+    return run + 4.0 * flat * cells * (checks and checks_finer(setup, cells))
