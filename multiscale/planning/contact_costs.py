@@ -13,6 +13,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
+import numpy as np
+
 from micro import HalfSpaceModel, ScaledModel
 from micro.choice.models import solution_seconds
 from micro.contact.solver import box_around
@@ -21,8 +23,8 @@ from multiscale.setup.problem import ProblemSetup
 
 _OVERHEAD, _SIZE_OVERHEAD = 2.5e-3, 25e-9
 """Time of a solution besides its products, and of it per cell of the surface [s]."""
-_PRODUCTS, _PRODUCTS_PER_DOUBLING = 12.0, 2.2
-"""Products of a solution: 12 and 2.2 for every doubling of the cells along a side."""
+_PRODUCTS, _PRODUCTS_PER_DOUBLING = 14.0, 2.4
+"""Products of a solution: 14 and 2.4 for every doubling of the cells along a side."""
 _PRODUCT = 0.67
 """Time of a product, most of them in single precision and with a product of the inverse, over that
 in double precision on all cells."""
@@ -30,8 +32,11 @@ _FROM_COARSE = 1.33
 """Factor of the work of a solution that starts from coarser grids."""
 _FREE_MOTIONS = 1.25
 """Factor of the work where the plane's approach or tilt is free."""
-_BLOCK = 1.9
-"""Factor of the work with free sides and a finite body."""
+_BODY_PRODUCT, _BODY_CELL = 0.2e-3, 30e-9
+"""Time of a product with free sides and a finite body, and of it per cell [s]; 30 to 45 ns were
+measured on 128² to 1024² cells."""
+_PERIODIC = 0.33
+"""Time of a product with a periodic half-space, without padding, over that with others."""
 _SLOPES = 1.3
 """Factor of the products with finite slopes."""
 _PASSES, _PASS = 5.0, 1.0e-3
@@ -40,12 +45,12 @@ _SLOPES_COARSE, _SLOPES_CELL = 3.6e-3, 45e-9
 """Time of evaluating finite slopes on 64² cells, which is the least on finer ones too, and per cell
 [s]: 64² to 256² took 5 to 7 ms, 512² 16 and 1024² 70 ms."""
 _SLOPES_LEAST = 64**2
-_STIFFNESS = 0.28
-"""Solutions that an interfacial stiffness is worth; 0.2 to 0.34 were measured."""
+_STIFFNESS = 0.3
+"""Solutions that an interfacial stiffness is worth; 0.2 to 0.4 were measured."""
 _CHECK_BODY, _CHECK_BODY_CELL = 0.2, 2.5e-6
 """Time of free sides and body on the grids of an error check, and per cell of the surface [s]."""
-_LOADS = (0.25, 0.5, 0.75, 1.0)
-"""Loads relative to the largest; their mean stands for the loads of a run."""
+_MOST_LOADS = 4
+"""Load steps at most whose boxes are looked at."""
 _ESTIMATE_CELLS = 96
 """Cells along a side, at most, of the half-space that estimates the plane at the largest load."""
 
@@ -96,7 +101,9 @@ def solved_boxes(setup: ProblemSetup) -> Sequence[float]:
     largest = float(inside.max())
     if largest <= 0.0:
         return (1.0,)
-    boxes = (box_around(inside > (1.0 - load) * largest) for load in _LOADS)
+    steps = _MOST_LOADS if setup.uses_laws else min(loads.count, _MOST_LOADS)
+    rising = (np.arange(steps) + 1.0) / steps
+    boxes = (box_around(inside > (1.0 - load) * largest) for load in rising)
     return [math.prod(part.stop - part.start for part in box) / inside.size for box in boxes]
 
 
@@ -134,6 +141,11 @@ class ContactCosts:
     def boxes(self) -> Sequence[float]:
         """Part of the surface in the box that is solved, at rising loads; see `solved_boxes`."""
         return solved_boxes(self.setup)
+
+    @staticmethod
+    def products(cells: float) -> float:
+        """Return the products of a solution without finite slopes on so many cells."""
+        return _PRODUCTS + _PRODUCTS_PER_DOUBLING * 0.5 * math.log2(max(cells, 1.0))
 
     def step(self) -> float:
         """Return the time of a load step or a row of laws, in the mean over loads."""
@@ -193,13 +205,18 @@ class ContactCosts:
         more: float = 1.0,
     ) -> float:
         """Return the time of a solution without finite slopes on some cells of the surface."""
-        products = _PRODUCTS + _PRODUCTS_PER_DOUBLING * 0.5 * math.log2(max(cells, 1.0))
-        work = more * _PRODUCT * products * self.speed.product(box * cells)
-        work *= (_FROM_COARSE if cold else 1.0) * (_FREE_MOTIONS if free else 1.0)
-        work += self.speed.arrays * _OVERHEAD
+        each = _PRODUCT * self._product(box * cells)
         if self.setup.has_block and not (on_half_space or self.setup.samples):
-            work *= _BLOCK
-        return work + self.speed.product(cells) + self.speed.arrays * _SIZE_OVERHEAD * cells
+            each += self.speed.arrays * (_BODY_PRODUCT + _BODY_CELL * box * cells)
+        work = more * self.products(cells) * each
+        work *= (_FROM_COARSE if cold else 1.0) * (_FREE_MOTIONS if free else 1.0)
+        besides = self.speed.arrays * (_OVERHEAD + _SIZE_OVERHEAD * cells)
+        return work + besides + self._product(cells)
+
+    def _product(self, cells: float) -> float:
+        """Return the time of a product in double precision on some cells."""
+        periodic = self.setup.scene.surface.periodic or bool(self.setup.samples)
+        return (_PERIODIC if periodic else 1.0) * self.speed.product(cells)
 
     def _sloped(self, cells: float, box: float, *, free: bool = False) -> float:
         """Return the time of a solution with finite slopes, for as many passes as they take."""

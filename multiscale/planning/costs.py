@@ -28,13 +28,13 @@ _NEWTON_STEPS = 2.7
 """Newton steps of a load step of laws whose compliance is condensed to the patches."""
 
 # times on one core [s]
-_SURFACE, _SURFACE_HEIGHT = 10e-3, 0.12e-6
+_SURFACE, _SURFACE_HEIGHT = 2e-3, 0.055e-6
 _CHOICE, _CHOICE_HEIGHT = 0.05, 6e-6
 """Time of choosing a micro model, and of it per height of the surface."""
-_IMPORT, _BODY = 0.7, 0.065
+_IMPORT, _BODY = 0.52, 0.05
 """Times of importing dolfinx, PETSc and gmsh, and of the body correction of a cube. Thin blocks
 take several times longer."""
-_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.21, 0.16, 0.9
+_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.25, 0.2, 0.9
 """Times of importing matplotlib, of a figure, and of that in three dimensions."""
 _WRITING, _WRITTEN_HEIGHT = 0.04, 0.1e-6
 """Time of writing tables and report, and per height of a map of the contact."""

@@ -15,16 +15,18 @@ from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_requests
 
-_LIBRARIES = {"dolfinx": 85e6, "matplotlib": 50e6}
+_LIBRARIES = {"dolfinx": 70e6, "matplotlib": 70e6}
 """Memory of libraries that runs import when they need them [B]."""
-_SURFACE, _CONTACT, _ON_BOX = 37.0, 115.0, 70.0
-"""Memory per height of the surface with its spline, of the contact problem with kernel, work array
-and maps, and of it per cell of the box that is solved [B]: 141 where the box was 3/8 of 512² cells,
-155 where it was 9/16 of 1024²."""
-_SLOPES, _BODY = 80.0, 60.0
-"""Memory per cell of finite slopes, and of free sides and body [B]."""
+_SURFACE, _SUMMITS = 37.0, 100.0
+"""Memory per height of the surface with its spline, and of finding its summits [B]."""
+_SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 75.0, 70.0, 40.0, 40.0, 40.0
+"""Memory per cell of a contact problem with its kernel and work array, of it per cell of the box
+that is solved, of free sides and body, of the maps of a load step, and of finite slopes [B]. In
+sum 141 were measured where the box was 3/8 of 512² cells, 155 where it was 9/16 of 1024²."""
+_KEPT = 60.0
+"""Memory per cell that the run keeps while an error check solves a finer grid [B]."""
 _FIGURES = 25.0
-"""Memory per height of figures and of the maps of a contact that are written [B]."""
+"""Memory per height of figures, and of the maps of a contact that are written [B]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,33 +89,36 @@ def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:
         launch: How the run is started.
     """
     output, heights = setup.scene.output, setup.surface.heights.size
-    program = launch.memory
-    for library, needed in (("dolfinx", setup.has_block), ("matplotlib", bool(output.figures))):
-        if needed and not launch.imported(library):
-            program += _LIBRARIES[library]
-    asked = 0.0
-    for request in run_memory_requests(setup):
-        if not request.key.startswith("surface"):
-            asked += request.shared / launch.ranks + request.per_rank + request.root_only
+    program, figures = launch.memory, _FIGURES * heights
+    if setup.has_block and not launch.imported("dolfinx"):
+        program += _LIBRARIES["dolfinx"]
+    if output.figures:
+        figures += _FIGURES * heights
+        figures += 0.0 if launch.imported("matplotlib") else _LIBRARIES["matplotlib"]
+    requests = [one for one in run_memory_requests(setup) if not one.key.startswith("surface")]
+    asked = sum(one.shared / launch.ranks + one.per_rank + one.root_only for one in requests)
+    summits = _SUMMITS if setup.uses_summits else 0.0
     parts = {
         "program": program,
-        "surface": _SURFACE * heights,
-        "contact problem": _contact_memory(setup),
-        "figures": (bool(output.figures) + 1) * _FIGURES * heights,
+        "surface": (_SURFACE + summits) * heights,
         "meshes and laws": asked,
+        **_contact_or_figures(setup, figures),
     }
     return {part: size for part, size in parts.items() if size}
 
 
-def _contact_memory(setup: ProblemSetup) -> float:
-    """Return the memory of the contact problem, with that of an error check on a finer grid [B]."""
+def _contact_or_figures(setup: ProblemSetup, figures: float) -> dict[str, float]:
+    """Return the memory of an error check, or of the contact problem and figures after it [B]."""
     if not isinstance(setup.micro, HalfSpaceModel):
-        return 0.0
-    cells, box = setup.micro.surface.heights.size, solved_boxes(setup)[-1]
-    flat = _CONTACT + _ON_BOX * box
+        return {"figures": figures}
+    cells = setup.micro.surface.heights.size
+    solved = _SOLVED + _ON_BOX * solved_boxes(setup)[-1]
     if setup.scene.kind == "isolated":
-        return flat * cells / setup.patches.count
-    flat += _BODY if setup.has_block and not setup.samples else 0.0
-    run = (flat + (_SLOPES if setup.finite_slopes else 0.0)) * cells
+        return {"contact problem": solved * cells / setup.patches.count, "figures": figures}
+    solved += _BODY * (setup.has_block and not setup.samples)
+    run = (solved + _MAPS + _SLOPES * setup.finite_slopes) * cells
+    check = (_KEPT + 4.0 * solved) * cells
     checks = setup.scene.output.check != "none" and not setup.samples
-    return run + 4.0 * flat * cells * (checks and checks_finer(setup, cells))
+    if checks and checks_finer(setup, cells) and check > run + figures:
+        return {"error check": check}
+    return {"contact problem": run, "figures": figures}

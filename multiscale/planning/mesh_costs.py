@@ -15,12 +15,12 @@ _ENTRY = 1.15e-9
 """Time of an entry of the stiffness in a product with a vector [s]."""
 _ENTRIES = {"Q1": 81.0, "P1": 45.0, "Q2": 190.0, "P2": 85.0}
 """Entries of the stiffness per unknown."""
-_SET_UP, _CYCLE, _CYCLE_OVERHEAD = 250.0, 6.6, 0.13e-3
+_SET_UP, _CYCLE, _CYCLE_OVERHEAD = 80.0, 9.0, 0.13e-3
 """Products with the stiffness that mesh, stiffness and multigrid take as long as; those of a
 multigrid cycle; and the time of a cycle besides [s]."""
-_ALGEBRAIC_SET_UP, _ALGEBRAIC_CYCLE = {"Q1": 1000.0, "P1": 500.0}, 17.0
+_ALGEBRAIC_SET_UP, _ALGEBRAIC_CYCLE = {"Q1": 400.0, "P1": 400.0}, 14.0
 """The same of meshes without a lattice, reading included: a pad of 10⁶ unknowns of tetrahedra took
-490 and 17, a ring of 10⁵ of flat hexahedra 1000 and 14. Quadratic elements are taken to be like
+490 and 17, a ring of 10⁵ of flat hexahedra 1000 and 14, a cube of 10⁴ of hexahedra 150. Quadratic elements are taken to be like
 linear ones."""
 _REFERENCE_CYCLES = {"Q1": 15.0, "Q2": 60.0, "P1": 40.0, "P2": 60.0}
 """Multigrid cycles of a load step of a reference. 15 to 22, 31 to 44 and 51 to 76 were counted with

@@ -275,13 +275,14 @@ class ProblemSetup:
     @property
     def interfering_patches(self) -> int:
         """Number of patches that the largest closures of their laws bring into contact."""
+        surface, largest = self.surface, self.largest_closures
         if self.ignores_border:
             x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
-        else:
-            x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y))
-            z = self.surface.heights.T.ravel()
+        else:  # few of many heights come near
+            i, j = np.nonzero(largest.max() > surface.highest - surface.heights)
+            x, y, z = surface.x[i], surface.y[j], surface.heights[i, j]
         owner = self.patches.index_of(x, y)
-        closes = self.largest_closures[owner] > self.surface.highest - z
+        closes = largest[owner] > surface.highest - z
         return int(np.unique(owner[closes]).size)
 
     @property

@@ -30,9 +30,10 @@ def seconds(text):
     return sum(float(number) * _UNITS[unit] for number, unit in text)
 
 
-def said(pattern, output):
-    """Return seconds and megabytes of the line that begins with a pattern, and the line."""
-    line = next(line for line in output.splitlines() if re.match(pattern, line))
+def said(beginning, output):
+    """Return seconds and megabytes of the line that begins so, and the line."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", output)
+    line = next(line for line in plain.splitlines() if line.startswith(beginning))
     times = re.findall(r"([\d.e+]+) (h|min|s)\b", re.split(r"[:(]", line)[0])
     return seconds(times), float(re.findall(r"([\d.e+]+) MB", line)[-1]), line
 
@@ -67,9 +68,9 @@ def compared(name, folder, verbose):
     path = folder / f"{name}.toml"
     path.write_text(text.format(folder=folder))
     scene = str(path)
-    planned, mb_planned, line = said("cost ", launched(["plan", scene], ranks, threads))
+    planned, mb_planned, line = said("cost", launched(["plan", scene], ranks, threads))
     words = ["run", scene, "--overwrite", "--out", str(folder / name)]
-    taken, mb_taken, took = said("took ", launched(words, ranks, threads))
+    taken, mb_taken, took = said("took", launched(words, ranks, threads))
     shutil.rmtree(folder / name)
     if verbose:
         print(f"  {' '.join(line.split())}\n  {' '.join(took.split())}")
