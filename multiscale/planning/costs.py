@@ -24,6 +24,8 @@ ROWS = {"cells": 84, "summits": 105}
 summits 60 to 150."""
 _PATCH_SUMS = 4e-6
 """Time of a patch's sums in a row of consistent laws [s]."""
+_CYCLES_PER_ROW = 3.0
+"""Multigrid cycles of a row of consistent laws on a mesh, whose displacements it takes."""
 _NEWTON_STEPS = 2.7
 """Newton steps of a load step of laws whose compliance is condensed to the patches."""
 
@@ -172,7 +174,10 @@ def _law_seconds(costs: ContactCosts, ranks: int) -> float:
         return rows * samples * costs.step()
     if setup.scene.kind == "isolated":
         return rows * setup.interfering_patches * costs.patch() / ranks
-    return rows * (costs.step() + costs.speed.arrays * _PATCH_SUMS * setup.patches.count)
+    each = costs.step() + costs.speed.arrays * _PATCH_SUMS * setup.patches.count
+    if not newton_choice(setup).condensed:
+        each += mesh_seconds(setup, costs.speed, 1, made=False) * _CYCLES_PER_ROW
+    return rows * each
 
 
 def _contact_seconds(costs: ContactCosts, steps: int, *, on_mesh: bool) -> tuple[float, float]:

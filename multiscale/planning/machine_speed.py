@@ -42,6 +42,13 @@ class Machine:
         self._clocks = clocks or Clocks()
         self._products: dict[tuple[int, int], float] = {}
 
+    @property
+    def measured(self) -> frozenset[str]:
+        """What has been measured so far."""
+        kept = {"_arrays": "arrays", "sparse": "sparse"}
+        found = {kept[name] for name in vars(self) if name in kept}
+        return frozenset(found | {"products"} if self._products else found)
+
     @cached_property
     def _arrays(self) -> tuple[float, Competition]:
         """Shortest time of a real transform of 384 × 384 points, and what others did meanwhile."""

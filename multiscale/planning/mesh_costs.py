@@ -18,10 +18,11 @@ _ENTRIES = {"Q1": 81.0, "P1": 45.0, "Q2": 190.0, "P2": 85.0}
 _SET_UP, _CYCLE, _CYCLE_OVERHEAD = 80.0, 9.0, 0.13e-3
 """Products with the stiffness that mesh, stiffness and multigrid take as long as; those of a
 multigrid cycle; and the time of a cycle besides [s]."""
-_ALGEBRAIC_SET_UP, _ALGEBRAIC_CYCLE = {"Q1": 400.0, "P1": 400.0}, 14.0
+_ALGEBRAIC_SET_UP = {"Q1": 400.0, "P1": 400.0, "Q2": 100.0, "P2": 170.0}
+_ALGEBRAIC_CYCLE = 14.0
 """The same of meshes without a lattice, reading included: a pad of 10⁶ unknowns of tetrahedra took
-490 and 17, a ring of 10⁵ of flat hexahedra 1000 and 14, a cube of 10⁴ of hexahedra 150. Quadratic elements are taken to be like
-linear ones."""
+490 and 17, quadratic ones 170; a ring of 10⁵ of flat hexahedra 1000 and 14, a cube of 10⁴ of
+hexahedra 150 and 10, of 10⁵ of quadratic ones 60."""
 _REFERENCE_CYCLES = {"Q1": 15.0, "Q2": 60.0, "P1": 40.0, "P2": 60.0}
 """Multigrid cycles of a load step of a reference. 15 to 22, 31 to 44 and 51 to 76 were counted with
 Q1, P1 and P2. Q2 is taken to be like P2."""
@@ -62,7 +63,7 @@ def mesh_seconds(setup: ProblemSetup, speed: Speed, cycles: int, *, made: bool =
     for face in filter(None, (setup.face, setup.counter_face)):
         product = speed.sparse * _ENTRY * _ENTRIES[face.element] * face.unknowns
         cycle += _ALGEBRAIC_CYCLE * product
-        set_up += _ALGEBRAIC_SET_UP[f"{face.element[0]}1"] * product
+        set_up += _ALGEBRAIC_SET_UP[face.element] * product
     if setup.face is None:
         shape = setup.shape
         product = speed.sparse * _ENTRY * _ENTRIES[shape.element] * mesh_unknowns(shape)

@@ -5,7 +5,8 @@ from box_msh import write_box
 
 from geometry import BlockShape
 from multiscale import Scene
-from multiscale.planning.costs import predicted_cost, run_memory_requests
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.memory_costs import run_memory_requests
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.set_up import set_up
 
