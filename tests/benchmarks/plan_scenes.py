@@ -111,7 +111,7 @@ SCENES = {
     ),
     "body-consistent-128": (
         scene("consistent", 128, by(4, approach=6),
-              body("box.msh", "top", "bottom", 'element = "quadratic"'), block=None), 1, 1,
+              body("box.msh", "top", "bottom"), block=None), 1, 1,
     ),
     "fields-256": (
         scene("concurrent", 256, by(4, approach=6), '[output]\nfields = "last"', seed=7), 1, 1,
