@@ -13,21 +13,20 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
 
-import numpy as np
-
 from micro import HalfSpaceModel, ScaledModel
 from micro.choice.models import solution_seconds
-from micro.contact.solver import box_around
-from multiscale.measured_errors import MOST_CHECKED_CELLS
+from multiscale.planning.solved_boxes import Box, checks_finer, solved_boxes
 from multiscale.setup.problem import ProblemSetup
 
 _OVERHEAD, _SIZE_OVERHEAD = 2.5e-3, 25e-9
 """Time of a solution besides its products, and of it per cell of the surface [s]."""
 _PRODUCTS, _PRODUCTS_PER_DOUBLING = 14.0, 2.4
 """Products of a solution: 14 and 2.4 for every doubling of the cells along a side."""
-_PRODUCT = 0.67
-"""Time of a product, most of them in single precision and with a product of the inverse, over that
-in double precision on all cells."""
+_DOUBLE, _SINGLE = 0.3, 0.65
+"""Time of a product over that in double precision on all cells: three of ten are that, the others
+are in single precision, with a product of the inverse, on the rows that hold contact alone."""
+_FEW, _MANY = 0.7, 0.6
+"""Products are 0.7 times as many where few of the rows hold contact, and 1.3 times where all do."""
 _FROM_COARSE = 1.33
 """Factor of the work of a solution that starts from coarser grids."""
 _FREE_MOTIONS = 1.25
@@ -41,16 +40,16 @@ _SLOPES = 1.3
 """Factor of the products with finite slopes."""
 _PASSES, _PASS = 5.0, 1.0e-3
 """Solutions by which finite slopes converge, and the overhead of each [s]."""
-_SLOPES_COARSE, _SLOPES_CELL = 3.6e-3, 45e-9
+_SLOPES_COARSE, _SLOPES_CELL = 3.6e-3, 65e-9
 """Time of evaluating finite slopes on 64² cells, which is the least on finer ones too, and per cell
-[s]: 64² to 256² took 5 to 7 ms, 512² 16 and 1024² 70 ms."""
+[s]: 64² to 256² took 5 to 7 ms, 512² 16 to 28, 1024² 70 to 110."""
 _SLOPES_LEAST = 64**2
 _STIFFNESS = 0.3
 """Solutions that an interfacial stiffness is worth; 0.2 to 0.4 were measured."""
+_CHECK_CELL = 0.4e-6
+"""Time per cell of the finest grid of an error check of the surfaces on its grids [s]."""
 _CHECK_BODY, _CHECK_BODY_CELL = 0.2, 2.5e-6
 """Time of free sides and body on the grids of an error check, and per cell of the surface [s]."""
-_MOST_LOADS = 4
-"""Load steps at most whose boxes are looked at."""
 _ESTIMATE_CELLS = 96
 """Cells along a side, at most, of the half-space that estimates the plane at the largest load."""
 
@@ -71,40 +70,6 @@ class Speed(Protocol):
     def product(self, cells: float) -> float:
         """Return the time of a product with the half-space of so many cells [s]."""
         ...
-
-
-def checks_finer(setup: ProblemSetup, cells: int) -> bool:
-    """Tell whether an error check is expected to solve a grid twice as fine.
-
-    Where finite slopes are left out their error outweighs that of the grid.
-
-    Args:
-        setup: The problem.
-        cells: Cells of the half-space.
-    """
-    return setup.finite_slopes and 4 * cells <= MOST_CHECKED_CELLS
-
-
-def solved_boxes(setup: ProblemSetup) -> Sequence[float]:
-    """Return the part of the surface in the box that is solved, at rising loads.
-
-    Args:
-        setup: The problem.
-
-    Returns:
-        The parts, that at the largest load last.
-    """
-    loads = setup.scene.loading.load_history
-    if setup.scene.surface.periodic or loads.tilt is None or setup.samples:
-        return (1.0,)
-    inside = setup.cell_interference
-    largest = float(inside.max())
-    if largest <= 0.0:
-        return (1.0,)
-    steps = _MOST_LOADS if setup.uses_laws else min(loads.count, _MOST_LOADS)
-    rising = (np.arange(steps) + 1.0) / steps
-    boxes = (box_around(inside > (1.0 - load) * largest) for load in rising)
-    return [math.prod(part.stop - part.start for part in box) / inside.size for box in boxes]
 
 
 @dataclass(frozen=True)
@@ -138,8 +103,8 @@ class ContactCosts:
         return loads.quantity == "force" or loads.tilt is None
 
     @cached_property
-    def boxes(self) -> Sequence[float]:
-        """Part of the surface in the box that is solved, at rising loads; see `solved_boxes`."""
+    def boxes(self) -> Sequence[Box]:
+        """The boxes that are solved at rising loads; see `solved_boxes`."""
         return solved_boxes(self.setup)
 
     @staticmethod
@@ -160,7 +125,7 @@ class ContactCosts:
         setup = self.setup
         cells = self.cells // setup.patches.count
         if self.on_cells:
-            return self._flat(cells, 1.0, on_half_space=True)
+            return self._flat(cells, Box(), on_half_space=True)
         summits = int(setup.interfering_summits.sum()) if setup.uses_summits else 0
         return self._of_contacts(cells, summits // max(setup.interfering_patches, 1))
 
@@ -175,7 +140,9 @@ class ContactCosts:
         total = (1.6 + 0.6 * setup.has_block if setup.finite_slopes else 1.0) * half
         total += (1.0 + 0.4 * setup.has_block) * self._flat(cells // 4, box, cold=True)
         total += self._flat(cells // 16, box, cold=True)
-        if checks_finer(setup, cells):
+        finer = checks_finer(setup, cells)
+        total += self.speed.arrays * _CHECK_CELL * cells * (4 if finer else 1)
+        if finer:
             total += self._flat(cells, box, cold=True) + self._flat(4 * cells, box, cold=True)
         if setup.has_block:
             total += self.speed.arrays * (_CHECK_BODY + _CHECK_BODY_CELL * cells)
@@ -187,9 +154,9 @@ class ContactCosts:
             return 0.0
         if self.on_cells and not self.setup.uses_laws:
             cells = min(self.cells, _ESTIMATE_CELLS**2)
-            return self._flat(cells, 1.0, cold=True, free=True, on_half_space=True)
+            return self._flat(cells, Box(), cold=True, free=True, on_half_space=True)
         if self.setup.samples:
-            return self._flat(_ESTIMATE_CELLS**2, 1.0, cold=True, free=True, on_half_space=True)
+            return self._flat(_ESTIMATE_CELLS**2, Box(), cold=True, free=True, on_half_space=True)
         if self.on_cells:
             return self._flat(self.cells, self.boxes[-1], cold=True, free=True, on_half_space=True)
         return 2.0 * self.step()
@@ -197,7 +164,7 @@ class ContactCosts:
     def _flat(
         self,
         cells: float,
-        box: float,
+        box: Box,
         *,
         cold: bool = False,
         free: bool = False,
@@ -205,10 +172,11 @@ class ContactCosts:
         more: float = 1.0,
     ) -> float:
         """Return the time of a solution without finite slopes on some cells of the surface."""
-        each = _PRODUCT * self._product(box * cells)
+        part = box.part * cells
+        each = (_DOUBLE + _SINGLE * box.rows) * self._product(part)
         if self.setup.has_block and not (on_half_space or self.setup.samples):
-            each += self.speed.arrays * (_BODY_PRODUCT + _BODY_CELL * box * cells)
-        work = more * self.products(cells) * each
+            each += self.speed.arrays * (_BODY_PRODUCT + _BODY_CELL * part)
+        work = more * (_FEW + _MANY * box.rows) * self.products(cells) * each
         work *= (_FROM_COARSE if cold else 1.0) * (_FREE_MOTIONS if free else 1.0)
         besides = self.speed.arrays * (_OVERHEAD + _SIZE_OVERHEAD * cells)
         return work + besides + self._product(cells)
@@ -218,7 +186,7 @@ class ContactCosts:
         periodic = self.setup.scene.surface.periodic or bool(self.setup.samples)
         return (_PERIODIC if periodic else 1.0) * self.speed.product(cells)
 
-    def _sloped(self, cells: float, box: float, *, free: bool = False) -> float:
+    def _sloped(self, cells: float, box: Box, *, free: bool = False) -> float:
         """Return the time of a solution with finite slopes, for as many passes as they take."""
         coarse = min(cells / _SLOPES_LEAST, 1.0) * _SLOPES_COARSE
         each = self.speed.arrays * (coarse + _SLOPES_CELL * cells + _PASS)

@@ -30,7 +30,7 @@ _NEWTON_STEPS = 2.7
 """Newton steps of a load step of laws whose compliance is condensed to the patches."""
 
 # times on one core [s]
-_SURFACE, _SURFACE_HEIGHT = 2e-3, 0.055e-6
+_SURFACE, _SURFACE_HEIGHT = 2e-3, 0.25e-6
 _CHOICE, _CHOICE_HEIGHT = 0.05, 6e-6
 """Time of choosing a micro model, and of it per height of the surface."""
 _IMPORT, _BODY = 0.52, 0.05

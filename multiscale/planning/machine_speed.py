@@ -1,13 +1,13 @@
 """How fast this machine is, from benchmarks of a fraction of a second, made anew for every plan.
 
 Nothing is kept between processes: the speed of a shared machine changes from hour to hour, and that
-of threads with their number. The shortest of many times tells how fast idle cores are. What other
-programs take of the cores while the benchmarks run is measured beside (`busy_cores`).
+of threads with their number. The shortest of several times, on the wall and of the threads
+themselves, tells how fast idle cores are. What other programs take of the cores meanwhile is
+measured beside (`busy_cores`).
 """
 
 from __future__ import annotations
 
-import timeit
 from collections.abc import Callable
 from functools import cached_property
 from typing import Any
@@ -25,6 +25,8 @@ _TRANSFORM, _PRODUCT = 0.51e-3, 2.8e-3
 _WATCHED, _REPETITIONS = 0.25, 5
 """Time that the first benchmark is repeated for, long enough to count what others use [s], and how
 often the others are repeated."""
+_EVEN = 1.1
+"""Time of work in threads over the mean of what each of them is busy with, on idle cores."""
 _SIDES = (32, 128, 512, 1024)
 """Cells along a side of the grids that products are timed on."""
 
@@ -58,7 +60,7 @@ class Machine:
         with self._clocks.around(found):
             until = self._clocks.wall() + _WATCHED
             while not times or self._clocks.wall() < until:
-                times.append(timeit.timeit(lambda: fft.rfft2(points), number=1))
+                times.append(self._shortest(lambda: fft.rfft2(points), repetitions=1))
         return min(times), found[0]
 
     @property
@@ -78,7 +80,7 @@ class Machine:
         columns = (np.arange(order)[:, None] + np.arange(bands)) % order
         starts, vector = bands * np.arange(order + 1), np.ones(order)
         matrix = csr_matrix((np.ones(columns.size), columns.ravel(), starts), (order, order))
-        return _shortest(lambda: matrix @ vector) / _PRODUCT
+        return self._shortest(lambda: matrix @ vector) / _PRODUCT
 
     def product(self, cells: float) -> float:
         """Return the time of a product with the half-space of a square grid on idle cores [s].
@@ -106,17 +108,28 @@ class Machine:
         if key not in self._products:
             grid = HalfSpaceGrid((side, side), (1.0, 1.0), periodic=False)
             pressure = np.ones((side, side))
-            shortest = _shortest(lambda: grid.compliance(pressure.copy()))
+            shortest = self._shortest(lambda: grid.compliance(pressure.copy()), threads=cores())
             self._products[key] = shortest / _work(side**2)
         return self._products[key]
+
+    def _shortest(
+        self, work: Callable[[], Any], *, threads: int = 1, repetitions: int = _REPETITIONS
+    ) -> float:
+        """Return the time that work takes on idle cores, as far as repetitions show it [s].
+
+        On cores that others use, the wall clock tells less than the time that the threads had.
+        """
+        times = []
+        for _ in range(repetitions):
+            wall, own = self._clocks.wall(), self._clocks.own()
+            work()
+            wall, own = self._clocks.wall() - wall, self._clocks.own() - own
+            times.append(min(wall, _EVEN * own / threads) if own > 0.0 else wall)
+        return min(times)
 
 
 def _work(cells: float) -> float:
     return cells * float(np.log2(4.0 * cells))
-
-
-def _shortest(work: Callable[[], Any]) -> float:
-    return min(timeit.repeat(work, number=1, repeat=_REPETITIONS))
 
 
 THIS_MACHINE = Machine()

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from micro import HalfSpaceModel
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
-from multiscale.planning.contact_costs import checks_finer, solved_boxes
+from multiscale.planning.solved_boxes import checks_finer, solved_boxes
 from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_requests
@@ -112,7 +112,7 @@ def _contact_or_figures(setup: ProblemSetup, figures: float) -> dict[str, float]
     if not isinstance(setup.micro, HalfSpaceModel):
         return {"figures": figures}
     cells = setup.micro.surface.heights.size
-    solved = _SOLVED + _ON_BOX * solved_boxes(setup)[-1]
+    solved = _SOLVED + _ON_BOX * solved_boxes(setup)[-1].part
     if setup.scene.kind == "isolated":
         return {"contact problem": solved * cells / setup.patches.count, "figures": figures}
     solved += _BODY * (setup.has_block and not setup.samples)

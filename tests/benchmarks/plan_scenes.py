@@ -58,8 +58,8 @@ SCENES = {
         scene("analytic", 2048, by(1, force=40), NO_FIGURES, waves=(4, 256), block=STEEL), 1, 2,
     ),
     "analytic-4096": (
-        scene("analytic", 4096, by(1, approach=1), NO_FIGURES, waves=(4, 512), block=STEEL,
-              slope=0.1), 1, 2,
+        scene("analytic", 4096, by(1, approach=1), '[output]\ncheck = "none"\nfigures = false',
+              waves=(4, 512), block=STEEL, slope=0.1), 1, 2,
     ),
     "elliptic-256": (scene("analytic", 256, by(8, approach=6), ELLIPTIC), 1, 1),
     "elliptic-1024": (scene("analytic", 1024, by(4, force=1), ELLIPTIC, waves=(2, 64)), 1, 1),
