@@ -16,7 +16,7 @@ from multiscale.planning.busy_cores import Competition
 from multiscale.planning.contact_costs import ContactCosts, Speed
 from multiscale.planning.machine_speed import THIS_MACHINE, Machine
 from multiscale.planning.memory_costs import Launch, memory_parts, step_count
-from multiscale.planning.mesh_costs import mesh_seconds, reference_seconds
+from multiscale.planning.mesh_costs import face_seconds, mesh_seconds, reference_seconds
 from multiscale.setup.problem import ProblemSetup
 
 ROWS = {"cells": 84, "summits": 105}
@@ -134,7 +134,9 @@ def _seconds(setup: ProblemSetup, speed: Speed, launch: Launch) -> dict[str, flo
         if setup.uses_laws:
             seconds["laws"] = _law_seconds(costs, launch.ranks)
         block, pressed = _contact_seconds(costs, steps, on_mesh=on_mesh)
-        seconds |= {"block": block + setup.has_block * imports, "load steps": pressed}
+        block += setup.has_block * imports
+        block += face_seconds(setup, speed) if launch.solves_face else 0.0
+        seconds |= {"block": block, "load steps": pressed}
         seconds |= _read_off_seconds(costs, steps)
     if output.fields and setup.has_block and not (on_mesh or setup.meshes):
         fields = sum(output.wants_fields(one, last=one == steps) for one in range(1, steps + 1))

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from micro import HalfSpaceModel
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
+from multiscale.planning.mesh_costs import face_work
 from multiscale.planning.solved_boxes import checks_finer, solved_boxes
 from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
@@ -23,6 +24,8 @@ _SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 75.0, 70.0, 40.0, 40.0, 40.0
 """Memory per cell of a contact problem with its kernel and work array, of it per cell of the box
 that is solved, of free sides and body, of the maps of a load step, and of finite slopes [B]. In
 sum 141 were measured where the box was 3/8 of 512² cells, 155 where it was 9/16 of 1024²."""
+_FACE = 1.25e9
+"""Memory of the compliance of a meshed body's face for `face_work` 1 [B]."""
 _KEPT = 60.0
 """Memory per cell that the run keeps while an error check solves a finer grid [B]."""
 _FIGURES = 25.0
@@ -37,21 +40,24 @@ class Launch:
         ranks: Processes of the MPI job.
         memory: Memory of a process before anything of the scene is in it [B].
         imported: Tells whether a library has been imported by then.
+        solves_face: Whether the compliance of a meshed body is yet to be solved for.
     """
 
     ranks: int = 1
     memory: float = field(default_factory=peak_memory)
     imported: Callable[[str], bool] = sys.modules.__contains__
+    solves_face: bool = False
 
     @classmethod
-    def anew(cls, memory: float, ranks: int = 1) -> Launch:
+    def anew(cls, memory: float, ranks: int = 1, *, solves_face: bool = False) -> Launch:
         """Return the start of a program of its own, in which no library has been imported.
 
         Args:
             memory: Memory of this process when it had imported the same [B].
             ranks: Processes of the MPI job.
+            solves_face: As the attribute.
         """
-        return cls(ranks=ranks, memory=memory, imported=lambda _: False)
+        return cls(ranks=ranks, memory=memory, imported=lambda _: False, solves_face=solves_face)
 
 
 def step_count(load_history: LoadHistory) -> int:
@@ -102,6 +108,7 @@ def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:
         "program": program,
         "surface": (_SURFACE + summits) * heights,
         "meshes and laws": asked,
+        "body term": face_work(setup) * _FACE if launch.solves_face else 0.0,
         **_contact_or_figures(setup, figures),
     }
     return {part: size for part, size in parts.items() if size}

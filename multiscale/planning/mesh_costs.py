@@ -26,8 +26,34 @@ hexahedra 150 and 10, of 10⁵ of quadratic ones 60."""
 _REFERENCE_CYCLES = {"Q1": 15.0, "Q2": 60.0, "P1": 40.0, "P2": 60.0}
 """Multigrid cycles of a load step of a reference. 15 to 22, 31 to 44 and 51 to 76 were counted with
 Q1, P1 and P2. Q2 is taken to be like P2."""
+_FACE, _CUBE, _FACTORISATION = 11.0, 11_271, 1.2
+"""Time of solving for the compliance of the face of a cube in 8 × 8 modes [s], the unknowns of its
+linear elements, and the power of them that the time grows with."""
 _FREE_TILT = 1.4
 """Factor of these cycles where the plane is free to tilt: up to 90 were counted with P2."""
+
+
+def face_work(setup: ProblemSetup) -> float:
+    """Return the work of solving for the compliance of the meshed bodies' faces, in modes.
+
+    It is 1 for a cube of 16 × 16 × 12 trilinear hexahedra, which are raised to quadratic ones and
+    whose stiffness is factorised.
+
+    Args:
+        setup: The problem.
+    """
+    faces = filter(None, (setup.face, setup.counter_face))
+    return sum((face.unknowns / _CUBE) ** _FACTORISATION for face in faces if face.digest)
+
+
+def face_seconds(setup: ProblemSetup, speed: Speed) -> float:
+    """Return the time of solving for the compliance of the meshed bodies' faces [s].
+
+    Args:
+        setup: The problem.
+        speed: How fast work is done.
+    """
+    return speed.arrays * _FACE * face_work(setup)
 
 
 def reference_seconds(
