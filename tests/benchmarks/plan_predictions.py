@@ -22,6 +22,8 @@ from box_msh import write_box
 from plan_scenes import SCENES
 
 PATCHLAW = [sys.executable, "-m", "multiscale"]
+_LOOP = "import os\nparent = os.getppid()\nwhile os.getppid() == parent: pass"
+"""Keeps a core busy as long as this program runs, however it ends."""
 _UNITS = {"h": 3600.0, "min": 60.0, "s": 1.0}
 
 
@@ -53,7 +55,7 @@ def launched(words, ranks, threads):
 @contextlib.contextmanager
 def busy_core(wanted):
     """Keep one core busy meanwhile, if wanted."""
-    loop = subprocess.Popen([sys.executable, "-c", "while True: pass"]) if wanted else None
+    loop = subprocess.Popen([sys.executable, "-c", _LOOP]) if wanted else None
     try:
         yield
     finally:
