@@ -7,15 +7,18 @@ Only mpi4py's lower-case methods of the communicator are used, so that nothing h
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
+from heapq import heappop, heappush
+from itertools import chain
 from typing import Any, TypeVar
 
-from geometry.cores import lent, node_cores
+from geometry.cores import lendable, lent, place
 
 T = TypeVar("T")
 
-_NAP = 1e-3
-"""Time between two looks of a waiting rank at whether the work is done [s]."""
+_NAP, _SHARE = 1e-3, 0.1
+"""Longest time between two looks of a waiting rank at whether the work is done [s], and that time
+over the one it has waited for."""
 
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
@@ -46,8 +49,6 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
 def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
     """Do long work on rank 0, which is lent the cores of its node, and broadcast the result.
 
-    The other ranks sleep meanwhile. In a collective call of MPI they would keep their cores busy.
-
     Args:
         comm: MPI communicator, or None.
         work: What to do; its result must be picklable.
@@ -63,19 +64,27 @@ def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
     """
     if comm is None or comm.size == 1:
         return work()
+    done = _while_others_sleep(comm, range(1), lambda: _attempt(work))
+    result, error = comm.bcast(done, root=0)
+    if error is not None:
+        raise error
+    return result
 
-    def lending() -> T:
-        try:
-            with lent(node_cores()):
-                return work()
-        finally:
-            comm.Ibarrier().Wait()
 
-    if comm.rank:
-        done = comm.Ibarrier()
-        while not done.Test():
-            time.sleep(_NAP)
-    return on_root(comm, lending)
+def _while_others_sleep(comm: Any, working: Collection[int], work: Callable[[], T]) -> T | None:
+    """Do work on some ranks, which are lent the cores of those that wait; return None on others.
+
+    Ranks sleep until all are done. In a collective call of MPI they would keep their cores busy.
+    """
+    places, result = comm.allgather(place()), None
+    if comm.rank in working:
+        here = lendable(places, working, comm.rank)
+        with lent(here.own, here.granted):
+            result = work()
+    done, began = comm.Ibarrier(), time.perf_counter()
+    while not done.Test():
+        time.sleep(min(_NAP, _SHARE * (time.perf_counter() - began)))
+    return result
 
 
 def together(comm: Any, work: Callable[[], T]) -> T:
@@ -107,16 +116,17 @@ def shared(
     comm: Any,
     count: int,
     work: Callable[[int], T],
-    first: int = 0,
+    *,
+    costs: Sequence[float] | None = None,
     observe: Callable[[int], None] | None = None,
 ) -> list[T]:
-    """Do tasks of a list in turn on all ranks: the first on one, the second on the next.
+    """Do tasks of a list on all ranks; ranks that get none lend their cores to the others.
 
     Args:
         comm: MPI communicator (mpi4py), or None.
         count: Number of tasks.
         work: Does the task of an index; must not communicate itself.
-        first: Rank that takes the first task, modulo the number of ranks.
+        costs: What the tasks cost, relative to each other; see `dealt`. The same on all ranks.
         observe: Called on every rank after each task of its own, with the number of tasks that all
             ranks have done by then if they are equally quick.
 
@@ -130,17 +140,54 @@ def shared(
         Collective.
     """
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    own = range((rank - first) % size, count, size)
+    parts = dealt(count, size, costs)
 
-    def done(turn: int, index: int) -> T:
-        result = work(index)
-        if observe is not None:
-            observe(min(size * (turn + 1), count))
-        return result
+    def work_off() -> list[T]:
+        found = []
+        for turn, index in enumerate(parts[rank]):
+            found.append(work(index))
+            if observe is not None:
+                observe(min(size * (turn + 1), count))
+        return found
 
-    mine = together(comm, lambda: [done(turn, index) for turn, index in enumerate(own)])
-    gathered = [mine] if size == 1 else comm.allgather(mine)
-    return [gathered[(index + first) % size][index // size] for index in range(count)]
+    if size == 1:
+        gathered = [work_off()]
+    else:
+        working = [k for k in range(size) if parts[k]]
+        done = _while_others_sleep(comm, working, lambda: _attempt(work_off))
+        outcomes = comm.allgather(done or ([], None))
+        failures = [error for _, error in outcomes if error is not None]
+        if failures:
+            raise failures[0]
+        gathered = [found for found, _ in outcomes]
+    results = dict(zip(chain(*parts), chain(*gathered), strict=True))
+    return [results[index] for index in range(count)]
+
+
+def dealt(count: int, ranks: int, costs: Sequence[float] | None = None) -> list[list[int]]:
+    """Deal tasks to ranks: the costliest first, each to the rank with the least to do.
+
+    The last rank then ends at most a third later than with the best of all deals.
+
+    Args:
+        count: Number of tasks.
+        ranks: Number of ranks.
+        costs: What the tasks cost, shape (count,); all the same when not given.
+
+    Returns:
+        The tasks of every rank, in the order in which it does them.
+
+    Source:
+        Graham 1969, doi 10.1137/0117039.
+    """
+    costs = [1.0] * count if costs is None else costs
+    parts: list[list[int]] = [[] for _ in range(ranks)]
+    ahead = [(0.0, rank) for rank in range(ranks)]  # what each has to do
+    for index in sorted(range(count), key=lambda task: -costs[task]):
+        load, rank = heappop(ahead)
+        parts[rank].append(index)
+        heappush(ahead, (load + costs[index], rank))
+    return parts
 
 
 def _attempt(work: Callable[[], T]) -> tuple[T | None, Exception | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil
@@ -23,6 +24,9 @@ Array = NDArray[np.float64]
 
 _FEWEST = 4
 """Smallest number of heights along a side."""
+_KEPT_SPLINE = 2**20
+"""Heights up to which the interpolant that showed the highest point is kept for other uses: it
+takes three times the memory of the heights."""
 _WHOLE = 1e-6
 """Share of a cell by which a rectangle may extend into it by rounding alone."""
 _SLACK = 1e-9
@@ -106,7 +110,11 @@ class Surface:
 
     @cached_property
     def _summit(self) -> tuple[float, float, float]:
-        return self.interpolant.maximum()
+        if self.heights.size <= _KEPT_SPLINE or "interpolant" in vars(self):
+            return self.interpolant.maximum()
+        found = Interpolant(self.heights, self.lengths, periodic=self.periodic).maximum()
+        gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
+        return found
 
     def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Evaluate the interpolant at any points, up to and on the border.

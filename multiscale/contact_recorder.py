@@ -79,7 +79,7 @@ class ContactRecorder:
         """
         laws = self._setup.uses_laws
         asked = "none" if laws and self._asked == "auto" else self._asked
-        known = any(record.step == step.step for record in self.records)
+        known = bool(self.records) and self.records[-1].step == step.step
         if asked == "none" or known or not (last or asked == "all"):
             return step
         if laws:

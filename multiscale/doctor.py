@@ -19,9 +19,10 @@ from typing import Any
 
 import threadpoolctl
 
+from geometry.cores import place
 from geometry.errors import InputError, PatchlawError
 from multiscale.installation import removal, shadows, versions
-from multiscale.machine import control_group_memory, detached_processes
+from multiscale.machine import control_group_memory, cores_statement, detached_processes
 
 _SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel"}
@@ -217,11 +218,9 @@ def threads(comm: Any) -> CheckResult:
     Args:
         comm: MPI communicator, or None.
     """
-    stated, mine = os.environ.get("OMP_NUM_THREADS", ""), os.sched_getaffinity(0)
-    count = int(stated) if stated.isdigit() else len(mine)
     wanted: Counter[str] = Counter()
     offered: dict[str, set[int]] = {}
-    for host, cores, number in gathered(comm, (platform.node(), mine, count)):
+    for host, cores, number in gathered(comm, place()):
         wanted[host] += number
         offered.setdefault(host, set()).update(cores)
     for host, number in wanted.items():
@@ -229,8 +228,8 @@ def threads(comm: Any) -> CheckResult:
             text = f"{number} threads of all ranks on {len(offered[host])} core(s) of {host}"
             remedy = "export OMP_NUM_THREADS=1 and start no more ranks than cores"
             return CheckResult("warning", text, remedy)
-    text = f"OMP_NUM_THREADS={stated or 'not set'}, {len(mine)} core(s) for this process"
-    return CheckResult("ok", text)
+    stated = os.environ.get("OMP_NUM_THREADS") or "not set"
+    return CheckResult("ok", f"{cores_statement(comm)} (OMP_NUM_THREADS {stated})")
 
 
 def memory(comm: Any, free: float | None = None) -> CheckResult:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from geometry.checks import PROGRAM, address_space
+from geometry.cores import lendable, place
 from geometry.errors import InputError
 
 _LEAST_DATA = 0.5e9
@@ -74,6 +75,27 @@ def world() -> Any:
     from mpi4py import MPI
 
     return MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
+
+
+def cores_statement(comm: Any) -> str:
+    """Say how many ranks a job has, and how many threads they may start.
+
+    Args:
+        comm: MPI communicator; None for a process on its own.
+
+    Note:
+        Collective.
+    """
+    places = [place()] if comm is None else comm.allgather(place())
+    own = sorted({one.own for one in places})
+    each = f"{own[0]}" if len(own) == 1 else f"{own[0]} to {own[-1]}"
+    text = f"{each} thread{'s' * (own != [1])}"
+    if len(places) == 1:
+        return f"one process with {text}"
+    nodes = len({one.node for one in places})
+    on = f" on {nodes} nodes" * (nodes > 1)
+    alone = lendable(places, [0], 0).own
+    return f"{len(places)} ranks{on} with {text} each; what one rank does for all takes {alone}"
 
 
 def large_object_comm(comm: Any) -> Any:

@@ -75,6 +75,7 @@ class Run:
         self.table: LawTable | None = None
         self.coupling: Coupling | None = None
         self._start: Arrays = {}
+        self._deepest = 0.0  # approach so far
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
         assembly.load_finite_elements(scene, comm)
@@ -144,6 +145,7 @@ class Run:
 
                         step = conducting(step, coupling, self.setup)
                 self.steps.append(self._checked(step))
+                self._deepest = max(self._deepest, step.approach_mm)
                 self.make_contact(last=self.finished)
                 yield self.steps[-1]
 
@@ -190,8 +192,7 @@ class Run:
 
     def _has_unloaded(self, step: LoadStep) -> bool:
         """Tell whether the plastic depth at a load step is not that of rising loads."""
-        before = max((each.approach_mm for each in self.steps), default=0.0)
-        return self.scene.micro.hardness is not None and step.approach_mm < _BACK * before
+        return self.scene.micro.hardness is not None and step.approach_mm < _BACK * self._deepest
 
     @property
     def times(self) -> dict[str, float]:
@@ -235,6 +236,7 @@ class Run:
             contacts: What `contacts` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
+        self._deepest = max((step.approach_mm for step in steps), default=0.0)
         self._recorder.resume(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
         if laws:

@@ -69,10 +69,17 @@ class GridCompliance:
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
         self.products = 0
 
-    def displacement(self, pressure: Array) -> Array:
-        """Return the displacement by pressures / E* on all cells, shape (nx, ny) [mm]."""
+    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the displacement by pressures / E* on all cells, shape (nx, ny) [mm].
+
+        Args:
+            pressure: The pressures, shape (nx, ny).
+            out: Where the displacement is put; new memory if not given.
+        """
         self.products += 1
-        found = self._half_space.compliance(pressure.copy())
+        found = np.empty_like(pressure) if out is None else out
+        found[:] = pressure
+        self._half_space.compliance(found)
         for term in self._terms:
             found += term.displacement(pressure)
         return found
@@ -96,10 +103,9 @@ class GridCompliance:
     def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
         if self._last is None or self._last[0] is not cells:
-            row, column = np.divmod(cells.place, cells.columns)
-            columns, column = np.unique(column, return_inverse=True)
+            columns, column = np.unique(cells.column, return_inverse=True)
             terms = [term.among(cells.rows, columns) for term in self._terms]
-            place = row * len(columns) + column.ravel()
+            place = cells.row * len(columns) + column.ravel()
             self._last = cells, terms, place, (len(cells.rows), len(columns))
         return self._last[1:]
 

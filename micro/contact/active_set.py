@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.cores import blas_threads, blocks, in_threads
 from geometry.errors import NotConverged
 from micro.compliance.half_space_grid import Cells
 from micro.contact.conjugate_gradients import ContactCells
@@ -23,6 +24,8 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
+_BLOCK = 2**17
+"""Cells that a thread evaluates at a time."""
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.
 Where cells of very different sides meet the periodic kernel, whose inverse is then far from an
@@ -52,7 +55,7 @@ class ActiveSet:
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to begin with, shape (nx, ny).
+        start: Pressures / E* ≥ 0 to begin with, shape (nx, ny); overwritten.
 
     Attributes:
         pressure: Present pressures / E*, which are admissible, shape (nx, ny).
@@ -72,29 +75,43 @@ class ActiveSet:
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
         self._set: Flags = np.zeros(problem.interference.shape, bool)
         self._yielding: Flags | None = None
+        self.gap = np.empty_like(start)
         pressure, self.motion = admissible_start(problem, start)
         self._accept(pressure)
 
     def _accept(self, pressure: Array) -> None:
         """Evaluate admissible pressures."""
-        problem, self.pressure = self.problem, pressure
-        gap = problem.grid.displacement(pressure)
-        twice_elastic = float(np.vdot(pressure, gap))
-        self._energy = twice_elastic - 2.0 * float(np.vdot(pressure, problem.interference))
-        gap -= problem.interference
-        if problem.motions.count and pressure.any():
-            self.motion = problem.motions.closing(self._weights(pressure), gap)
-        nearer = problem.motions.displacement(self.motion)
-        gap -= nearer
-        interference = problem.interference + nearer
-        self.gap = gap  # in the memory of the displacement
-        self.scale = float(interference.max())
-        elastic = gap if problem.upper == np.inf else gap[pressure < problem.upper]
-        worst = max(-float(elastic.min(initial=0.0)), float(gap[pressure > 0.0].max(initial=0.0)))
-        self.residual = max(0.0, worst) / self.scale if self.scale > 0.0 else 0.0
-        self.rounding = 0.0
-        if problem.motions.turns and self.scale > 0.0:
-            self.rounding = _ROUNDING * float(np.abs(interference).max()) / self.scale
+        problem, motions, self.pressure = self.problem, self.problem.motions, pressure
+        gap = self.gap = problem.grid.displacement(pressure, out=self.gap)
+        interference = problem.interference
+        parts = blocks(gap.shape[0], _BLOCK // gap.shape[1])
+
+        def work(rows: slice) -> float:
+            """Turn displacements of some rows into gaps; return twice the energy of the rows."""
+            elastic = float(np.vdot(pressure[rows], gap[rows]))
+            gap[rows] -= interference[rows]
+            return elastic - 2.0 * float(np.vdot(pressure[rows], interference[rows]))
+
+        def extremes(rows: slice) -> tuple[float, float, float]:
+            """Let free motions act; return the largest interference, its size, the violation."""
+            nearer, here, p = motions.displacement(self.motion, rows), gap[rows], pressure[rows]
+            here -= nearer
+            nearer += interference[rows]
+            elastic = here if problem.upper == np.inf else np.where(p < problem.upper, here, 0.0)
+            apart = float(np.where(p > 0.0, here, 0.0).max())
+            violation = max(0.0, -float(elastic.min()), apart)
+            return float(nearer.max()), float(np.abs(nearer).max()), violation
+
+        self._energy = sum(in_threads(work, parts))
+        if motions.count and pressure.any():
+            self.motion = motions.closing(self._weights(pressure), gap)
+        largest = np.max(in_threads(extremes, parts), axis=0)
+        self.scale = float(largest[0])
+        self.residual = self.rounding = 0.0
+        if self.scale > 0.0:
+            self.residual = float(largest[2]) / self.scale
+            if motions.turns:
+                self.rounding = _ROUNDING * float(largest[1]) / self.scale
 
     def _weights(self, pressure: Array) -> Array:
         """Return weights of the cells whose gaps give the motions; yielding cells may overlap."""
@@ -222,7 +239,7 @@ def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> Co
 
     Args:
         problem: The contact problem.
-        start: Pressures / E* ≥ 0 to start from, shape (nx, ny).
+        start: Pressures / E* ≥ 0 to start from, shape (nx, ny); overwritten.
         most_steps: Sets of cells that are tried at most.
 
     Raises:
@@ -234,12 +251,13 @@ def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> Co
         doi 10.1016/S0043-1648(99)00113-1.
     """
     used = problem.grid.products
-    search = ActiveSet(problem, start)
-    for steps in range(most_steps):
-        if search.residual <= search.enough:
-            products = problem.grid.products - used
-            return ContactPressures(search.pressure, search.motion, search.residual, products)
-        search.step(cautious=steps >= _TRUSTING_STEPS)
+    with blas_threads(1):
+        search = ActiveSet(problem, start)
+        for steps in range(most_steps):
+            if search.residual <= search.enough:
+                products = problem.grid.products - used
+                return ContactPressures(search.pressure, search.motion, search.residual, products)
+            search.step(cautious=steps >= _TRUSTING_STEPS)
     raise NotConverged(
         f"the contact pressure (residual {search.residual:.1e}, asked {problem.tolerance:.1e})",
         reason="set of cells in contact not found",

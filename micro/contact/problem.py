@@ -119,14 +119,15 @@ class ContactProblem:
         """Return pressures near given ones that lie within the bounds and meet the loads.
 
         Args:
-            pressure: Pressures / E* ≥ 0 that may do neither, shape (nx, ny).
+            pressure: Pressures / E* ≥ 0 that may do neither, shape (nx, ny); may be overwritten by
+                the result.
             fixed: Cells whose pressures stay as they are where that is possible, shape (nx, ny).
 
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.motions.count:
-            return np.minimum(pressure, self.upper)
+            return np.minimum(pressure, self.upper, out=pressure)
         found = None
         if fixed is not None:
             found = self.motions.scaled_to_loads(pressure, self.upper, fixed)

@@ -80,9 +80,14 @@ class Motions:
         """Whether slopes are free."""
         return self.count > 1
 
-    def displacement(self, motion: Array) -> Array:
-        """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm]."""
-        return np.asarray((self.along_x * motion[:, None]).T @ self.along_y)
+    def displacement(self, motion: Array, rows: slice = slice(None)) -> Array:
+        """Return how far a motion moves the body towards the surface, shape (nx, ny) [mm].
+
+        Args:
+            motion: The motion, shape (k,) [mm].
+            rows: Rows of the cells to return; all if not given.
+        """
+        return np.asarray((self.along_x[:, rows] * motion[:, None]).T @ self.along_y)
 
     def levers_of(self, cells: Indices) -> Array:
         """Return the levers of some cells by their flat indices, shape (k, n)."""
@@ -125,7 +130,7 @@ class Motions:
         The multipliers μ minimise a convex function, which Newton's method does.
 
         Args:
-            pressure: Pressures / E* ≥ 0, shape (nx, ny).
+            pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten by the result.
             upper: Upper bound / E*.
             fixed: Cells whose pressures stay as they are, shape (nx, ny).
 
@@ -134,7 +139,9 @@ class Motions:
         """
         if not self.turns and upper == np.inf:
             total = float(pressure.sum())
-            return pressure * (self.loads[0] / total) if total > 0.0 else None
+            if total > 0.0:
+                pressure *= self.loads[0] / total
+            return pressure if total > 0.0 else None
         cells, loads, acting = np.flatnonzero(pressure), self.loads, 0.0
         if fixed is not None:
             cells = np.flatnonzero(np.where(fixed, 0.0, pressure))

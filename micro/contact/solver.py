@@ -15,7 +15,6 @@ Theory: demos/theory.md, section 3.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,36 +55,37 @@ def solve_on_surface(problem: ContactProblem, start: ContactPressures | None) ->
         return _solve_under_force(problem, start)
     if interference.max() <= 0.0:
         return ContactPressures(np.zeros(interference.shape))
-    return _solve_growing(problem, _box(problem, interference), pressure)
+    return _solve_growing(problem, _box(problem, 0.0), pressure)
 
 
 def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve with a free approach; the box follows from an estimate of it."""
-    top = float(problem.interference.max())
-    level = problem.interference - top  # the approach counts from first touch of a cell
-    problem = replace(problem, interference=level)
+    interference = problem.interference
+    top = float(interference.max())  # the approach that counts is that from first touch of a cell
     first, most = None, np.inf
     if start is not None and start.pressure.any():
         first, most = start.pressure, _MARGIN * (float(start.motion[0]) + top)
     elif not problem.compliance.periodic:
         # summits of a coarse grid are lower: the estimate errs upwards
         bits = _FEW_CELLS.bit_length() - 1
-        factors = [1 << max(0, (n - 1).bit_length() - bits) for n in level.shape]
-        most = _MARGIN * float(_solve_nested(problem.coarsened(factors, _ESTIMATE)).motion[0])
+        factors = [1 << max(0, (n - 1).bit_length() - bits) for n in interference.shape]
+        found = _solve_nested(problem.coarsened(factors, _ESTIMATE))
+        most = _MARGIN * (float(found.motion[0]) + top)
     while True:
-        box = _box(problem, level + max(most, float(np.finfo(float).tiny)))
+        box = _box(problem, min(top - most, np.nextafter(top, -np.inf)))
         found = _solve_growing(problem, box, first)
-        approach = float(found.motion[0])
-        if approach <= most or box == _whole(level):
-            return found._replace(motion=found.motion - top)
+        approach = float(found.motion[0]) + top
+        if approach <= most or box == _whole(interference):
+            return found
         first, most = found.pressure, _MARGIN * approach
 
 
-def _box(problem: ContactProblem, interference: Array) -> Box:
-    """Return the box that a body of this interference can touch on a half-space."""
-    if problem.compliance.periodic or not np.isfinite(interference).all():
+def _box(problem: ContactProblem, least: float) -> Box:
+    """Return the box that a body can touch on a half-space: the cells of more interference."""
+    interference = problem.interference
+    if problem.compliance.periodic or least == -np.inf or not np.isfinite(interference).all():
         return _whole(interference)
-    return box_around(interference > 0.0)
+    return box_around(interference > least)
 
 
 def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
@@ -119,8 +119,10 @@ def _lifted(problem: ContactProblem, box: Box, interference: Array, pressure: Ar
 def _solve_on(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on the cells of a box, from coarser grids where there is no start."""
     part = problem.on(box)
-    first = nested_start(part) if start is None or not start[box].any() else start[box]
-    found = solve(part, first)
+    known = None if start is None else start[box].copy()  # the search overwrites it
+    found = solve(part, nested_start(part) if known is None or not known.any() else known)
+    if box == _whole(problem.interference):
+        return found
     pressure = np.zeros(problem.interference.shape)
     pressure[box] = found.pressure
     return found._replace(pressure=pressure)
@@ -144,7 +146,8 @@ def nested_start(problem: ContactProblem) -> Array:
     if max(factors) > 1:
         try:
             found = _solve_nested(problem.coarsened(factors, _ROUGH))
-            return refined(found.pressure, factors)[: shape[0], : shape[1]]
+            fine = refined(found.pressure, factors)[: shape[0], : shape[1]]
+            return np.ascontiguousarray(fine)
         except NotConverged:  # a bad start only costs time
             pass
     total = float(np.abs(problem.motions.loads).max(initial=0.0))

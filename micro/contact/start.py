@@ -32,7 +32,7 @@ def admissible_start(problem: ContactProblem, pressure: Array) -> tuple[Array, A
 
     Args:
         problem: The contact problem.
-        pressure: Pressures / E* ≥ 0, shape (nx, ny).
+        pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten.
 
     Raises:
         NotConverged: When no pressures within the bounds meet the loads.
@@ -40,7 +40,8 @@ def admissible_start(problem: ContactProblem, pressure: Array) -> tuple[Array, A
     if problem.unloaded:
         return _unloaded_start(problem, pressure)
     for share in _EVEN_SHARES:
-        found = problem.admissible(pressure + share * (float(pressure.max()) or 1.0))
+        even = share * (float(pressure.max()) or 1.0)
+        found = problem.admissible(pressure + even if share else pressure)
         if found is not None:
             return found, np.zeros(problem.motions.count)
     raise NotConverged(

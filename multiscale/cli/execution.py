@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
+from geometry.cores import hold_blas
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from multiscale.machine import (
     check_address_space,
@@ -42,6 +43,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
     try:
         check_address_space()
         comm = world()
+        hold_blas()
     except InputError as error:
         terminal.complain(None, error)
         return error.exit_code

@@ -174,7 +174,7 @@ class ContactCoupling:
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""
-        return on_root(self._comm, lambda: latest.detail)
+        return on_root_alone(self._comm, lambda: latest.detail)
 
     def state(self) -> Arrays:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""

@@ -9,6 +9,9 @@ from matplotlib.figure import Figure
 
 from multiscale.figures.style import COLOURS, add_grid_and_legend, new_figure
 
+MOST_MARKED = 500
+"""Load steps that have a symbol each; more of them are drawn as lines alone."""
+
 
 def history_figure(history: Any, kind: str) -> Figure:
     """Draw force, contact area and mean separation of a run.
@@ -20,7 +23,9 @@ def history_figure(history: Any, kind: str) -> Figure:
     figure = new_figure(11.0, 3.6)
     force, area, gap = figure.subplots(1, 3)
     colour = COLOURS.get(kind, COLOURS["analytic"])
-    look: dict[str, Any] = {"marker": "o", "ms": 3.5, "color": colour, "label": kind}
+    look: dict[str, Any] = {"color": colour, "label": kind}
+    if len(history) <= MOST_MARKED:
+        look |= {"marker": "o", "ms": 3.5}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at zero approach of the middle.
     level = not any(any(step.tilt) for step in history.steps)

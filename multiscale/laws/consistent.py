@@ -5,6 +5,7 @@ Theory: demos/theory.md, section 10.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from geometry.collective import on_root, shared
+from geometry.collective import on_root_alone, shared
 from micro import HalfSpaceModel, MicroModel, Pressed, Response, RigidPlane, influence_matrix
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -99,7 +100,7 @@ def consistent_laws(
         comm=comm,
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
-    first, end, tilt = on_root(comm, lambda: whole.range_up_to(largest))
+    first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
     laws, error = refined(
         whole.rows,
@@ -152,6 +153,7 @@ class WholeSurface:
     comm: Any = None
     observe: Callable[[int], None] | None = None
     _solved: dict[float, tuple[Response, RigidPlane]] = field(default_factory=dict, init=False)
+    _seconds: dict[float, float] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
         """Return the approaches at first touch and at the largest load [mm], and the tilt there.
@@ -232,22 +234,32 @@ class WholeSurface:
         count = _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
-        def solve(part: int) -> list[tuple[Response, RigidPlane]]:
+        def solve(part: int) -> list[tuple[Response, RigidPlane, float]]:
             found, start = [], None
             for approach in parts[part]:
+                began = time.process_time()
                 control = Control(approach=float(approach), tilt=self.tilt)
                 pressed = self._press(control, start)
                 start = pressed.start
-                found.append((pressed.response, pressed.plane))
+                found.append((pressed.response, pressed.plane, time.process_time() - began))
             return found
 
         def solved(done: int) -> None:
             if self.observe is not None:
                 self.observe(len(self._solved) + min(count * done, len(approaches)))
 
-        before = -(-len(self._solved) // count)  # parts of earlier calls: the next rank continues
-        found = shared(self.comm, len(parts), solve, before, solved)
-        return [row for rows in found for row in rows]
+        costs = [float(self._costs(part).sum()) for part in parts]
+        found = shared(self.comm, len(parts), solve, costs=costs, observe=solved)
+        rows = [row for part in found for row in part]
+        self._seconds.update((float(a), row[2]) for a, row in zip(approaches, rows, strict=True))
+        return [row[:2] for row in rows]
+
+    def _costs(self, approaches: Array) -> Array:
+        """Return what rows cost, relative to each other: as long as those next to them took."""
+        if not self._seconds:
+            return approaches - min(float(approaches.min()), 0.0)
+        known = sorted(self._seconds)
+        return np.interp(approaches, known, [self._seconds[approach] for approach in known])
 
     def _press(self, control: Control, start: Any) -> Pressed:
         if isinstance(self.model, HalfSpaceModel):

@@ -166,21 +166,20 @@ def isolated_laws(
     Source:
         Waddad et al. 2016, section 3.2, eq. 29-31, doi 10.1016/j.triboint.2015.12.023.
     """
-    # those that the plane comes nearest to first: they take longest, and the ranks end together
-    order = np.argsort(-(mean_heights + closure_ends), kind="stable")
+    count = patches.count
+    touch = shared(comm, count, lambda index: model.of_patch(patches, index)[0].first_touch)
+    # a patch takes the longer the further it is closed, and one that stays open takes nothing
+    costs = np.maximum(closure_ends - touch, 0.0).tolist()
 
-    def make(task: int) -> PatchLaw:
-        index = int(order[task])
+    def make(index: int) -> PatchLaw:
         alone, patch = model.of_patch(patches, index)
         isolated = IsolatedPatch(
             model=alone, patch=patch, mean_height=float(mean_heights[index]), love=love
         )
         return isolated.law(float(closure_ends[index]), tolerance, most_rows)
 
-    count = patches.count
     watch = (lambda done: observe("laws of patches", done, count)) if observe else None
-    made = shared(comm, count, make, observe=watch)
-    laws = tuple(made[task] for task in np.argsort(order))
+    laws = tuple(shared(comm, count, make, costs=costs, observe=watch))
     return LawTable(
         patches=patches,
         laws=laws,

@@ -193,7 +193,8 @@ class PeriodicSamples:
             if self.observe is not None:
                 self.observe(self._solved[0] + done * len(separations) // tasks)
 
-        found = shared(self.comm, tasks, solve, observe=solved)
+        nearer = [self.first_touch - float(part.mean()) for part in parts]  # and so dearer
+        found = shared(self.comm, tasks, solve, costs=nearer * len(self.samples), observe=solved)
         self._solved[0] += len(separations)
         each = len(parts)
         return [

@@ -119,6 +119,7 @@ class LoadHistory:
         quantity: What is prescribed, ``"approach"`` or ``"force"``.
         points: Its values at the ends of the legs, the first of which starts at zero [mm or N].
         steps: Load steps per leg.
+        cycles: How often the points follow each other.
         tilt: Slopes of the plane; None lets it turn freely.
         force_change: Largest change of the force in a step relative to the largest force so far,
             that of the step included; steps that exceed it are halved. The first step with a force
@@ -130,18 +131,29 @@ class LoadHistory:
     steps: int = 8
     tilt: tuple[float, float] | None = (0.0, 0.0)
     force_change: float | None = None
+    cycles: int = 1
 
     @property
     def targets(self) -> list[float]:
         """Values of the prescribed quantity at the load steps, before any is halved."""
-        ends = np.array((0.0, *self.points))
+        first, later = self.cycle_from(0.0), self.cycle_from(self.points[-1])
+        return first + (self.cycles - 1) * later
+
+    def cycle_from(self, value: float) -> list[float]:
+        """Return the values of the prescribed quantity in a cycle that starts at a value."""
+        ends = np.array((value, *self.points))
         legs = np.linspace(ends[:-1], ends[1:], self.steps + 1, axis=1)[:, 1:]
-        return [float(value) for value in legs.ravel()]
+        return [float(each) for each in legs.ravel()]
+
+    @property
+    def legs(self) -> int:
+        """Number of ways from one turning point to the next."""
+        return self.cycles * len(self.points)
 
     @property
     def count(self) -> int:
         """Number of load steps, before any is halved."""
-        return self.steps * len(self.points)
+        return self.steps * self.legs
 
     @property
     def largest(self) -> float:
@@ -151,7 +163,8 @@ class LoadHistory:
     @property
     def unloads(self) -> bool:
         """Whether the load falls anywhere."""
-        return any(later < earlier for earlier, later in pairwise(self.points))
+        points = self.points[-1:] * (self.cycles > 1) + self.points
+        return any(later < earlier for earlier, later in pairwise(points))
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""

@@ -102,7 +102,7 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         The files written.
     """
     header = [column.name for column in COLUMNS]
-    rows = [list(record.values()) for record in history.records()]
+    rows = ([column.of(step) for column in COLUMNS] for step in history)
     files = [
         write_csv(folder / "history.csv", header, rows),
         write_csv(folder / "patches.csv", history.patch_columns, history.patch_rows()),

@@ -15,7 +15,7 @@ from rich.table import Table
 from geometry.errors import PatchlawError
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
-from multiscale.machine import peak_memory
+from multiscale.machine import cores_statement, peak_memory
 from multiscale.planning import plan
 from multiscale.planning.costs import Cost
 from multiscale.readable import Observer, duration, quantity
@@ -105,10 +105,14 @@ def show_plan(
         setup: The problem, set up from the scene.
         cost: Predicted time and memory; None leaves them out.
         shortages: Sentences on the memory that these nodes lack.
+
+    Note:
+        Collective.
     """
+    cores = cores_statement(comm)
     if speaks(comm):
         warnings = [*plan.warnings(setup), *shortages]
-        show_pairs(comm, list(plan.statements(setup, cost)), warnings)
+        show_pairs(comm, [*plan.statements(setup, cost), ("cores", cores)], warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
@@ -212,14 +216,10 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    header, rows = history.table()
-    rows = list(rows)
+    header, rows = history.table(MOST_ROWS)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")
-    half = MOST_ROWS // 2
-    if len(rows) > MOST_ROWS:
-        rows[half:-half] = [("…", f"{len(rows) - MOST_ROWS} more", *[""] * (len(header) - 2))]
     for row in rows:
         table.add_row(*row)
     # A reference has one more column.

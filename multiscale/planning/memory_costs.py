@@ -67,7 +67,7 @@ def step_count(load_history: LoadHistory) -> int:
         load_history: The loads, whose steps may be halved by a largest change of the force.
     """
     change = load_history.force_change or math.inf
-    return max(load_history.count, math.ceil(len(load_history.points) / change))
+    return max(load_history.count, math.ceil(load_history.legs / change))
 
 
 def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:

@@ -238,7 +238,8 @@ def _load(setup: ProblemSetup) -> str:
     forced = load_history.quantity == "force"
     unit, what = ("N", "a force") if forced else ("mm", "an approach")
     way = ", ".join(quantity(point, unit, 6) for point in load_history.points)
-    text = f"{load_history.count} steps to {what} of {way}"
+    again = f", {load_history.cycles} times" * (load_history.cycles > 1)
+    text = f"{load_history.count} steps to {what} of {way}{again}"
     if load_history.force_change is not None:
         text += f", halved where the force changes by more than {load_history.force_change:.3g}"
     if load_history.tilt is None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.collective import on_root
+from geometry.collective import on_root_alone
 from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.machine import ClusterNodes, large_object_comm
@@ -46,7 +46,9 @@ def set_up(
     """
     bodies, large = scene_bodies(scene, comm), large_object_comm(comm)
     faces = bodies.facts
-    setup: ProblemSetup = on_root(large, lambda: make_setup(scene, resolved, nodes, faces=faces))
+    setup: ProblemSetup = on_root_alone(
+        large, lambda: make_setup(scene, resolved, nodes, faces=faces)
+    )
     setup = replace(setup, bodies=bodies)
     if not setup.samples:
         _place(setup, bodies)

@@ -1,4 +1,8 @@
-"""The checkpoint of a run: what it needs to go on, in an HDF5 file that is replaced whole."""
+"""The checkpoint of a run: what it needs to go on, in an HDF5 file that is replaced whole.
+
+The load steps so far stand in a log beside it, which grows by a line for each: what a checkpoint
+writes does not grow with the run.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,18 @@ import json
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten
-from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition
+from multiscale.restart.step_log import LogMark, StepLog, read_steps
 from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
 from multiscale.storage import (
@@ -30,7 +35,7 @@ from multiscale.storage import (
     write_bytes,
 )
 
-FORMAT = "patchlaw checkpoint 6"
+FORMAT = "patchlaw checkpoint 7"
 FILE_NAME = "checkpoint.h5"
 
 LEAST_INTERVAL = 1.0
@@ -38,8 +43,8 @@ LEAST_INTERVAL = 1.0
 LEAST_RATIO = 20.0
 """Least wall time between two writes over that of a write; so writing takes 5 % at most."""
 
-_COLUMNS = [one.name for one in fields(LoadStep) if one.name != "patches"]
-_PATCH_COLUMNS = [one.name for one in fields(PatchState)]
+LOG_SUFFIX = ".steps"
+"""Suffix of the log of load steps, whose name is that of the checkpoint."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -70,7 +75,7 @@ class Checkpoint:
 
 
 def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
-    """Return all that is needed to go on with a run from here.
+    """Return all that is needed to go on with a run from its latest load step.
 
     Args:
         run: The run.
@@ -89,23 +94,24 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
     )
 
 
-def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
+def write_checkpoint(path: Path, checkpoint: Checkpoint, log: StepLog | None = None) -> Path:
     """Write a checkpoint whole, or leave the earlier one.
 
     Args:
         path: File to write.
         checkpoint: Its content.
+        log: The log of its load steps; by default it is written anew.
 
     Raises:
-        NotWritten: When the file cannot be written.
+        NotWritten: When a file cannot be written.
     """
-    steps = checkpoint.steps
+    log = log or StepLog(path.with_suffix(LOG_SUFFIX))
+    log.write(checkpoint.steps)
     facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights", "meshes")}
-    facts["steps"] = [[getattr(step, name) for name in _COLUMNS] for step in steps]
+    facts["log"] = asdict(log.mark)
     record = (
         json.dumps(facts, default=np.generic.item),
         np.frombuffer(checkpoint.laws, np.uint8),
-        [_stacked([getattr(step.patches, name) for step in steps]) for name in _PATCH_COLUMNS],
         checkpoint.position,
         checkpoint.contacts,
     )
@@ -151,43 +157,41 @@ def _read(path: Path) -> Checkpoint:
             {name: stored_numbers(item) for name, item in file.get(group, {}).items()}
             for group in ("run", "state")
         )
-    text, laws, patches, position, contacts = unpacked(run, (LoadPosition, ContactRecord))
+    text, laws, position, contacts = unpacked(run, (LoadPosition, ContactRecord))
     facts = json.loads(text)
-    columns = zip(_PATCH_COLUMNS, patches, strict=True)
-    known = {name: column for name, column in columns if column is not None}
-    steps = [
-        LoadStep(
-            **dict(zip(_COLUMNS, map(_tuples, row), strict=True)),
-            patches=PatchState(**{name: column[k] for name, column in known.items()}),
-        )
-        for k, row in enumerate(facts.pop("steps"))
-    ]
+    mark = LogMark(**facts.pop("log"))
     return Checkpoint(
         **facts,
         laws=laws.tobytes(),
-        steps=tuple(steps),
+        steps=read_steps(path.with_suffix(LOG_SUFFIX), mark),
         position=position,
         state=state,
         contacts=contacts,
     )
 
 
-def _stacked(columns: list[Any]) -> Any:
-    """Return the arrays of load steps as one; None where they have none."""
-    return None if any(column is None for column in columns) else np.array(columns)
+class _Accepted(NamedTuple):
+    """A run after a load step; the steps and contacts in it do not change any more."""
 
+    position: LoadPosition
+    state: Arrays
+    steps: int
+    contacts: int
 
-def _tuples(value: Any) -> Any:
-    """Return a value read from JSON with its lists as tuples."""
-    return tuple(map(_tuples, value)) if isinstance(value, list) else value
+    def checkpoint(self, run: Run) -> Checkpoint:
+        return replace(
+            checkpoint_of(run, self.state),
+            position=self.position,
+            steps=tuple(run.steps[: self.steps]),
+            contacts=run.contacts[: self.contacts],
+        )
 
 
 class CheckpointWriter:
-    """Writes the checkpoint of a run to its results folder, as one file that is replaced whole.
+    """Writes the checkpoint of a run to its results folder, with the log of its load steps.
 
     Every accepted load step is kept in memory, and written at once unless the last write was less
-    than a second or 20 times its own duration ago. On 16 patches, 200 load steps take 5 ms and
-    0.14 MB, and 10,000 take 0.12 s and 6.4 MB. What is not written yet is written when the run
+    than a second or 20 times its own duration ago. What is not written yet is written when the run
     ends, by an error or a signal too. A process that is killed loses it, and the resumed run
     computes it again.
 
@@ -203,7 +207,8 @@ class CheckpointWriter:
     def __init__(self, folder: Path, run: Run, hold: Callable[[], None]) -> None:
         self.path = folder / FILE_NAME
         self._run, self._hold = run, hold
-        self._pending: Checkpoint | None = None
+        self._log = StepLog(self.path.with_suffix(LOG_SUFFIX))
+        self._pending: _Accepted | None = None
         self._due = 0.0
 
     def __enter__(self) -> CheckpointWriter:
@@ -224,14 +229,14 @@ class CheckpointWriter:
         Note:
             Collective.
         """
-        state = self._run.state()
+        run, state = self._run, self._run.state()
 
         def keep() -> None:
-            self._pending = checkpoint_of(self._run, state)
+            self._pending = _Accepted(run.position, state, len(run.steps), len(run.contacts))
             if time.monotonic() >= self._due:
                 self._write_pending()
 
-        on_root(self._run.comm, keep)
+        on_root(run.comm, keep)
 
     def write(self) -> None:
         """Write the run as it is now, like `accept`, but at once."""
@@ -250,13 +255,18 @@ class CheckpointWriter:
         on_root(self._run.comm, self._write_pending)
 
     def remove(self) -> None:
-        """Remove the file and forget what is not written; the run needs it no longer.
+        """Remove the files and forget what is not written; the run needs them no longer.
 
         Note:
             Collective.
         """
         self._pending = None
-        on_root(self._run.comm, lambda: self.path.unlink(missing_ok=True))
+
+        def unlink() -> None:
+            for path in (self.path, self._log.path):
+                path.unlink(missing_ok=True)
+
+        on_root(self._run.comm, unlink)
 
     def _write_pending(self) -> None:
         if self._pending is None:
@@ -267,7 +277,7 @@ class CheckpointWriter:
         except InputError as error:  # the folder was good when the run began
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
-        write_checkpoint(self.path, self._pending)
+        write_checkpoint(self.path, self._pending.checkpoint(self._run), self._log)
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))

@@ -24,6 +24,8 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "stiffness_MPa_per_mm"
 """Column of the derivative dp/dc of a patch's law."""
+MOST_SHOWN = 1000
+"""Load steps in the table of a report or notebook; ``history.csv`` has all."""
 
 
 @dataclass(eq=False)
@@ -208,16 +210,26 @@ class History:
         """
         return data_frame(self.records())
 
-    def table(self) -> Table:
+    def table(self, most: int = MOST_SHOWN) -> Table:
         """Return headings and rows of the table that reports and terminals show.
 
         A reference has one more column, with its values at mesh size zero.
+
+        Args:
+            most: Load steps that are shown; of more the middle is left out, and a row says so.
         """
         columns = [column for column in COLUMNS if column.heading]
-        texts = {column.heading: [column.text(step) for step in self.steps] for column in columns}
+        whole, half = len(self.steps) <= most, most // 2
+        shown = self.steps if whole else self.steps[:half] + self.steps[-half:]
+        texts = {column.heading: [column.text(step) for step in shown] for column in columns}
         if self.reference is not None:
-            heading, texts[heading] = self.reference.cells
-        return list(texts), list(zip(*texts.values(), strict=True))
+            heading, cells = self.reference.cells
+            texts[heading] = list(cells) if whole else [*cells[:half], *cells[-half:]]
+        rows = list(zip(*texts.values(), strict=True))
+        if not whole:
+            left = len(self.steps) - len(shown)
+            rows.insert(half, ("…", f"{left} more", *[""] * (len(texts) - 2)))
+        return list(texts), rows
 
     def plot(self, label: str = "history") -> Any:
         """Draw mean pressure, contact area and mean separation.

@@ -142,6 +142,8 @@ class LoadSection(Section):
     """Force on the rigid plane, or a list of turning points."""
     steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
     """Load steps to every turning point."""
+    cycles: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 1
+    """How often the plane goes through the turning points, of which it needs two at least."""
     tilt: Tilt = (0.0, 0.0)
     """Slopes of the approach along x and y about the middle of the interface; ``free`` lets the
     plane turn until the pressures have no moment."""
@@ -153,6 +155,11 @@ class LoadSection(Section):
     def _one_load(self) -> Self:
         if (self.approach is None) == (self.force is None):
             raise ValueError("needs exactly one load (allowed: either 'approach' or 'force')")
+        if self.cycles > 1 and len(self.approach or self.force or ()) < 2:
+            raise ValueError(
+                f"cycles = {self.cycles} needs two turning points (allowed: a list of loads, or "
+                "cycles = 1)"
+            )
         return self
 
     @property
@@ -164,4 +171,5 @@ class LoadSection(Section):
             steps=self.steps,
             tilt=None if self.tilt == "free" else self.tilt,
             force_change=self.force_change,
+            cycles=self.cycles,
         )

@@ -6,11 +6,16 @@ The peers live in an environment of their own, whose interpreter is given:
     peers/bin/pip install ContactMechanics==1.7.0 SurfaceTopography==1.18.2 tamaas==2.8.1
     python tests/benchmarks/half_space_against_peers.py --peers peers/bin/python
 
-Each code runs on one thread, in a process of its own; times are medians of interleaved repeats.
-The error is that of the pressures, relative in the L2 norm, against residual 1e-12.
+Each code runs in a process of its own, on the same number of threads; times are medians of
+interleaved repeats. The error is that of the pressures, relative in the L2 norm, against residual
+1e-12. Large surfaces, periodic and not, at two contact areas, on two threads:
+
+    python tests/benchmarks/half_space_against_peers.py --peers peers/bin/python \\
+        --large 2048 4096 --threads 2
 """
 
 import argparse
+import itertools
 import json
 import os
 import statistics
@@ -30,15 +35,16 @@ from micro import HalfSpaceModel  # noqa: E402
 CODES = ("patchlaw", "tamaas", "contactmechanics")
 SLOPE, HURST = 0.1, 0.8
 LOAD = 0.05 * SLOPE  # mean pressure over E*: 10 to 12 % of the area in contact
+AREAS = {0.02: 0.0091 * SLOPE, 0.1: 0.047 * SLOPE}  # the pressures of about these shares of contact
 
 
 class Process:
     """A code that solves on demand."""
 
-    def __init__(self, python, code):
+    def __init__(self, python, code, threads=1):
         words = [python, str(Path(__file__).with_name("half_space_peers.py")), code]
         pipe = subprocess.PIPE
-        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        environment = os.environ | {"OMP_NUM_THREADS": str(threads)}
         self.process = subprocess.Popen(
             words, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, text=True, env=environment
         )
@@ -87,7 +93,38 @@ def compare(pythons, task, repeats, exact):
     return {code: fresh[code] | {"seconds": statistics.median(rows[code])} for code in rows}
 
 
-def show(title, rows):
+def large(pythons, sizes, threads, repeats):
+    """Solve large surfaces once per process; print a table per size, area and boundary."""
+    own = CODES[0]
+    with tempfile.TemporaryDirectory() as folder:
+        for n in sizes:
+            file = str(Path(folder) / f"{n}.npy")
+            np.save(file, surface(n).heights)
+            for periodic, area in itertools.product((True, False), AREAS):
+                task = {"heights": file, "pressures": [AREAS[area]], "tolerance": 1e-6}
+                task["periodic"] = periodic
+                runs = {f"{own}, 1 thread": []} if threads > 1 else {}
+                runs |= {code: [] for code in pythons}
+                for _ in range(repeats):
+                    for name in runs:
+                        code = name.partition(",")[0]
+                        process = Process(pythons[code], code, 1 if "," in name else threads)
+                        runs[name].append(process.ask(**task))
+                        process.close()
+                rows = {name: median(found) for name, found in runs.items()}
+                kind = "periodic" if periodic else "not periodic"
+                show(f"{n} x {n}, {kind}, {area:.0%} contact, {threads} threads", rows, n * n)
+
+
+def median(answers):
+    """Return the answer with the median time, or that of a failure."""
+    failed = [answer for answer in answers if "failed" in answer]
+    return (failed or sorted(answers, key=lambda one: one["seconds"]))[
+        len(answers) // 2 * (not failed)
+    ]
+
+
+def show(title, rows, heights=None):
     """Print rows beside the first code's."""
     print(title)
     for code, row in rows.items():
@@ -95,13 +132,14 @@ def show(title, rows):
             print(f"  {code:17s} failed: {row['failed']}")
             continue
         notes = [f"{row['seconds']:8.4f} s", f"{row['megabytes']:7.1f} MB"]
+        if heights:
+            notes.append(f"{row['megabytes'] * 2**20 / heights:4.0f} bytes a height")
+            notes.append(f"contact {row['area']:.3f}")
         if "error" in row:
             notes.append(f"error {row['error']:.0e}")
         if row["iterations"]:
             notes.append(f"{row['iterations']} iterations")
-        if row["transforms"]:
-            notes.append(f"transforms {row['transforms']:.0%} of the time")
-        notes.append(f"{row['seconds'] / rows[CODES[0]]['seconds']:.1f} x")
+        notes.append(f"{row['seconds'] / rows[CODES[0]].get('seconds', np.nan):.2f} x")
         print(f"  {code:17s} " + "  ".join(notes), flush=True)
 
 
@@ -112,8 +150,13 @@ def main():
     parser.add_argument("--tolerances", type=float, nargs="+", default=[1e-4, 1e-8])
     parser.add_argument("--repeats", type=int, default=5)
     parser.add_argument("--curve", type=int, nargs="*", default=[128, 256], help="sizes")
+    parser.add_argument("--large", type=int, nargs="+", help="sizes for a table of their own")
+    parser.add_argument("--threads", type=int, default=1, help="of each code, in that table")
     options = parser.parse_args()
     pythons = {code: options.peers for code in CODES} | {"patchlaw": sys.executable}
+    if options.large:
+        large(pythons, options.large, options.threads, options.repeats)
+        return
     with tempfile.TemporaryDirectory() as folder:
         for n in options.sizes:
             file = str(Path(folder) / f"{n}.npy")

@@ -51,6 +51,17 @@ def test_legs_are_divided_evenly():
     assert load_history(8.0, 2.0, 5.0, steps=3).count == len(targets)
 
 
+def test_cycles_repeat_the_turning_points():
+    loads = load_history(8.0, 2.0, steps=2, cycles=3)
+    again = load_history(8.0, 2.0, 8.0, 2.0, 8.0, 2.0, steps=2)
+    assert loads.targets == again.targets == [4.0, 8.0, 5.0, 2.0] + 2 * [5.0, 8.0, 5.0, 2.0]
+    assert (loads.count, loads.legs, loads.largest) == (12, 6, 8.0)
+    assert loads.unloads
+    assert load_history(2.0, 8.0, cycles=2).unloads
+    assert not load_history(2.0, 8.0).unloads
+    assert len(list(load_steps(Spring(), loads))) == 12
+
+
 def test_steps_are_numbered_through():
     steps = list(load_steps(Spring(), load_history(1.0, 0.5, steps=2)))
     assert [step.step for step in steps] == [1, 2, 3, 4]

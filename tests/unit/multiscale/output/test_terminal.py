@@ -6,6 +6,7 @@ import numpy as np
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.collective import shared
+from geometry.cores import Place
 from geometry.rigid_plane import Control
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
@@ -53,10 +54,16 @@ def test_shared_tasks_are_counted_over_all_ranks():
     assert told == [1, 2, 3, 4]
     del told[:]
     # of three ranks this one does the tasks 0, 3, 6
-    gathered = SimpleNamespace(
-        rank=0, size=3, allgather=lambda mine: [None] * 3 if mine is None else [[0] * 3] * 3
-    )
-    shared(gathered, 7, lambda index: index, observe=told.append)
+
+    def allgather(mine):
+        if isinstance(mine, Place):
+            return [mine] * 3
+        assert mine == ([0, 3, 6], None)
+        return [mine, ([1, 4], None), ([2, 5], None)]
+
+    done = SimpleNamespace(Test=lambda: True)
+    ranks = SimpleNamespace(rank=0, size=3, allgather=allgather, Ibarrier=lambda: done)
+    assert shared(ranks, 7, lambda index: index, observe=told.append) == list(range(7))
     assert told == [3, 6, 7]
 
 

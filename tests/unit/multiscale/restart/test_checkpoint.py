@@ -185,8 +185,20 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
         (lambda path: path.write_bytes(checksum(b"no HDF5")), "cannot be read: "),
         (lambda path: flip(path), "its checksum does not fit its content"),
         (lambda path: relabel(path), "'patchlaw checkpoint 2': was written by another pa"),
+        (lambda path: path.with_suffix(".steps").unlink(), "cannot be read: .*No such file"),
+        (lambda path: change_log(path, lambda log: log[:-1]), "checkpoint.steps beside it does no"),
+        (lambda path: change_log(path, lambda log: b"[" + log[1:]), "checkpoint.steps beside it "),
     ],
-    ids=["cut", "foreign", "no HDF5", "a bit flipped", "another format"],
+    ids=[
+        "cut",
+        "foreign",
+        "no HDF5",
+        "a bit flipped",
+        "another format",
+        "no log",
+        "log cut",
+        "log changed",
+    ],
 )
 def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage, text):
     path = interrupted(tmp_path / "out", ended)
@@ -197,6 +209,11 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
     assert str(path) in str(error.value)
     assert "remove it, or run without --resume" in str(error.value)
     assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == before
+
+
+def change_log(path, change):
+    log = path.with_suffix(".steps")
+    log.write_bytes(change(log.read_bytes()))
 
 
 def flip(path):
@@ -306,7 +323,9 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
         CheckpointWriter(path.parent, run, FolderLock(path.parent).hold).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
-    assert {each.name for each in path.parent.iterdir()} == {".lock", "checkpoint.h5"}
+    names = {".lock", "checkpoint.h5", "checkpoint.steps"}
+    assert {each.name for each in path.parent.iterdir()} == names
+    assert len(read_checkpoint(path).steps) == 2
 
 
 WORDS = [
@@ -371,7 +390,8 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
     assert done.returncode == 5
     kept = {path.name for path in out.iterdir()} if out.exists() else set()
-    assert kept == (left | {"checkpoint.h5"} if left else set())
+    kept_of_run = {"checkpoint.h5", "checkpoint.steps"}
+    assert kept == (left | kept_of_run if left else set())
     assert main(words) == 0
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
     assert (out / "surface.png").exists()
@@ -390,8 +410,8 @@ def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_pat
     assert done.returncode == 5, done.stderr
     assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
     assert {path.name for path in out.iterdir()} == {
-        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "contacts.csv",
-        "contact.h5",
+        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "checkpoint.steps",
+        "contacts.csv", "contact.h5",
     }  # fmt: skip
 
 

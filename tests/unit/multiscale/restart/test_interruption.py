@@ -104,7 +104,7 @@ def test_no_time_at_all_keeps_what_there_is(capfd, tmp_path):
     words = ["run", PAPER, "--out", str(tmp_path), "--max-time", "1 s", *SMALL]
     assert main(words) == 4
     assert "stopped before the block was made" in capfd.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.h5"]
+    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.h5"]  # no load step yet
 
 
 @pytest.mark.parametrize(

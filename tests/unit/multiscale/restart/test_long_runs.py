@@ -1,0 +1,110 @@
+"""Long runs: neither memory nor what is written per load step grows with the number of steps."""
+
+import gc
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from multiscale import Run, Scene
+from multiscale.restart import checkpoint
+from multiscale.restart.checkpoint import (
+    CheckpointWriter,
+    checkpoint_of,
+    read_checkpoint,
+    write_checkpoint,
+)
+from multiscale.restart.results_folder import FolderLock
+
+SURFACE = {
+    "spectrum": {"hurst": 0.9, "waves": [2, 6], "rms_slope": 0.1, "seed": 2},
+    "grid": [16, 16],
+    "lengths": [1.0, 1.0],
+}
+CASES = {
+    "summits": {"micro": {"model": "elliptic"}},
+    "hardness": {"micro": {"model": "half-space", "hardness": 300.0}},
+}
+
+
+def cyclic(changes, cycles):
+    """Return a small scene that goes up and down; both turning points are one step away."""
+    data = {
+        "surface": SURFACE,
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "patches": {"grid": [2, 2]},
+        "coupling": {"kind": "analytic"},
+        "load": {"approach": [3e-3, 2e-3], "steps": 2, "cycles": cycles},
+        "output": {"check": "none"},
+    }
+    return Scene.from_dict(data | changes)
+
+
+class Latest(list):
+    """Load steps of which the latest alone is kept: what grows beside them shows."""
+
+    def append(self, step):
+        self[:] = [step]
+
+
+def after_steps(run, numbers, measure):
+    """Return what is measured after some load steps of a run."""
+    found = {}
+    for step in run.load_steps():
+        if step.step in numbers:
+            found[step.step] = measure()
+    return [found[number] for number in numbers]
+
+
+@pytest.mark.parametrize("changes", CASES.values(), ids=CASES)
+def test_memory_grows_by_the_history_alone(changes):
+    run = Run(cyclic(changes, 50))
+    run.steps = Latest()
+
+    def alive():
+        gc.collect()
+        return len(gc.get_objects()), tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        (objects, first), (objects_later, later) = after_steps(run, (50, 200), alive)
+    finally:
+        tracemalloc.stop()
+    assert objects_later - objects < 10
+    # a row has 1500 bytes and more, a map 2000; numpy keeps small blocks, up to 90 B a step here
+    assert later - first < 200 * 150
+
+
+def written_bytes():
+    """Return the bytes that this process has written so far, as Linux counts them."""
+    return int(Path("/proc/self/io").read_text().split("wchar: ")[1].split()[0])
+
+
+def test_every_load_step_writes_as_much_as_the_first_ones(tmp_path, monkeypatch):
+    monkeypatch.setattr(checkpoint, "LEAST_INTERVAL", 0.0)
+    monkeypatch.setattr(checkpoint, "LEAST_RATIO", 0.0)
+    run, lock = Run(cyclic(CASES["summits"], 30)), FolderLock(tmp_path / "out")
+    with CheckpointWriter(tmp_path / "out", run, lock.hold) as writer:
+        writer.write()
+        counted = []
+        for _ in run.load_steps():
+            writer.accept()
+            counted.append(written_bytes())
+        assert len(read_checkpoint(writer.path).steps) == 120
+        writer.remove()
+    lock.release()
+    early, late = counted[40] - counted[20], counted[119] - counted[99]
+    assert late < 1.02 * early  # numbers have a digit more or less
+
+
+def test_resumed_cycles_go_on_where_they_were(tmp_path):
+    whole, part = Run(cyclic(CASES["hardness"], 5)), Run(cyclic(CASES["hardness"], 5))
+    forces = [step.force_N for step in whole.load_steps()]
+    for step in part.load_steps():
+        if step.step == 9:
+            break
+    kept = read_checkpoint(write_checkpoint(tmp_path / "c.h5", checkpoint_of(part, part.state())))
+    again = Run(part.given)
+    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    list(again.load_steps())
+    assert [step.force_N for step in again.steps] == forces

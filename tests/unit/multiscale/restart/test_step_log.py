@@ -1,0 +1,109 @@
+"""The log of load steps: what is kept of it, and what an interrupted write leaves."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from geometry.errors import InputError, NotWritten
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.restart.step_log import LogMark, StepLog, read_steps
+
+
+def step(number):
+    """Return a load step with numbers of all kinds."""
+    dice = np.random.default_rng(number)
+    arrays = {name: dice.normal(size=3) for name in ("closure_mm", "pressure_MPa")}
+    return LoadStep(
+        step=number, approach_mm=1e-3 * number / 3.0, force_N=float("nan"),
+        mean_pressure_MPa=np.float64(1 / 3), contact_area_fraction=0.1, mean_separation_mm=1e-300,
+        contacts=np.int64(7), newton_iterations=2, tilt=(1e-3, -2e-3), warnings=("a µ", "b"),
+        errors=(("grid", 0.1),), meshes=((1.0, 2.0, 3.0),),
+        patches=PatchState(**arrays, contact_area_fraction=np.arange(3)),
+    )  # fmt: skip
+
+
+STEPS = [step(number) for number in range(1, 8)]
+
+
+def same(found, steps):
+    """Compare load steps, bit by bit."""
+    for one, other in zip(found, steps, strict=True):
+        for each in fields(one):
+            mine, its = getattr(one, each.name), getattr(other, each.name)
+            if each.name == "patches":
+                for name in PatchState.__slots__:
+                    np.testing.assert_array_equal(getattr(mine, name), getattr(its, name))
+            else:
+                assert mine == its or (mine != mine and its != its)
+
+
+def test_load_steps_come_back_to_the_last_bit(tmp_path):
+    log = StepLog(tmp_path / "log")
+    marks = []
+    for count in (0, 1, 1, 4, 7):
+        log.write(STEPS[:count])
+        marks.append(log.mark)
+    assert [mark.steps for mark in marks] == [0, 1, 1, 4, 7]
+    for mark in marks:  # an earlier checkpoint stays good when a later one was not written
+        same(read_steps(log.path, mark), STEPS[: mark.steps])
+    assert log.path.stat().st_size == log.mark.size
+
+
+def test_each_load_step_is_written_once(tmp_path, monkeypatch):
+    log, written = StepLog(tmp_path / "log"), []
+    append = StepLog._append
+    monkeypatch.setattr(StepLog, "_append", lambda s, b: (written.append(len(b)), append(s, b)))
+    for count in range(1, 8):
+        log.write(STEPS[:count])
+    first = log.mark.size - sum(written)
+    assert len(written) == 6
+    assert max(written) <= 1.5 * first
+
+
+def test_what_a_killed_run_wrote_behind_its_checkpoint_goes(tmp_path):
+    log = StepLog(tmp_path / "log")
+    log.write(STEPS[:3])
+    mark = log.mark
+    with log.path.open("ab") as file:
+        file.write(b'{"step": 4, "appr')
+    same(read_steps(log.path, mark), STEPS[:3])
+    log.write(STEPS[:5])
+    same(read_steps(log.path, log.mark), STEPS[:5])
+    resumed = StepLog(log.path)  # of another process: it knows nothing of the file
+    resumed.write([*STEPS[:3], replace(STEPS[3], contacts=9)])
+    assert read_steps(log.path, resumed.mark)[3].contacts == 9
+    same(read_steps(log.path, mark), STEPS[:3])
+
+
+def test_log_that_vanished_is_written_whole(tmp_path):
+    log = StepLog(tmp_path / "log")
+    log.write(STEPS[:3])
+    log.path.unlink()
+    log.write(STEPS[:4])
+    same(read_steps(log.path, log.mark), STEPS[:4])
+
+
+def test_failed_write_leaves_the_mark(tmp_path, monkeypatch):
+    log = StepLog(tmp_path / "log")
+    log.write(STEPS[:3])
+    mark = log.mark
+
+    def full(number):
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as broken:
+        broken.setattr("multiscale.restart.step_log.os.fsync", full)
+        with pytest.raises(NotWritten, match="log: cannot be written: No space left on device"):
+            log.write(STEPS)
+    assert log.mark == mark
+    same(read_steps(log.path, mark), STEPS[:3])
+    log.write(STEPS)
+    same(read_steps(log.path, log.mark), STEPS)
+
+
+def test_promise_of_more_bytes_than_there_are_is_refused(tmp_path):
+    log = StepLog(tmp_path / "log")
+    log.write(STEPS[:2])
+    with pytest.raises(InputError, match="is damaged: log beside it"):
+        read_steps(log.path, LogMark(steps=2, size=10**18, sha256=log.mark.sha256))
