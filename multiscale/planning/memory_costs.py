@@ -20,10 +20,10 @@ _LIBRARIES = {"dolfinx": 70e6, "matplotlib": 70e6}
 """Memory of libraries that runs import when they need them [B]."""
 _SURFACE, _SUMMITS = 37.0, 100.0
 """Memory per height of the surface with its spline, and of finding its summits [B]."""
-_SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 75.0, 70.0, 40.0, 40.0, 40.0
+_SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 55.0, 35.0, 40.0, 35.0, 40.0
 """Memory per cell of a contact problem with its kernel and work array, of it per cell of the box
 that is solved, of free sides and body, of the maps of a load step, and of finite slopes [B]. In
-sum 141 were measured where the box was 3/8 of 512² cells, 155 where it was 9/16 of 1024²."""
+sum 95 were measured where the box was small, 101 where it was 9/16 of 512² and of 1024² cells."""
 _FACE = 1.25e9
 """Memory of the compliance of a meshed body's face for `face_work` 1 [B]."""
 _KEPT = 60.0
