@@ -173,13 +173,12 @@ def test_ranks_share_meshes_and_laws_of_patches():
 
 
 def test_the_largest_part_of_the_memory_is_said():
-    cost = predicted_cost(
-        make_setup(scene(grid=512, cells=(4, 4, 4))), Reference(), Launch(memory=1e6)
-    )
+    launch = Launch(memory=1e6, imported=lambda _: True)
+    cost = predicted_cost(make_setup(scene(grid=512, cells=(4, 4, 4))), Reference(), launch)
     assert "most of it for the contact problem" in dict(cost_statements(cost))["cost"]
     assert cost.memory == pytest.approx(sum(cost.parts.values()), rel=1e-12)
     meshed = make_setup(scene(coupling={"kind": "consistent", "compliance": "finite-element"}))
-    cost = predicted_cost(meshed, Reference(), Launch(memory=1e6))
+    cost = predicted_cost(meshed, Reference(), launch)
     assert cost.parts["meshes and laws"] > 0.0
 
 
