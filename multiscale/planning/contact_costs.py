@@ -38,12 +38,14 @@ _PERIODIC = 0.33
 """Time of a product with a periodic half-space, without padding, over that with others."""
 _SLOPES = 1.3
 """Factor of the products with finite slopes."""
-_PASSES, _PASS = 5.0, 1.0e-3
-"""Solutions by which finite slopes converge, and the overhead of each [s]."""
+_PASSES, _PASS, _PASS_CELL = 5.0, 1.0e-3, 40e-9
+"""Solutions by which finite slopes converge, and the overhead of each and of it per cell [s]."""
 _SLOPES_COARSE, _SLOPES_CELL = 3.6e-3, 65e-9
 """Time of evaluating finite slopes on 64² cells, which is the least on finer ones too, and per cell
 [s]: 64² to 256² took 5 to 7 ms, 512² 16 to 28, 1024² 70 to 110."""
 _SLOPES_LEAST = 64**2
+_SLOPES_CACHED, _SLOPES_GROWTH = 2**20, 0.3
+"""Cells beyond which that per cell grows with this power of them: to 155 ns on 4096²."""
 _STIFFNESS = 0.3
 """Solutions that an interfacial stiffness is worth; 0.2 to 0.4 were measured."""
 _CHECK_CELL = 0.4e-6
@@ -189,7 +191,9 @@ class ContactCosts:
     def _sloped(self, cells: float, box: Box, *, free: bool = False) -> float:
         """Return the time of a solution with finite slopes, for as many passes as they take."""
         coarse = min(cells / _SLOPES_LEAST, 1.0) * _SLOPES_COARSE
-        each = self.speed.arrays * (coarse + _SLOPES_CELL * cells + _PASS)
+        large = max(cells / _SLOPES_CACHED, 1.0) ** _SLOPES_GROWTH
+        each = _PASS + coarse + (_PASS_CELL + _SLOPES_CELL * large) * cells
+        each *= self.speed.arrays
         return _PASSES * each + self._flat(cells, box, free=free, more=_SLOPES)
 
     def _of_contacts(self, cells: float, summits: int) -> float:
