@@ -9,6 +9,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from geometry.cores import cores
 from geometry.errors import InputError
 from geometry.surface import Surface
 
@@ -163,16 +164,16 @@ def _wavenumbers(surface: Surface) -> tuple[Array, Array]:
 
 def _power(h: Array) -> Array:
     """Return the variance carried by every wave of the discrete transform [mm²]."""
-    return np.abs(scipy.fft.fft2(h, norm="forward")) ** 2
+    return np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2
 
 
 def _spectral(surface: Surface) -> tuple[float, float, float, float, float]:
     """Return <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²> of the trigonometric interpolant."""
     power = _power(surface.heights - surface.mean_height)
-    qx, qy = _wavenumbers(surface)
-    weights = (qx**2, qy**2, qx**4, qy**4, (qx**2 + qy**2) ** 2)
-    first, second, third, fourth, last = (float(np.sum(power * weight)) for weight in weights)
-    return first, second, third, fourth, last
+    x, y = (wavenumber.ravel() ** 2 for wavenumber in _wavenumbers(surface))
+    along_x, along_y = power.sum(axis=1), power.sum(axis=0)
+    xx, yy, mixed = float(along_x @ x**2), float(along_y @ y**2), float(x @ power @ y)
+    return float(along_x @ x), float(along_y @ y), xx, yy, xx + 2.0 * mixed + yy
 
 
 def _differences(surface: Surface) -> tuple[float, float, float, float, float]:

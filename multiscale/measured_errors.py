@@ -40,7 +40,7 @@ _COARSER_ALONE = 8.0
 """Factor of the error from coarser grids where the finer grid is not solved."""
 _MATTERS = 0.5
 """Share of the other causes above which the error of the grid is worth the finer grid."""
-_MOST_CELLS, _FEWEST_CELLS = 2**20, 32
+MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
 error."""
 _FEWER_MODES = 0.75
@@ -180,7 +180,7 @@ class _Problems:
         twice = abs(self._force(self._half, 0) - self._force(self._quarter, 0))
         error = max(_COARSER * coarser, _TWICE * twice)
         needed = min(nx, ny) < _FEWEST_CELLS or _COARSER_ALONE * error > _MATTERS * others
-        if 4 * nx * ny > _MOST_CELLS or not needed:
+        if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
             return _COARSER_ALONE * error
         finer = abs(self._force((2 * nx, 2 * ny), 0) - self._force((nx, ny), 0))
         return max(_FINER * finer, error)

@@ -85,6 +85,12 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     return large.bcast(made, root=0)
 
 
+def is_cached(kind: str, key: tuple[object, ...]) -> bool:
+    """Tell whether this process finds a file of arrays in the cache; see `cached`."""
+    path = _path(kind, key)
+    return path is not None and path.exists()
+
+
 @cache
 def sources_digest(top: Path = _TOP) -> str:
     """Return a digest of the sources of the packages that make the cached arrays.

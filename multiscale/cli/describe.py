@@ -10,19 +10,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root
+from geometry.collective import on_root, on_root_alone
 from geometry.errors import InputError
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
+from multiscale.couplings.body import scene_body
 from multiscale.exports.export import export_texts, remove_exports
 from multiscale.laws.law_file import write_laws
-from multiscale.machine import cluster_nodes
+from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.costs import predicted_cost
+from multiscale.planning.memory_costs import Launch
 from multiscale.planning.set_up import set_up
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
@@ -41,9 +43,12 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = scene_and_folder(choice, comm)
+    memory, ranks = peak_memory(), 1 if comm is None else comm.size
     load_finite_elements(scene, comm)
     setup = _setup(scene, comm)
-    cost = on_root(comm, lambda: predicted_cost(setup))
+    known = setup.bodies.first is None or bool(setup.samples) or scene_body(setup).is_cached()
+    launch = Launch.anew(memory, ranks, solves_face=not known)
+    cost = on_root_alone(comm, lambda: predicted_cost(setup, launch=launch))
     shortages = list(memory_warnings(setup, cluster_nodes(comm)))
     terminal.show_plan(comm, setup, cost, shortages)
 

@@ -16,7 +16,8 @@ from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
 from multiscale.planning.auto_keys import auto_keys
-from multiscale.planning.costs import predicted_cost, step_count
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.memory_costs import step_count
 from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
 from multiscale.restart.results_folder import locked

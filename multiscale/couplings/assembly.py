@@ -38,8 +38,8 @@ MOST_CYCLES_PER_STEP = 12
 """Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
 steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
 patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
-CYCLES_AT_POINTS = 30
-"""Those of a load step of laws of samples, which stand at points: 10 to 60 on three parts."""
+CYCLES_AT_POINTS = 24
+"""Those of a load step of laws of samples, which stand at points: 6 to 60 on four parts."""
 
 CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4

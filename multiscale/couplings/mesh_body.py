@@ -27,6 +27,8 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 _SAME = 1e-9
 """Difference of Poisson's ratios that is rounding."""
+_CACHED = "mesh-face"
+"""Kind of these compliances in the cache."""
 _ON_MESH = 6
 """Modes at most where they load the mesh itself: finer ones are those of its elements."""
 
@@ -132,12 +134,9 @@ class MeshTerms(FaceTerms):
         """
         from macro import FaceCompliance
         from macro.compliance.cache import cached
-        from macro.compliance.mesh_digest import body_digest
         from macro.compliance.mesh_face import lowered, mesh_face_compliance, raised, turned
 
-        count, body = modes or self.modes, raised(self.body)
-        if not self.around.below:
-            count = min(count, _ON_MESH)
+        count, body = self._count(modes), raised(self.body)
 
         def of(one: ElasticBody) -> FaceCompliance:
             fields = RectangleFields(
@@ -156,17 +155,34 @@ class MeshTerms(FaceTerms):
             rough = None if linear is None else of(linear).normal
             return replace(of(body), rough=rough).arrays
 
+        found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
+        return turned(found) if self.behind else found
+
+    def is_cached(self) -> bool:
+        """Tell whether an earlier run has left the compliance of the rectangle; collective."""
+        from macro.compliance.cache import is_cached
+
+        return is_cached(_CACHED, self._key(self._count(None)))
+
+    def _count(self, modes: int | None) -> int:
+        """Return the modes along a side, by default those of the shape."""
+        count = modes or self.modes
+        return count if self.around.below else min(count, _ON_MESH)
+
+    def _key(self, count: int) -> tuple[object, ...]:
+        """Return what the compliance in so many modes along a side depends on; collective."""
+        from macro.compliance.mesh_digest import body_digest
+        from macro.compliance.mesh_face import raised
+
         frame = self.facets.frame
-        key = (
-            body_digest(body),
+        return (
+            body_digest(raised(self.body)),
             (*frame.origin.tolist(), *frame.axes.ravel().tolist()),
             self.lengths,
             count,
             self.around.free_sides,
             self.around.below,
         )
-        found = FaceCompliance(**cached("mesh-face", key, compute, self.body.comm))
-        return turned(found) if self.behind else found
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,6 +226,10 @@ class PairTerms(FaceTerms):
         if self._alike:
             share += contact_modulus / self.second.material.contact_modulus
         return share
+
+    def is_cached(self) -> bool:
+        """Tell whether earlier runs have left the compliances of both bodies; collective."""
+        return self.first.is_cached() and self._behind.is_cached()
 
     def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
         """Return the compliance of the first body, and what the other adds to a half-space.

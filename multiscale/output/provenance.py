@@ -47,9 +47,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "lengths_mm": list(setup.surface.lengths),
             "heights_sha256": run.heights,
             "highest_mm": setup.surface.highest,
-            "summits": setup.asperities.count,
-            "summits_in_reach": int(setup.interfering_summits.sum()),
-            "border_maxima_in_reach": setup.interfering_border_maxima,
+            **(_summits(setup) if setup.uses_summits else {}),
         },
         "patches": None if setup.samples else list(setup.patches.grid),
         "regions": list(setup.regions.names) if setup.regions else None,
@@ -105,6 +103,14 @@ def _reference(run: Run) -> dict[str, Any] | None:
         "area_rate": record.area.rate.tolist(),
         "error": record.label,
         "mesh_quality": coupling.qualities,
+    }
+
+
+def _summits(setup: ProblemSetup) -> dict[str, int]:
+    return {
+        "summits": setup.asperities.count,
+        "summits_in_reach": int(setup.interfering_summits.sum()),
+        "border_maxima_in_reach": setup.interfering_border_maxima,
     }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from geometry.meshes.block import BlockShape, misalignment
 from multiscale.machine import ClusterNodes
 from multiscale.planning.body_plan import LOCKING_FROM, body_statement, body_warnings
-from multiscale.planning.costs import run_memory_requests
+from multiscale.planning.memory_costs import run_memory_requests
 from multiscale.readable import quantity
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import ReferenceMeshes

@@ -45,12 +45,28 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     if setup.decision is not None:
         yield "choice", setup.decision.sentence
     if cost is not None:
-        phases = ", ".join(
-            f"{phase} {duration(seconds)}" for phase, seconds in cost.seconds.items()
-        )
-        memory = f"{cost.memory / 1e6:.0f} MB"
-        yield "cost", f"about {duration(cost.total)} on one core ({phases}) and {memory}"
+        yield from cost_statements(cost)
     yield "error", _error(setup)
+
+
+def cost_statements(cost: Cost) -> Iterator[tuple[str, str]]:
+    """Yield what a run is predicted to take, and what other programs do to it.
+
+    Args:
+        cost: The prediction.
+    """
+    phases = ", ".join(f"{phase} {duration(seconds)}" for phase, seconds in cost.seconds.items())
+    count = "one core" if cost.cores == 1 else f"{cost.cores} cores"
+    largest = max(cost.parts, key=lambda part: cost.parts[part])
+    memory = f"{cost.memory / 1e6:.0f} MB, most of it for the {largest}"
+    yield "cost", f"about {duration(cost.total)} on {count} ({phases}) and {memory}"
+    if cost.competition.busy:
+        others, cores = cost.competition.others, cost.competition.cores
+        yield (
+            "busy",
+            f"other programs would use {others:.2g} of the {cores} cores; the times above are for "
+            f"that, idle cores would take about {duration(cost.idle)}",
+        )
 
 
 def warnings(setup: ProblemSetup) -> Iterator[str]:

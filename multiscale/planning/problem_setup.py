@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from geometry.asperities import find_asperities
 from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
@@ -130,8 +129,6 @@ def _setup(
         surface=surface,
         counter_surface=counter_surface,
         materials=materials,
-        # the block's sides are free
-        asperities=like.asperities if like else find_asperities(surface, periodic=False),
         patches=patches,
         mean_heights=patch_means(surface, patches),
         block_shape=shape,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 
-from geometry.asperities import find_asperities
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
@@ -63,7 +62,6 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         scene=scene,
         surface=surface,
         counter_surface=None,
-        asperities=find_asperities(surface, periodic=False),
         micro=model,
         patches=patches,
         mean_heights=patch_means(surface, patches),

@@ -24,15 +24,15 @@ is made, while rows are inserted [B]."""
 BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
 """Memory of a patch's results and of the other results of a load step [B]."""
 
-BYTES_PER_BODY_UNKNOWN = {"P1": 2400, "P2": 2500, "Q1": 4200, "Q2": 3500}
+BYTES_PER_BODY_UNKNOWN = {"P1": 2400, "P2": 1600, "Q1": 4200, "Q2": 2800}
 """Memory of a body on a mesh per unknown, over all ranks: mesh, stiffness, multigrid and solve [B].
-Brake pads took 2350 (2.5·10⁵ unknowns), 2290 (4.9·10⁶), 4000 (1.9·10⁵) and 3140 (1.8·10⁵); the
-stiffness alone takes 920, 1260, 1100 and 2380, multigrid 1070, 850, 2590 and 590."""
+Brake pads took 2350 (2.5·10⁵ unknowns) with P1, 1320 to 1560 (2·10⁵ to 10⁶) with P2, 4000 (1.9·10⁵)
+with Q1; an L took 2690 (1.3·10⁵) with Q2."""
 BYTES_READ_PER_UNKNOWN = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}
 """Memory that rank 0 takes besides, per unknown, while gmsh reads the mesh of a body [B]."""
-_BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 32, 32, 100
-"""Memory per unknown of an earlier state and its copy for initial guesses, the largest number of
-them, and the vectors of Newton's method [B]. Eight load steps took 360."""
+_BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 8, 32, 100
+"""Memory per unknown of an earlier state for initial guesses, the largest number of them, and the
+vectors of Newton's method [B]. Two load steps took 107."""
 
 
 def check_memory(

@@ -17,6 +17,7 @@ from geometry import (
     Regions,
     RigidPlane,
     Surface,
+    find_asperities,
 )
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
@@ -116,7 +117,6 @@ class ProblemSetup:
     Attributes:
         scene: The scene with its auto values resolved, but for ``micro.model``.
         surface: Its rough surface, with the heights of both sides where both are rough.
-        asperities: The surface's summits.
         micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
         mean_heights: Mean height of each patch, shape (N,) [mm].
@@ -139,7 +139,6 @@ class ProblemSetup:
 
     scene: Scene
     surface: Surface
-    asperities: Asperities
     micro: MicroModel | None
     patches: PatchGrid
     mean_heights: Array
@@ -155,6 +154,13 @@ class ProblemSetup:
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def asperities(self) -> Asperities:
+        """The surface's summits; found when first needed, which takes seconds on 4096² heights."""
+        if isinstance(self.micro, AsperityModel):
+            return self.micro.asperities
+        return find_asperities(self.surface, periodic=False)  # the block's sides are free
 
     @property
     def shape(self) -> BlockShape:
@@ -269,12 +275,14 @@ class ProblemSetup:
     @property
     def interfering_patches(self) -> int:
         """Number of patches that the largest closures of their laws bring into contact."""
-        x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
-        if not self.ignores_border:
-            x, y = (part.ravel() for part in np.meshgrid(self.surface.x, self.surface.y))
-            z = self.surface.heights.T.ravel()
+        surface, largest = self.surface, self.largest_closures
+        if self.ignores_border:
+            x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
+        else:  # few of many heights come near
+            i, j = np.nonzero(largest.max() > surface.highest - surface.heights)
+            x, y, z = surface.x[i], surface.y[j], surface.heights[i, j]
         owner = self.patches.index_of(x, y)
-        closes = self.largest_closures[owner] > self.surface.highest - z
+        closes = largest[owner] > surface.highest - z
         return int(np.unique(owner[closes]).size)
 
     @property

@@ -1,11 +1,16 @@
 """What a plan says of bodies on meshes and of laws of samples."""
 
+import numpy as np
 import pytest
 from box_msh import write_box
+from mpi4py import MPI
 
 from geometry import BlockShape
+from macro.compliance.cache import cached
 from multiscale import Scene
-from multiscale.planning.costs import predicted_cost, run_memory_requests
+from multiscale.couplings.body import scene_body
+from multiscale.planning.costs import predicted_cost
+from multiscale.planning.memory_costs import Launch, run_memory_requests
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.set_up import set_up
 
@@ -64,3 +69,19 @@ def test_surfaces_lie_in_the_middle_of_a_face_or_where_the_scene_says(mesh):
     body = {"mesh": str(mesh), "contact": 1, "supports": [{"surface": 2}], "place": ["0.5 mm", 0]}
     moved = setup_of(mesh, body={**body, **HALF_SPACE}).bodies.first.frame
     assert moved.origin.tolist() == pytest.approx([0.5, 0.0, 0.0], abs=1e-12)
+
+
+def test_a_face_that_is_yet_to_be_solved_for_is_planned(mesh, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / "cache"))
+    setup = setup_of(mesh, coupling={"kind": "concurrent"})
+    terms = scene_body(setup)
+    assert not terms.is_cached()
+    first, later = (
+        predicted_cost(setup, launch=Launch.anew(1e8, solves_face=solves))
+        for solves in (True, False)
+    )
+    assert first.seconds["block"] > later.seconds["block"]
+    assert "body term" in first.parts and "body term" not in later.parts
+    key = terms._key(terms._count(None))
+    cached("mesh-face", key, lambda: {"found": np.zeros(1)}, MPI.COMM_SELF)
+    assert terms.is_cached()

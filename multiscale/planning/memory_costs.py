@@ -1,0 +1,131 @@
+"""Predicts the largest memory of the first process of a run, part by part."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from micro import HalfSpaceModel
+from multiscale.loading.stepper import LoadHistory
+from multiscale.machine import MemoryRequest, peak_memory
+from multiscale.planning.mesh_costs import face_work
+from multiscale.planning.solved_boxes import checks_finer, solved_boxes
+from multiscale.setup.memory import body_request, memory_requests
+from multiscale.setup.problem import ProblemSetup
+from multiscale.setup.reference_meshes import reference_requests
+
+_LIBRARIES = {"dolfinx": 70e6, "matplotlib": 70e6}
+"""Memory of libraries that runs import when they need them [B]."""
+_SURFACE, _SUMMITS = 37.0, 100.0
+"""Memory per height of the surface with its spline, and of finding its summits [B]."""
+_SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 55.0, 35.0, 40.0, 35.0, 40.0
+"""Memory per cell of a contact problem with its kernel and work array, of it per cell of the box
+that is solved, of free sides and body, of the maps of a load step, and of finite slopes [B]. In
+sum 95 were measured where the box was small, 101 where it was 9/16 of 512² and of 1024² cells."""
+_FACE = 1.25e9
+"""Memory of the compliance of a meshed body's face for `face_work` 1 [B]."""
+_KEPT = 60.0
+"""Memory per cell that the run keeps while an error check solves a finer grid [B]."""
+_FIGURES = 25.0
+"""Memory per height of figures, and of the maps of a contact that are written [B]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Launch:
+    """How a run is started.
+
+    Attributes:
+        ranks: Processes of the MPI job.
+        memory: Memory of a process before anything of the scene is in it [B].
+        imported: Tells whether a library has been imported by then.
+        solves_face: Whether the compliance of a meshed body is yet to be solved for.
+    """
+
+    ranks: int = 1
+    memory: float = field(default_factory=peak_memory)
+    imported: Callable[[str], bool] = sys.modules.__contains__
+    solves_face: bool = False
+
+    @classmethod
+    def anew(cls, memory: float, ranks: int = 1, *, solves_face: bool = False) -> Launch:
+        """Return the start of a program of its own, in which no library has been imported.
+
+        Args:
+            memory: Memory of this process when it had imported the same [B].
+            ranks: Processes of the MPI job.
+            solves_face: As the attribute.
+        """
+        return cls(ranks=ranks, memory=memory, imported=lambda _: False, solves_face=solves_face)
+
+
+def step_count(load_history: LoadHistory) -> int:
+    """Return the number of load steps, as far as it is known before the run.
+
+    Args:
+        load_history: The loads, whose steps may be halved by a largest change of the force.
+    """
+    change = load_history.force_change or math.inf
+    return max(load_history.count, math.ceil(load_history.legs / change))
+
+
+def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
+    """Return what a run needs memory for, key by key of its scene.
+
+    Args:
+        setup: The problem.
+    """
+    meshes, scene = setup.meshes, setup.scene
+    steps = step_count(scene.loading.load_history)
+    of_bodies = [
+        body_request(key, face.element, face.unknowns, steps)
+        for key, face in (("body", setup.face), ("counter_body", setup.counter_face))
+        if face is not None and face.digest
+    ]
+    of_meshes = reference_requests(scene, meshes) if meshes else ()
+    return [*memory_requests(scene), *of_bodies, *of_meshes]
+
+
+def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:
+    """Return the memory of the parts of the first process that are held at its largest [B].
+
+    Args:
+        setup: The problem.
+        launch: How the run is started.
+    """
+    output, heights = setup.scene.output, setup.surface.heights.size
+    program, figures = launch.memory, _FIGURES * heights
+    if setup.has_block and not launch.imported("dolfinx"):
+        program += _LIBRARIES["dolfinx"]
+    if output.figures:
+        figures += _FIGURES * heights
+        figures += 0.0 if launch.imported("matplotlib") else _LIBRARIES["matplotlib"]
+    requests = [one for one in run_memory_requests(setup) if not one.key.startswith("surface")]
+    asked = sum(one.shared / launch.ranks + one.per_rank + one.root_only for one in requests)
+    summits = _SUMMITS if setup.uses_summits else 0.0
+    parts = {
+        "program": program,
+        "surface": (_SURFACE + summits) * heights,
+        "meshes and laws": asked,
+        "body term": face_work(setup) * _FACE if launch.solves_face else 0.0,
+        **_contact_or_figures(setup, figures),
+    }
+    return {part: size for part, size in parts.items() if size}
+
+
+def _contact_or_figures(setup: ProblemSetup, figures: float) -> dict[str, float]:
+    """Return the memory of an error check, or of the contact problem and figures after it [B]."""
+    if not isinstance(setup.micro, HalfSpaceModel):
+        return {"figures": figures}
+    cells = setup.micro.surface.heights.size
+    solved = _SOLVED + _ON_BOX * solved_boxes(setup)[-1].part
+    if setup.scene.kind == "isolated":
+        return {"contact problem": solved * cells / setup.patches.count, "figures": figures}
+    solved += _BODY * (setup.has_block and not setup.samples)
+    run = (solved + _MAPS + _SLOPES * setup.finite_slopes) * cells
+    check = (_KEPT + 4.0 * solved) * cells
+    checks = setup.scene.output.check != "none" and not setup.samples
+    if checks and checks_finer(setup, cells) and check > run + figures:
+        return {"error check": check}
+    return {"contact problem": run, "figures": figures}
