@@ -7,7 +7,7 @@ from types import ModuleType
 import pytest
 from scene_inputs import BASE
 
-from multiscale.output.report import LIBRARIES, provenance
+from multiscale.output.provenance import LIBRARIES, provenance
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 

@@ -106,7 +106,7 @@ def test_a_noisy_file_is_repaired_and_says_so(tmp_path):
     said = repair_notes(found)
     assert len(said) == 1
     assert "in the laws of 1 of 2 patches pressure or closure fell" in said[0]
-    assert f"by up to {found[1].repaired:.1e} of their largest" in said[0]
+    assert f"by up to {100 * found[1].repaired:.2g} % of their largest" in said[0]
     # what was repaired once stays as it is, and still says so
     write_laws(tmp_path / "again.h5", found)
     again = read_laws(tmp_path / "again.h5")

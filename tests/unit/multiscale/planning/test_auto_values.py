@@ -6,7 +6,7 @@ import pytest
 
 from geometry.errors import InputError
 from micro import choose
-from multiscale.output.report import provenance
+from multiscale.output.provenance import provenance
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import make_setup
 from multiscale.run import Run

@@ -122,7 +122,7 @@ def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
         plane_at_largest_load(load_history, coupling, setup.surface)
 
 
-@pytest.mark.parametrize(("given", "height"), [({}, 0.02), ({"height": "5 um"}, 0.005)])
+@pytest.mark.parametrize(("given", "height"), [({}, 20), ({"height": "5 um"}, 5)])
 def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
     spectrum = {"hurst": 0.95, "waves": [2, 4], "rms_slope": 0.2, "seed": 1}
     made = make_setup(
@@ -135,9 +135,9 @@ def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
             }
         )
     )
-    assert made.shape.height == pytest.approx(height, rel=1e-12)
+    assert made.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
     said = dict(statements(made))["block"]
-    assert f"0.04 × 0.02 mm and {height:g} mm high, free sides" in said
+    assert f"40 µm × 20 µm and {height} µm high, free sides" in said
 
 
 def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
