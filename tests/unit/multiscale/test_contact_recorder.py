@@ -132,7 +132,9 @@ def test_files_hold_the_contacts(tmp_path):
         {"step": record.step, "spots": len(record.spots)} for record in whole.contacts
     ]
     text = unescape((tmp_path / "report.html").read_text())
-    assert f"{whole.steps[-1].peak_pressure_MPa:.3g} MPa" in text[text.index("peak pressure") :][:80]
+    assert (
+        f"{whole.steps[-1].peak_pressure_MPa:.3g} MPa" in text[text.index("peak pressure") :][:80]
+    )
     quiet = Run(scene(contact="none"))
     list(quiet.load_steps())
     write_results(tmp_path, quiet, options=[])
