@@ -22,7 +22,7 @@ def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
     """Write a mesh with its tags and their names, to be read again by `read_mesh`.
 
     gmsh's files are read whole on rank 0, which takes 0.4 kB there for every cell of the mesh. The
-    files written here are read in parts: 0.7 kB for every cell that a rank then has.
+    files written here are read in parts: 0.5 kB for every cell that a rank then has.
 
     Args:
         tagged: The mesh [mm].

@@ -12,6 +12,7 @@ from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
 from multiscale.planning.mesh_costs import face_work
 from multiscale.planning.solved_boxes import checks_finer, solved_boxes
+from multiscale.scene.body_sections import CounterBodySection
 from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_requests
@@ -79,12 +80,21 @@ def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
     meshes, scene = setup.meshes, setup.scene
     steps = step_count(scene.loading.load_history)
     of_bodies = [
-        body_request(key, face.element, face.unknowns, steps)
-        for key, face in (("body", setup.face), ("counter_body", setup.counter_face))
+        body_request(key, face.element, face.unknowns, steps, in_parts=_in_parts(section))
+        for key, face, section in (
+            ("body", setup.face, scene.body),
+            ("counter_body", setup.counter_face, scene.counter_body),
+        )
         if face is not None and face.digest
     ]
     of_meshes = reference_requests(scene, meshes) if meshes else ()
     return [*memory_requests(scene), *of_bodies, *of_meshes]
+
+
+def _in_parts(section: CounterBodySection | None) -> bool:
+    """Return whether all ranks read a body's mesh in parts."""
+    mesh = section.mesh if section else None
+    return mesh is not None and mesh.lower().endswith(".xdmf")
 
 
 def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:

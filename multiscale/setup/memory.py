@@ -102,7 +102,9 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
     yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
 
 
-def body_request(key: str, element: str, unknowns: int, steps: int) -> MemoryRequest:
+def body_request(
+    key: str, element: str, unknowns: int, steps: int, *, in_parts: bool = False
+) -> MemoryRequest:
     """Return the memory that a body on a mesh takes.
 
     Args:
@@ -110,6 +112,7 @@ def body_request(key: str, element: str, unknowns: int, steps: int) -> MemoryReq
         element: Its element, such as ``"P1"``.
         unknowns: Degrees of freedom.
         steps: Load steps.
+        in_parts: Its file is read by all ranks in parts, as ``.xdmf`` is, and not by rank 0 whole.
     """
     states = min(steps, _MOST_STATES) * _BYTES_PER_EARLIER_STATE
     each = BYTES_PER_BODY_UNKNOWN[element] + states + _WORK_VECTORS
@@ -118,5 +121,5 @@ def body_request(key: str, element: str, unknowns: int, steps: int) -> MemoryReq
         value=None,
         purpose=f"the mesh of [{key}], its stiffness and multigrid,",
         shared=float(unknowns) * each,
-        root_only=float(unknowns) * BYTES_READ_PER_UNKNOWN[element],
+        root_only=0.0 if in_parts else float(unknowns) * BYTES_READ_PER_UNKNOWN[element],
     )

@@ -268,6 +268,14 @@ def test_bodies_take_what_their_request_says(element, unknowns, steps, measured)
     assert said.sentence.startswith("the mesh of [body], its stiffness and multigrid, needs about")
 
 
+def test_files_read_in_parts_burden_no_single_rank():
+    whole, parts = (
+        body_request("body", "P1", 1000, 1, in_parts=in_parts) for in_parts in (False, True)
+    )
+    assert parts.root_only == 0.0 < whole.root_only
+    assert parts.shared == whole.shared
+
+
 def test_earlier_states_are_kept_up_to_a_number():
     one, many, more = (body_request("body", "Q1", 1000, steps).total for steps in (1, 32, 500))
     assert one < many == more
