@@ -9,7 +9,7 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 
-QUICK = {"four_models", "heat", "kappa", "own_problem", "paper_figures", "rough_block", "tilt"}
+QUICK = {"four_models", "kappa", "own_problem", "paper_figures"}
 """Demos that take seconds; the others are among the long tests."""
 
 

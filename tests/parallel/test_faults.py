@@ -24,7 +24,7 @@ WORDS = (
     [
         pytest.param(1, "surface", marks=pytest.mark.long),
         pytest.param(1, "plan", marks=pytest.mark.long),
-        (1, "laws"),
+        pytest.param(1, "laws", marks=pytest.mark.long),
         pytest.param(1, "block", marks=pytest.mark.long),
         (1, "load step"),
         pytest.param(1, "checkpoint", marks=pytest.mark.long),
@@ -57,6 +57,7 @@ def test_full_disk_ends_all_with_5(mpirun, tmp_path):
     assert not list(out.glob("*fields*"))
 
 
+@pytest.mark.long
 def test_signal_to_one_rank_stops_all_and_any_number_goes_on(mpirun, tmp_path):
     out = tmp_path / "out"
     done = mpirun(2, SCRIPT, 1, "signal", "checkpoint", *WORDS, out, timeout=100)

@@ -37,7 +37,13 @@ def table(path, names):
 
 
 @pytest.mark.parametrize("ranks", RANKS)
-@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(SCENES[name], id=name, marks=[pytest.mark.long] * ("tetrahedra" in name))
+        for name in SCENES
+    ],
+)
 def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, ranks):
     path, text = tmp_path / "scene.toml", (root / PAPER).read_text(encoding="utf-8")
     if "load.tilt=free" in scene:

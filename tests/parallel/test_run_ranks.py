@@ -117,7 +117,10 @@ LONG = {
     "concurrent, islands",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",
+    "concurrent, with a hardness, conducting",
+    "half-space with slopes, tilted",
     "laws of the half-space, contact on request",
+    "laws that conduct",
     "wide block, tilted",
 }
 
@@ -229,6 +232,7 @@ def test_bad_heights_end_all_ranks(mpirun, root, tmp_path, content):
     assert not out.exists()
 
 
+@pytest.mark.long  # as in test_faults.py
 def test_bug_on_one_rank_ends_all(mpirun, tmp_path):
     """An error that only one rank meets must not leave the others waiting."""
     code = (

@@ -46,7 +46,12 @@ def extrapolated(small, large):
 
 
 @pytest.mark.parametrize(
-    ("grid", "sides"), [((1, 1), (1.0, 1.0)), ((1, 1), (1.0, 0.5)), ((2, 2), (1.0, 1.0))]
+    ("grid", "sides"),
+    [
+        ((1, 1), (1.0, 1.0)),
+        pytest.param((1, 1), (1.0, 0.5), marks=pytest.mark.long),
+        pytest.param((2, 2), (1.0, 1.0), marks=pytest.mark.long),
+    ],
 )
 def test_large_block_tends_to_love(grid, sides):
     block = block_of(interface=sides, cells=(2, 2, 1))

@@ -31,7 +31,9 @@ def half_space():
     return force("coupling.kind=analytic")
 
 
-@pytest.mark.parametrize("interface", ["patchwise", "pointwise"])
+@pytest.mark.parametrize(
+    "interface", ["patchwise", pytest.param("pointwise", marks=pytest.mark.long)]
+)
 def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
     errors = [
         np.abs(force(*block_of(ratio), f"coupling.interface={interface}") / half_space - 1)
@@ -125,7 +127,8 @@ def test_pointwise_laws_reach_to_the_corners_of_tilted_patches():
     assert step.force_N > 1.0
 
 
-@pytest.mark.parametrize("grid", [pytest.param((4, 4), marks=pytest.mark.long), (4, 2)])
+@pytest.mark.long
+@pytest.mark.parametrize("grid", [(4, 4), (4, 2)])
 def test_consistent_laws_go_as_far_as_points_of_patches_ask(grid):
     """Where a patch sinks less than in its mean, closures are larger than in any of its rows."""
     small = ["surface.grid=[64, 64]", "micro.model=half-space", "load.steps=1"]

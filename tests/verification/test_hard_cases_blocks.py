@@ -22,6 +22,7 @@ def stiffness(element, cells, nu):
     ).force_N[-1]  # fmt: skip
 
 
+@pytest.mark.long
 def test_quadratic_elements_do_not_lock():
     # hard: at ν = 0.4999 trilinear cells are half as stiff again; the remedy is the element
     linear = [stiffness("Q1", [n, n, n], 0.4999) for n in (4, 8)]

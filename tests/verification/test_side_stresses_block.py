@@ -81,7 +81,8 @@ def slope_effect(stresses, x, y, weights, nu):
     return float(np.sum((heights - level) * (pressure**2 - lateral) * weights))
 
 
-@pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.long), 0.45])
+@pytest.mark.long
+@pytest.mark.parametrize("nu", [0.0, 0.45])
 def test_stresses_beside_a_side_are_those_of_a_meshed_block(nu):
     centres, areas, meshed = meshed_stresses(nu)
     spacing = (1.0 / CELLS,) * 2

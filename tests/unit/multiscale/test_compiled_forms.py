@@ -10,6 +10,7 @@ import pytest
 
 from multiscale.cli.command_line import main
 
+pytestmark = pytest.mark.long
 SCENE = "demos/scenes/paper.toml"
 SMALL = [
     "surface.grid=[32, 32]", "block.cells=[4, 4, 2]", "patches.grid=[2, 2]", "load.steps=1",

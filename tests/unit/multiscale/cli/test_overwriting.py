@@ -23,7 +23,8 @@ def scene(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("command", ["run", "surface", "laws"])
 def test_results_of_another_scene_are_kept(scene, capsys, command):
-    words = [command, "scene.toml", "--set", "coupling.kind=isolated", "patches.grid=[1, 1]"]
+    kind = "isolated" if command == "laws" else "analytic"
+    words = [command, "scene.toml", "--set", f"coupling.kind={kind}", "patches.grid=[1, 1]"]
     words.append("load.steps=1")
     assert main(["run", *words[1:]]) == 0
     capsys.readouterr()

@@ -20,7 +20,7 @@ def test_comparisons_of_any_scenes(tmp_path_factory, drawn):
     compared(path, *drawn[1:])
 
 
-@settings(few, max_examples=15)
+@settings(few, max_examples=10)
 @given(lines)
 def test_command_lines_of_any_words(tmp_path_factory, words):
     path = tmp_path_factory.getbasetemp() / "called.toml"

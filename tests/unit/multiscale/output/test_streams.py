@@ -104,21 +104,25 @@ def test_interrupt_during_imports_is_quiet(root, seconds):
         f"threading.Timer({seconds}, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "raise SystemExit(patchlaw.main())"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, "plan", PAPER],
-        cwd=root,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    for _ in range(3):  # the interpreter loses a signal that comes while C code asks for attributes
+        done = subprocess.run(
+            [sys.executable, "-c", code, "plan", PAPER],
+            cwd=root,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert "Traceback" not in done.stderr
+        if done.returncode != 0:
+            break
     assert done.returncode == 130
-    assert "Traceback" not in done.stderr
 
 
 def is_configuration(number):
     return b"comparison.process" in Path(f"/proc/{number}/cmdline").read_bytes()
 
 
+@pytest.mark.long
 def test_processes_end_with_the_comparison_that_was_told_to(root, tmp_path):
     words = ["compare", PAPER, "--out", str(tmp_path / "out")]
     process = subprocess.Popen(

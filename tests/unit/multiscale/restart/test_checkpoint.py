@@ -373,7 +373,9 @@ LIMITED = (
     ("size", "file", "left"),
     [
         (8_000, "checkpoint.h5", set()),
-        (25_000, "overview.png", {"history.csv", "patches.csv"}),
+        pytest.param(
+            25_000, "overview.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
+        ),
     ],
 )
 def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file, left):
