@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from geometry.asperities import Asperities
@@ -153,6 +154,9 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
     axes.minorticks_off()  # drawing them takes as long as all the rest
+    if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:  # powers of ten would be too few
+        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.xaxis.set_major_formatter("{x:g}")
     axes.set_title(f"rms gradient {roughness(surface).sdq:.3g}")
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from matplotlib import rc_context, rcParams
 
-from geometry import PatchGrid
+from geometry import PatchGrid, Spectrum, synthesise
 from multiscale.figures import style
 from multiscale.figures.maps import coarsened, colour_bar, draw_pressures, map_axes, place_colours
+from multiscale.figures.surface import draw_spectrum
 
 
 def png_chunks(content):
@@ -96,3 +97,22 @@ def test_coarse_maps_keep_the_smallest_spot():
     shown = coarsened(field, largest=True, most=100)
     assert shown.shape == (100, 70) and shown[50, 7] == 3.0 and shown.sum() == 3.0
     assert coarsened(field, largest=False, most=100).sum() == pytest.approx(0.03)
+
+
+@pytest.mark.parametrize(
+    ("waves", "labels"), [((2, 10), {"20", "50"}), ((2, 400), {"$\\mathdefault{10^{2}}$"})]
+)
+def test_wavenumbers_are_labelled_however_short_their_range(waves, labels):
+    grid = (2 * waves[1] + 2,) * 2
+    made = Spectrum(hurst=0.8, waves=waves, rms_slope=0.1, seed=1)
+    figure = style.new_figure(style.ONE_COLUMN, 2.0)
+    axes = figure.subplots()
+    draw_spectrum(axes, synthesise(made, grid=grid, lengths=(1.0, 1.0)))
+    figure.canvas.draw()
+    low, high = axes.get_xlim()
+    shown = {
+        label.get_text()
+        for place, label in zip(axes.get_xticks(), axes.get_xticklabels(), strict=True)
+        if low <= place <= high
+    }
+    assert labels <= shown
