@@ -19,7 +19,7 @@ from multiscale.planning import set_up
 command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
-    "surface": (set_up, "on_root"),
+    "surface": (set_up, "on_root_alone"),
     "plan": (command.terminal, "show_plan"),
     "laws": (assembly, "make_table"),
     "block": (assembly, "assemble"),
@@ -63,5 +63,7 @@ accepted = count(0)  # the first call is made before any load step
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]
 if MPI.COMM_WORLD.rank == rank:
     actions = {"bug": bug, "one-sided": one_sided, "signal": signalled, "slow": slow, "full": full}
-    setattr(*PLACES[place], actions[what])
+    module, name = PLACES[place]
+    assert hasattr(module, name), f"nothing is called {name} there any more"
+    setattr(module, name, actions[what])
 sys.exit(main(words))
