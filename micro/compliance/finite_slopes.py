@@ -139,93 +139,101 @@ class FiniteSlopes:
         Returns:
             Shape (nx, ny) [mm].
         """
-        waves, heights = self._waves, self._heights
-        modulus = self.material.young_modulus
+        waves, heights, below = self._waves, self._heights, self._below
+        nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         loaded = waves.alone(waves.coarsened(pressure))
-        loads = waves.of(loaded)
-        xx, _, xy = waves.directions
-        along, across = waves.fields(np.stack([xx * loads, xy * loads]))
-        stresses = self._stresses(loaded, along, across)
+        stresses = self._stresses(loaded)
         strains = self._strains(stresses)
         weights = -heights * strains
-        total = waves.of(heights * loaded) / modulus
+        pushed = heights * loaded / modulus
+        bent = []
         if self.order == 2:
-            value, more, bent = self._second(loads, stresses)
+            value, more = self._second(loaded, stresses)
             energy = loaded**2 / modulus - _product(stresses, strains)
-            share = _share(float(np.sum(self._below * energy)), value)
-            weights = weights + share * more
-            total = total + share * bent
-        total = total + self._adjoint(weights)
+            share = _share(float(np.sum(below * energy)), value)
+            weights += share * more
+            bent = [share * below**2 * stresses]
+        for term in self.edge_stresses:
+            pushed += term.adjoint(weights * np.array([1.0, 1.0, 2.0])[:, None, None])  # xy and yx
+        # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
+        pushed -= 2.0 * nu * (weights[0] + weights[1])
+        fields = [pushed[None], (2.0 * nu - 1.0) * weights, *bent]
+        found = waves.changed(np.concatenate(fields), self._displaced, 1, inside=True)[0]
         if self._periodic:
-            total[0, 0] = 0.0
-        cx, cy = self.grid
-        return waves.refined(waves.fields(total)[:cx, :cy])
+            found -= found.mean()
+        return waves.refined(found)
 
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
         return FiniteSlopes(self._surface, self.material, order=self.order, periodic=self._periodic)
 
-    def _second(self, loads: Spectrum, stresses: Array) -> tuple[float, Array, Spectrum]:
-        """Return the value of the second-order form and the two parts of its displacement.
+    def _second(self, loaded: Array, stresses: Array) -> tuple[float, Array]:
+        """Return the value of the second-order form, and the weights of stresses in it.
 
-        Returns:
-            The value at the pressures; the weights of stresses, whose adjoint gives the first part;
-            the waves of the second part.
+        The adjoint of the weights gives one part of its displacement.
+
+        Args:
+            loaded: Pressures.
+            stresses: The stresses by them.
         """
-        waves, heights = self._waves, self._below
-        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
-        bending = (1.0 - nu) / shear * waves.wave_number
-        strains = waves.fields(self._strains_by_traction(waves.of(heights * stresses)))
-        curvatures = waves.fields(bending * loads * waves.directions)
-        weights = heights * (0.5 * heights * curvatures - strains)
-        value = float(np.sum(_product(stresses, heights * (heights * curvatures - strains))))
-        return value, weights, 0.5 * bending * self._lengthwise(waves.of(heights**2 * stresses))
+        below = self._below
+        fields = np.concatenate([loaded[None], below * stresses])
+        found = self._waves.changed(fields, self._curvatures_and_strains, 6)
+        curvatures, strains = below * found[:3], found[3:]
+        value = float(np.sum(_product(below * stresses, curvatures - strains)))
+        return value, below * (0.5 * curvatures - strains)
 
-    def _stresses(self, pressure: Array, along: Array, across: Array) -> Array:
-        """Return σ_xx, σ_yy, σ_xy by pressures and their k_x²/k² and k_x k_y/k² transforms."""
-        nu = self.material.poisson_ratio
+    def _stresses(self, pressure: Array) -> Array:
+        """Return σ_xx, σ_yy, σ_xy by pressures."""
+        nu, directions = self.material.poisson_ratio, self._waves.directions
         side = 1.0 - 2.0 * nu
-        found = np.stack(
-            [-2.0 * nu * pressure - side * along, side * along - pressure, -side * across]
-        )
+
+        def along_and_across(waves: Spectrum, here: slice) -> Spectrum:
+            return np.asarray(waves * directions[::2, :, here])
+
+        along, across = side * self._waves.changed(pressure[None], along_and_across, 2)
+        found = np.stack([-2.0 * nu * pressure - along, along - pressure, -across])
         for term in self.edge_stresses:
             found += term.stresses(pressure)
         return found
 
-    def _adjoint(self, weights: Array) -> Spectrum:
-        """Return the waves of the displacement that does the work of the stresses on a tensor."""
-        nu = self.material.poisson_ratio
-        waves = self._waves.of(weights)
-        found = -2.0 * nu * (waves[0] + waves[1]) - (1.0 - 2.0 * nu) * self._lengthwise(waves)
-        if self.edge_stresses:
-            both = weights * np.array([1.0, 1.0, 2.0])[:, None, None]  # xy and yx
-            edges = np.sum([term.adjoint(both) for term in self.edge_stresses], axis=0)
-            found = found + self._waves.of(edges)
-        return np.asarray(found)
+    def _curvatures_and_strains(self, waves: Spectrum, here: slice) -> Spectrum:
+        """Return waves of ∂_α ∂_β u_z by those of pressures, and of strains by moments h σ_αβ.
+
+        The strains are those by tractions ∂_α (h σ_αβ) on the plane.
+        """
+        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
+        along_x, along_y, across = directions = self._waves.directions[:, :, here]
+        number = self._waves.wave_number[:, here] / shear
+        loads, (xx, yy, xy) = waves[0], waves[1:]
+        found = np.empty((6, *loads.shape), complex)
+        found[:3] = ((1.0 - nu) * number * loads) * directions
+        both = nu * _lengthwise(waves[1:], directions)
+        crossed = across * xy
+        found[3] = along_x * (xx - both) + crossed
+        found[4] = along_y * (yy - both) + crossed
+        found[5] = across * (0.5 * (xx + yy) - both) + 0.5 * xy
+        found[3:] *= -number
+        return found
+
+    def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
+        """Return waves of displacements by those of pushes and of tensors that pull lengthwise.
+
+        The first tensor does so as it is, the second one, if there is one, by its curvature.
+        """
+        directions = self._waves.directions[:, :, here]
+        found = waves[0] + _lengthwise(waves[1:4], directions)
+        if self.order == 2:
+            stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
+            bending = 0.5 / stiffness * self._waves.wave_number[:, here]
+            found += bending * _lengthwise(waves[4:], directions)
+        return np.asarray(found[None])
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""
         nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         xx, yy, xy = stresses
         return np.stack([xx - nu * yy, yy - nu * xx, (1.0 + nu) * xy]) / modulus
-
-    def _strains_by_traction(self, moments: Spectrum) -> Spectrum:
-        """Return the waves of the strains in the plane by tractions ∂_α (h σ_αβ) on it."""
-        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
-        along_x, along_y, across = self._waves.directions
-        xx, yy, xy = moments
-        both = nu * self._lengthwise(moments)
-        strains = [
-            along_x * (xx - both) + across * xy,
-            along_y * (yy - both) + across * xy,
-            across * (0.5 * (xx + yy) - both) + 0.5 * (along_x + along_y) * xy,
-        ]
-        return np.stack(strains) * (-self._waves.wave_number / shear)
-
-    def _lengthwise(self, tensor: Spectrum) -> Spectrum:
-        """Return the component k · tensor k/k² of every wave."""
-        xx, yy, xy = self._waves.directions
-        return np.asarray(xx * tensor[0] + yy * tensor[1] + 2.0 * xy * tensor[2])
 
 
 def coarse_grid(surface: Surface) -> tuple[int, int]:
@@ -245,6 +253,12 @@ def coarse_grid(surface: Surface) -> tuple[int, int]:
 def _product(one: Array, other: Array) -> Array:
     """Return the double contraction of two symmetric tensors of components xx, yy, xy."""
     return np.asarray(one[0] * other[0] + one[1] * other[1] + 2.0 * one[2] * other[2])
+
+
+def _lengthwise(tensor: Spectrum, directions: Array) -> Spectrum:
+    """Return the component k · tensor k/k² of every wave."""
+    xx, yy, xy = directions
+    return np.asarray(xx * tensor[0] + yy * tensor[1] + 2.0 * xy * tensor[2])
 
 
 def _share(first: float, second: float) -> float:

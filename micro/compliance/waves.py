@@ -1,4 +1,4 @@
-"""Fields on the cells of a surface as waves, on a grid as coarse as products of them allow.
+"""Fields on the cells of a surface by their waves, on a grid as coarse as products of them allow.
 
 Heights times stresses make waves shorter than either. Cells hold waves of two cells and longer.
 Shorter products alias to longer waves, which makes the powers of heights in an expansion unstable.
@@ -10,12 +10,14 @@ Theory: demos/theory.md, section 7.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Callable
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from geometry.cores import blocks, in_threads
 from geometry.small_caches import cached_where_small
 
 Array = NDArray[np.float64]
@@ -24,6 +26,8 @@ Around = Literal["copies", "mirrored", "nothing"]
 
 _KEPT, _DROPPED = 0.6, 0.9
 """Of the shortest wave number of the coarse cells: kept whole below, left out above."""
+_BLOCK = 2**20
+"""Bytes of a block of rows or columns that is transformed at a time."""
 _FEW_CELLS = 2**16
 """Coarse cells up to which what belongs to their waves is cached, with 10 MB then."""
 
@@ -90,18 +94,28 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        rows = fft.dct(field, axis=1, norm="ortho")[:, : self.coarse[1]]
-        cosines = fft.dct(rows, axis=0, norm="ortho")[: self.coarse[0]] * self._filter
-        return np.asarray(fft.idctn(cosines * self._scale, norm="ortho"))
+        (cx, cy), (nx, _) = self.coarse, self.grid
+        rows = _by_lines(
+            lambda part: fft.dct(part, axis=1, norm="ortho")[:, :cy], field, (nx, cy), axis=1
+        )
+        cosines = _by_lines(
+            lambda part: fft.dct(part, axis=0, norm="ortho")[:cx], rows, (cx, cy), axis=0
+        )
+        return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
 
     def refined(self, field: Array) -> Array:
         """Return a field on the cells of the rectangle by one on the coarse cells, (cx, cy).
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
+        (_, cy), (nx, ny) = self.coarse, self.grid
         cosines = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
-        columns = fft.idct(cosines, n=self.grid[0], axis=0, norm="ortho")
-        return np.asarray(fft.idct(columns, n=self.grid[1], axis=1, norm="ortho"))
+        columns = _by_lines(
+            lambda part: fft.idct(part, n=nx, axis=0, norm="ortho"), cosines, (nx, cy), axis=0
+        )
+        return _by_lines(
+            lambda part: fft.idct(part, n=ny, axis=1, norm="ortho"), columns, (nx, ny), axis=1
+        )
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""
@@ -111,15 +125,63 @@ class Waves:
         """Return a field on the coarse cells with zeros around them, shape (sx, sy)."""
         return np.pad(field, self._beyond)
 
-    def of(self, fields: Array) -> Spectrum:
-        """Return the waves of fields, shape (..., sx, sy)."""
-        rows = fft.rfft(fields, n=self.padded[1], axis=-1)
-        return np.asarray(fft.fft(rows, n=self.padded[0], axis=-2))
+    def changed(
+        self,
+        fields: Array,
+        change: Callable[[Spectrum, slice], Spectrum],
+        count: int,
+        *,
+        inside: bool = False,
+    ) -> Array:
+        """Return fields whose waves are made of the waves of other fields.
 
-    def fields(self, waves: Spectrum) -> Array:
-        """Return fields by their waves, shape (..., sx, sy)."""
-        rows = fft.ifft(waves, axis=-2)[..., : self.shown[0], :]
-        return np.asarray(fft.irfft(rows, n=self.padded[1], axis=-1)[..., : self.shown[1]])
+        Waves are changed some columns at a time, in the cache and on all cores. The result does not
+        depend on the number of threads.
+
+        Args:
+            fields: The other fields, shape (f, sx, sy).
+            change: Returns the waves of the fields, shape (count, mx, c), by those of the others,
+                (f, mx, c), and by which columns among ``my // 2 + 1`` they are.
+            count: Number of fields that are made.
+            inside: Whether they are wanted on the coarse cells alone.
+
+        Returns:
+            Shape (count, sx, sy), or (count, cx, cy).
+        """
+        (mx, my), half = self.padded, self.padded[1] // 2 + 1
+        given, high = fields.shape[:2]
+        sx, sy = self.coarse if inside else self.shown
+        loaded = np.empty((given, high, half), complex)
+        made, found = np.empty((count, sx, half), complex), np.empty((count, sx, sy))
+
+        def along_rows(here: slice) -> None:
+            loaded[:, here] = fft.rfft(fields[:, here], n=my, axis=2)
+
+        def along_columns(here: slice) -> None:
+            waves = change(fft.fft(loaded[:, :, here], n=mx, axis=1), here)
+            made[:, :, here] = fft.ifft(waves, axis=1, overwrite_x=True)[:, :sx]
+
+        def back_along_rows(here: slice) -> None:
+            found[:, here] = fft.irfft(made[:, here], n=my, axis=2)[:, :, :sy]
+
+        in_threads(along_rows, blocks(high, _BLOCK // (8 * my * given)))
+        in_threads(along_columns, blocks(half, _BLOCK // (16 * mx * given)))
+        in_threads(back_along_rows, blocks(sx, _BLOCK // (8 * my * count)))
+        return found
+
+
+def _by_lines(
+    change: Callable[[Array], Array], field: Array, shape: tuple[int, int], *, axis: int
+) -> Array:
+    """Return a field whose lines along an axis are changed, some at a time and on all cores."""
+    found = np.empty(shape)
+
+    def change_lines(here: slice) -> None:
+        place: Any = (here, slice(None)) if axis == 1 else (slice(None), here)
+        found[place] = change(field[place])
+
+    in_threads(change_lines, blocks(shape[1 - axis], _BLOCK // (8 * field.shape[axis])))
+    return found
 
 
 surface_waves = cached_where_small(
