@@ -9,6 +9,7 @@ Theory: demos/theory.md, section 5.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, Self, TypeAlias
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.sparse import csr_array, hstack
 
+from geometry.cores import in_threads
 from micro.compliance.free_sides import FreeSides, distance_nodes, means_over
 
 Array = NDArray[np.float64]
@@ -32,6 +34,8 @@ _NEAREST_STRESS = 1.0 / 256.0
 the largest stress, with 1/16 by 8 %."""
 _FEW_ROWS = 128
 """Rows of cells up to which products with full matrices are quicker than with sparse ones."""
+_MANY_CELLS = 2**16
+"""Cells from which the sides across x and those across y gain by a thread of their own."""
 _SWAPPED = [1, 0, 2]
 """Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
 _SHEAR = np.array([-1j, 1j])
@@ -135,6 +139,16 @@ def _multiplied(kernels: Array, waves: Waves) -> Waves:
     return np.matmul(kernels, waves.view(np.float64)).view(np.complex128)
 
 
+def _of_both(
+    across_x: Callable[[], Array], across_y: Callable[[], Array], cells: int
+) -> tuple[Array, Array]:
+    """Return what the sides across x and those across y do, of many cells at the same time."""
+    if cells < _MANY_CELLS:
+        return across_x(), across_y()
+    one, other = in_threads(lambda work: work(), [across_x, across_y])
+    return one, other
+
+
 def _pairs(
     sides: FreeSides, spacing: tuple[float, float], *, stress: bool
 ) -> tuple[_SidePair, _SidePair]:
@@ -158,8 +172,12 @@ class SideCells:
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
-        found = self.across_x.displacement(pressure)
-        return np.asarray(found + self.across_y.displacement(pressure.T).T)
+        one, other = _of_both(
+            lambda: self.across_x.displacement(pressure),
+            lambda: self.across_y.displacement(pressure.T),
+            pressure.size,
+        )
+        return np.asarray(one + other.T)
 
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""
@@ -184,8 +202,12 @@ class SideStresses:
             pressure: On all cells of the grid, shape (nx, ny) [MPa].
         """
         across_x, across_y = self._pairs
-        total = across_x.stresses(pressure)
-        total += across_y.stresses(pressure.T)[_SWAPPED].transpose(0, 2, 1)
+        total, other = _of_both(
+            lambda: across_x.stresses(pressure),
+            lambda: across_y.stresses(pressure.T),
+            pressure.size,
+        )
+        total += other[_SWAPPED].transpose(0, 2, 1)
         return total
 
     def adjoint(self, fields: Array) -> Array:
@@ -199,7 +221,10 @@ class SideStresses:
         """
         across_x, across_y = self._pairs
         turned = fields[_SWAPPED].transpose(0, 2, 1)
-        return across_x.adjoint(fields) + across_y.adjoint(turned).T
+        one, other = _of_both(
+            lambda: across_x.adjoint(fields), lambda: across_y.adjoint(turned), fields[0].size
+        )
+        return one + other.T
 
 
 @lru_cache(maxsize=8)

@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cores import blas_threads, blocks, in_threads
+from geometry.cores import blocks, in_threads
 from geometry.errors import NotConverged
 from micro.compliance.half_space_grid import Cells
 from micro.contact.conjugate_gradients import ContactCells
@@ -269,13 +269,12 @@ def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> Co
         doi 10.1016/S0043-1648(99)00113-1.
     """
     used = problem.grid.products
-    with blas_threads(1):
-        search = ActiveSet(problem, start)
-        for steps in range(most_steps):
-            if search.residual <= search.enough:
-                products = problem.grid.products - used
-                return ContactPressures(search.pressure, search.motion, search.residual, products)
-            search.step(cautious=steps >= _TRUSTING_STEPS)
+    search = ActiveSet(problem, start)
+    for steps in range(most_steps):
+        if search.residual <= search.enough:
+            products = problem.grid.products - used
+            return ContactPressures(search.pressure, search.motion, search.residual, products)
+        search.step(cautious=steps >= _TRUSTING_STEPS)
     raise NotConverged(
         f"the contact pressure (residual {search.residual:.1e}, asked {problem.tolerance:.1e})",
         reason="set of cells in contact not found",

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, Partition, Surface, overlaps, patch_means
+from geometry.cores import blas_threads
 from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane, motion_units
 from micro.compliance.grid_compliance import Compliance
@@ -73,7 +74,8 @@ class PlaneContact:
             bounded = self.upper < np.inf  # then cells give way, and no approach closes all gaps
             _check_periodic(control, -np.inf if bounded else float(interference.mean()))
         problem = self._problem(interference, control.free, control.loads)
-        found = solve_contact(problem, self._start(start, near))
+        with blas_threads(1):  # all cores are taken by threads of ours
+            found = solve_contact(problem, self._start(start, near))
         motion[control.free] = found.motion * self._units[control.free]
         return HalfSpaceState(
             contact=self,
@@ -107,7 +109,8 @@ class PlaneContact:
         """
         free, modulus = np.array([False, turns, turns]), self.compliance.modulus
         problem = self._problem(self.interference(state.plane), free, np.zeros(3))
-        rate, products = approach_stiffness(problem, state.pressure / modulus)
+        with blas_threads(1):
+            rate, products = approach_stiffness(problem, state.pressure / modulus)
         return rate * modulus * float(np.prod(self.surface.spacing)), products
 
     def interface_stiffness(self, state: HalfSpaceState) -> float:
