@@ -114,6 +114,7 @@ LONG = {
     "cells for an accuracy",
     "cube, patchwise",  # as the wide block
     "concurrent, asperities",
+    "condensed, up and down",
     "concurrent, islands",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",
@@ -177,7 +178,9 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
             "patches.grid = [50, 4]: more patches than cells",
             marks=pytest.mark.long,
         ),
-        ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),
+        pytest.param(
+            "surface.spectrum.waves=[2, 200]", "the grid is too coarse", marks=pytest.mark.long
+        ),
         pytest.param(
             "block.young_modulus='-4 GPa'",
             "block.young_modulus = '-4 GPa': must be greater than 0",

@@ -63,7 +63,9 @@ def test_known_sides_leave_the_same_whole(count):
     np.testing.assert_allclose(one, one.T, atol=1e-12)
 
 
-@pytest.mark.parametrize(("height", "miss"), [(0.1, 3e-3), (1.0, 6e-4), (10.0, 8e-4)])
+@pytest.mark.parametrize(
+    ("height", "miss"), [pytest.param(0.1, 3e-3, marks=pytest.mark.long), (1.0, 6e-4), (10.0, 8e-4)]
+)
 def test_modes_of_a_shape_resolve_points(height, miss):
     """Beside the own compliance of a contact of radius 0.02 mm more modes change little."""
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1))

@@ -76,7 +76,10 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     assert not any("lock" in one for one in warnings(split))  # its elements are of high order
 
 
-@pytest.mark.parametrize("kind", BLOCKED)
+@pytest.mark.parametrize(
+    "kind",
+    [pytest.param(kind, marks=[pytest.mark.long] * (kind == "consistent")) for kind in BLOCKED],
+)
 def test_no_tolerance_knows_a_unit(kind):
     # hard: E over nine decades, lengths over six; powers of two scale without any rounding
     def measured(length, modulus):

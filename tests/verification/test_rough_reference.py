@@ -127,6 +127,7 @@ def test_finite_slopes_soften_the_rough_block_as_estimated():
     assert 0.9 * estimate == pytest.approx(measured, abs=1.5e-3)
 
 
+@pytest.mark.long
 def test_area_within_facets_is_hertz():
     """Two methods on one mesh of 4.5 elements along a contact radius, nodes off the middle."""
     x = (np.arange(129) + 0.5) / 129 - 0.5

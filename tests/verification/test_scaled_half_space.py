@@ -55,6 +55,7 @@ def test_both_options_repair_the_elliptic_model(band):
     assert np.sqrt(np.mean(area**2)) < 0.08
 
 
+@pytest.mark.long
 def test_each_option_does_its_part():
     bias = [errors("set 1", "elliptic", options).mean(axis=(1, 2)) for options in ALL]
     neither, border, curvature, both = np.array(bias)

@@ -41,7 +41,12 @@ def pressed(folder, heights, kind, model, turned=False):
     return step.force_N, step.contact_area_fraction, pressure
 
 
-LONG = [("isolated", "islands"), ("consistent", "islands"), ("consistent", "half-space")]
+LONG = [
+    ("isolated", "islands"),
+    ("consistent", "islands"),
+    ("consistent", "half-space"),
+    ("consistent", "elliptic"),
+]
 
 
 @pytest.mark.parametrize(

@@ -81,6 +81,7 @@ def test_all_contacts_are_recorded_and_none_without_asking():
     assert (bare.linear_iterations == 0).all()
 
 
+@pytest.mark.long
 def test_contact_behind_laws_is_solved_on_request_alone():
     quiet, asked = run(scene("consistent")), run(scene("consistent", contact="all"))
     assert quiet.contact is None
