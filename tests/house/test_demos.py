@@ -12,18 +12,37 @@ DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 QUICK = {"four_models", "kappa", "own_problem", "paper_figures"}
 """Demos that take seconds; the others are among the long tests."""
+SLOW = {"compare"}
+"""Demos that take minutes even in reduced size: some forty processes, each with its own imports."""
+
+
+def duration(demo):
+    """Return the marks of a demo in reduced size."""
+    if demo.stem in QUICK:
+        return []
+    return pytest.mark.slow if demo.stem in SLOW else pytest.mark.long
 
 
 @pytest.mark.parametrize(
-    "demo",
+    ("demo", "words"),
     [
-        pytest.param(demo, marks=[] if demo.stem in QUICK else pytest.mark.long, id=demo.stem)
-        for demo in DEMOS
+        *(pytest.param(demo, ["--quick"], marks=duration(demo), id=demo.stem) for demo in DEMOS),
+        *(
+            pytest.param(
+                demo,
+                ["--data", "demos/data"],
+                marks=pytest.mark.long,
+                id=f"{demo.stem}, drawn again",
+            )
+            for demo in DEMOS
+            if demo.stem in SLOW
+        ),
     ],
 )
-def test_demo_runs(demo, tmp_path):
+def test_demo_runs(demo, words, root, tmp_path):
     done = subprocess.run(
-        [sys.executable, demo, "--quick", "--out", tmp_path],
+        [sys.executable, demo, *words, "--out", tmp_path],
+        cwd=root,
         env=dict(os.environ),  # without what MPI has put into this process behind Python's back
         capture_output=True,
         text=True,
