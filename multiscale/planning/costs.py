@@ -36,7 +36,7 @@ _CHOICE, _CHOICE_HEIGHT = 0.05, 6e-6
 _IMPORT, _BODY = 0.52, 0.05
 """Times of importing dolfinx, PETSc and gmsh, and of the body correction of a cube. Thin blocks
 take several times longer."""
-_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.25, 0.28, 0.9
+_DRAWING, _FIGURE, _BLOCK_FIGURE = 0.25, 0.36, 0.9
 """Times of importing matplotlib, of a figure, and of that in three dimensions."""
 _WRITING, _WRITTEN_HEIGHT = 0.04, 0.1e-6
 """Time of writing tables and report, and per height of a map of the contact."""
