@@ -217,9 +217,9 @@ class FiniteSlopes:
         return found
 
     def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
-        """Return waves of displacements by those of pushes and of tensors that pull lengthwise.
+        """Return the waves of the displacement in one of a scalar and those of one or two tensors.
 
-        The first tensor does so as it is, the second one, if there is one, by its curvature.
+        Each tensor t contributes k · t k/k², the second one times (1 − ν) |k|/(2 G).
         """
         directions = self._waves.directions[:, :, here]
         found = waves[0] + _lengthwise(waves[1:4], directions)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from geometry.cores import blocks, in_threads
+from geometry.cores import BLOCK, blocks, in_threads
 from geometry.small_caches import cached_where_small
 
 Array = NDArray[np.float64]
@@ -26,8 +26,6 @@ Around = Literal["copies", "mirrored", "nothing"]
 
 _KEPT, _DROPPED = 0.6, 0.9
 """Of the shortest wave number of the coarse cells: kept whole below, left out above."""
-_BLOCK = 2**20
-"""Bytes of a block of rows or columns that is transformed at a time."""
 _FEW_CELLS = 2**16
 """Coarse cells up to which what belongs to their waves is cached, with 10 MB then."""
 
@@ -164,9 +162,9 @@ class Waves:
         def back_along_rows(here: slice) -> None:
             found[:, here] = fft.irfft(made[:, here], n=my, axis=2)[:, :, :sy]
 
-        in_threads(along_rows, blocks(high, _BLOCK // (8 * my * given)))
-        in_threads(along_columns, blocks(half, _BLOCK // (16 * mx * given)))
-        in_threads(back_along_rows, blocks(sx, _BLOCK // (8 * my * count)))
+        in_threads(along_rows, blocks(high, BLOCK // (8 * my * given)))
+        in_threads(along_columns, blocks(half, BLOCK // (16 * mx * given)))
+        in_threads(back_along_rows, blocks(sx, BLOCK // (8 * my * count)))
         return found
 
 
@@ -180,7 +178,7 @@ def _by_lines(
         place: Any = (here, slice(None)) if axis == 1 else (slice(None), here)
         found[place] = change(field[place])
 
-    in_threads(change_lines, blocks(shape[1 - axis], _BLOCK // (8 * field.shape[axis])))
+    in_threads(change_lines, blocks(shape[1 - axis], BLOCK // (8 * field.shape[axis])))
     return found
 
 

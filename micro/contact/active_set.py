@@ -2,8 +2,8 @@
 
 A step takes the cells with a pressure or a negative gap as the contact, solves its linear system
 roughly by conjugate gradients and drops tensile pressures (primal-dual active set). Dropping them
-changes all gaps, so that cells elsewhere overlap which would only be dropped again. New cells
-therefore enter when the gaps of those that carry are closed more than they overlap.
+changes all gaps, and cells elsewhere overlap for a moment that would only be dropped again. Cells
+therefore enter only when the largest gap left in the contact is less than half of their overlap.
 
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
@@ -100,9 +100,10 @@ class ActiveSet:
             return elastic - 2.0 * float(np.vdot(pressure[rows], interference[rows]))
 
         def extremes(rows: slice) -> tuple[float, float, float, float]:
-            """Let free motions act; return the largest interference and size of it, and violations.
+            """Let free motions act; return four extremes.
 
-            These are the largest gap or overlap of cells that carry, and overlap of all others.
+            They are the largest interference, its largest absolute value, the largest gap or
+            overlap of cells that carry, and the largest overlap of all others.
             """
             nearer, here, p = motions.displacement(self.motion, rows), gap[rows], pressure[rows]
             here -= nearer

@@ -128,7 +128,7 @@ def test_threads_do_not_change_a_bit(monkeypatch, periodic):
     cells = cells_where(pressure > 0.9)
     for threads in ("1", "3"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
-        monkeypatch.setattr("micro.compliance.half_space_grid._BLOCK", 4000)
+        monkeypatch.setattr("micro.compliance.half_space_grid.BLOCK", 4000)
         elastic = half_space(grid, SPACING, periodic=periodic)
         some = elastic.apply_compliance(cells, pressure.ravel()[cells.flat])
         results.append((elastic.displacement(pressure).tobytes(), some.tobytes()))
