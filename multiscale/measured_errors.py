@@ -30,7 +30,7 @@ from geometry.collective import on_root_alone
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, percent, quantity
+from multiscale.readable import percent, quantity
 from multiscale.setup.problem import ProblemSetup
 
 _FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
@@ -246,12 +246,27 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
     )
 
 
-def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
-    """Yield the errors of the last load step that was measured, and whether they are too large.
+def unmeasured(setup: ProblemSetup) -> str:
+    """Return why a run does not measure the errors of its load steps; empty where it does.
+
+    Args:
+        setup: The problem.
+    """
+    if setup.samples:
+        return "laws of samples have no measure of it, but for errors between rows and scatter"
+    if setup.meshes is not None:
+        several = len(setup.meshes.shapes) > 1
+        return "" if several else "one mesh has no error bar (reference.meshes = 2)"
+    if not isinstance(setup.micro, HalfSpaceModel):
+        return f"{setup.model.name} contacts have no measure of it, half-space has"
+    return "output.check = 'none'" if setup.scene.output.check == "none" else ""
+
+
+def error_notes(steps: list[LoadStep]) -> Iterator[str]:
+    """Yield the errors of the last load step that was measured.
 
     Args:
         steps: The load steps.
-        accuracy: Relative error of the force that was requested; None when it was not.
     """
     measured = [step for step in steps if step.errors]
     if not measured:
@@ -267,9 +282,3 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
             f", and under its force the approach within {quantity(step.approach_error_mm, 'mm', 2)}"
         )
     yield f"{text}{share}: {causes}"
-    if accuracy is not None and whole > accuracy * step.force_N:
-        largest = max(step.errors, key=lambda each: each[1])[0]
-        yield Caution(
-            f"an accuracy of {percent(accuracy, 3)} was asked for, and the last load step keeps "
-            f"{percent(whole / step.force_N)}, most of it by {largest}"
-        )

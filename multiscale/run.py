@@ -23,10 +23,11 @@ from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
 from multiscale.machine import cluster_nodes
-from multiscale.measured_errors import checked, error_notes
+from multiscale.measured_errors import checked, error_notes, unmeasured
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.set_up import set_up
 from multiscale.readable import Observer
+from multiscale.results.accuracy_verdict import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.yielding_notes import energy_notes, yielding_notes
@@ -275,11 +276,15 @@ class Run:
             from multiscale.conductances import conductance_notes  # other scenes do without
 
             notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
+        by_force = self.scene.loading.load_history.quantity == "force"
+        accuracy = verdict(steps, self.given.accuracy, unmeasured(self.setup), by_force=by_force)
+        kept = [] if accuracy is None else [accuracy.sentence]
         return History(
             steps=steps,
             patches=self.setup.regions or self.setup.patches,
             seconds=self.times,
-            notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
+            notes=(*kept, *notes, *error_notes(self.steps), *mesh_notes),
+            accuracy=accuracy,
             reference=record,
             contact_records=self.contacts,
         )

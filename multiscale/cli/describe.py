@@ -23,9 +23,9 @@ from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
-from multiscale.planning.costs import predicted_cost
 from multiscale.planning.memory_costs import Launch
 from multiscale.planning.set_up import set_up
+from multiscale.planning.work import work_of
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.keys import Key, scene_keys
@@ -35,7 +35,7 @@ from multiscale.storage import write_text, write_whole
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Say what a run would do, and why; run nothing expensive.
+    """Say what a run would do, and why, and count its work; run nothing expensive.
 
     Args:
         choice: Parsed words of the command line.
@@ -48,9 +48,9 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     setup = _setup(scene, comm)
     known = setup.bodies.first is None or bool(setup.samples) or scene_body(setup).is_cached()
     launch = Launch.anew(memory, ranks, solves_face=not known)
-    cost = on_root_alone(comm, lambda: predicted_cost(setup, launch=launch))
+    work = on_root_alone(comm, lambda: work_of(setup, launch))
     shortages = list(memory_warnings(setup, cluster_nodes(comm)))
-    terminal.show_plan(comm, setup, cost, shortages)
+    terminal.show_plan(comm, setup, work, shortages)
 
 
 def _setup(scene: Scene, comm: Any) -> ProblemSetup:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import itertools
+import math
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,16 +17,9 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
-from multiscale.planning.auto_keys import auto_keys
-from multiscale.planning.costs import predicted_cost
-from multiscale.planning.memory_costs import step_count
-from multiscale.planning.problem_setup import make_setup
-from multiscale.readable import duration
 from multiscale.restart.results_folder import locked
-from multiscale.scene.scene import Scene
 from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
-from multiscale.sweeps.forecast import SweepForecast
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, sweep
 from multiscale.sweeps.sweep_results import SweepResults
@@ -50,11 +45,16 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
-        terminal.say(comm, on_root(comm, lambda: _forecast(scene, vary, comm, parts)))
+        cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
+        ranks = parts * (1 if comm is None else comm.size)
+        terminal.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
+        pace, last = terminal.Pace(math.ceil(cases / ranks)), time.monotonic()
         with terminal.following(comm) as (begun, ended):
 
             def observe(case: Case, result: CaseResult) -> None:
-                begun(f"case {case.number} is done")
+                nonlocal last
+                spent, last = time.monotonic() - last, time.monotonic()
+                begun(f"case {case.number} is done{pace.left(spent)}")
                 if result.failure:
                     ended(f"case {case.number}: {result.failure}")
 
@@ -83,29 +83,6 @@ def slurm_part() -> tuple[int, int]:
     task, first, count = (int(os.environ[name]) for name in names)
     step = int(os.environ.get("SLURM_ARRAY_TASK_STEP", 1))
     return (task - first) // step + 1, count
-
-
-def _forecast(scene: Scene, vary: dict[str, list[Any]], comm: Any, parts: int) -> str:
-    """Say what the sweep is predicted to take, from the plan of its first case."""
-    cases, ranks = sweep_cases(scene, vary), parts * (1 if comm is None else comm.size)
-    start = f"{len(cases)} cases on {ranks} rank{'s' * (ranks > 1)}"
-    first = cases[0].scene
-    if auto_keys(first) or first.body is not None:  # whose problems are not set up in an instant
-        return start
-    setup = make_setup(first.with_({"output.figures": False, "output.report": False}))
-    cost = predicted_cost(setup)
-    # a decomposed body and the libraries are there for the next case
-    once = cost.seconds.get("block", 0.0) if first.decomposed else 0.0
-    forecast = SweepForecast(
-        cases=len(cases),
-        ranks=ranks,
-        steps=step_count(first.loading.load_history),
-        case_seconds=cost.total - once,
-        set_up_seconds=once,
-        run_bytes=cost.memory,
-    )
-    time, memory = duration(forecast.seconds), f"{forecast.rank_bytes / 1e6:.0f} MB"
-    return f"{start}: about {time}, and {memory} on each"
 
 
 def _remove_results(folder: Path) -> None:

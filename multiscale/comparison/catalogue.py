@@ -30,9 +30,10 @@ from multiscale.comparison.scene_content import (
     pressure_grid,
     scaled,
 )
-from multiscale.planning.costs import predicted_cost
 from multiscale.planning.problem_setup import make_setup
+from multiscale.planning.work import work_of
 from multiscale.scene.scene import Scene
+from multiscale.setup.memory import MemoryLacking
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import (
     LAW_BLOCK_CELLS,
@@ -57,7 +58,7 @@ _HALF_SPACE: Content = {"model": "half-space"}
 
 
 def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
-    """Return the configurations of a scene, those of the least predicted cost first.
+    """Return the configurations of a scene, those of the least work first.
 
     Args:
         scene: The scene; only its key ``micro.model`` may be ``auto``.
@@ -89,10 +90,10 @@ def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Config
     cost, refusal, surface = float("inf"), "", json.dumps(proposal.content["surface"])
     try:
         setup = make_setup(proposal.scene, like=setups.get(surface))
-        cost = predicted_cost(setup).total
+        cost = work_of(setup).seconds
         setups.setdefault(surface, setup)
     except (InputError, NotConverged) as error:
-        if proposal.kind != "reference" or "GB of memory" not in str(error):
+        if proposal.kind != "reference" or not isinstance(error, MemoryLacking):
             return None
         refusal = str(error)
     return replace(proposal, content=content_of(proposal.scene), cost=cost, refusal=refusal)

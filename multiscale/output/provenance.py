@@ -62,7 +62,9 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
-        "decision": setup.decision and {**asdict(setup.decision), "kept": setup.decision.kept},
+        "decision": setup.decision and asdict(setup.decision),
+        "accuracy": history.accuracy
+        and {**asdict(history.accuracy), "kept": history.accuracy.kept},
         "steps": len(history),
         "finished": run.finished,
         "contacts": [{"step": record.step, "spots": len(record.spots)} for record in run.contacts],

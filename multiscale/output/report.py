@@ -83,6 +83,9 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
     face = setup.patches.area * setup.patches.count
     if not isinstance(run.history().patches, PatchGrid) and setup.face is not None:
         face = setup.face.area
+    if verdict := run.history().accuracy:
+        kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
+        yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
     share = last.contact_area_fraction
     yield "real contact area", percent(share, 3), f"{quantity(share * face, 'mm²', 3)} of the face"
     if last.peak_pressure_MPa:

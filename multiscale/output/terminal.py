@@ -17,8 +17,8 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import cores_statement, peak_memory
 from multiscale.planning import plan
-from multiscale.planning.costs import Cost
-from multiscale.readable import Observer, duration, quantity
+from multiscale.planning.work import Work
+from multiscale.readable import Caution, Observer, duration, quantity
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
 
@@ -96,14 +96,14 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 
 
 def show_plan(
-    comm: Any, setup: ProblemSetup, cost: Cost | None = None, shortages: Sequence[str] = ()
+    comm: Any, setup: ProblemSetup, work: Work | None = None, shortages: Sequence[str] = ()
 ) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
         setup: The problem, set up from the scene.
-        cost: Predicted time and memory; None leaves them out.
+        work: What the run computes, counted; None leaves it out.
         shortages: Sentences on the memory that these nodes lack.
 
     Note:
@@ -112,7 +112,7 @@ def show_plan(
     cores = cores_statement(comm)
     if speaks(comm):
         warnings = [*plan.warnings(setup), *shortages]
-        show_pairs(comm, [*plan.statements(setup, cost), ("cores", cores)], warnings)
+        show_pairs(comm, [*plan.statements(setup, work), ("cores", cores)], warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
@@ -166,10 +166,15 @@ def progress(
     """
     # Halved load steps make the total unknown.
     steps = None if load_history.force_change else load_history.count
+    pace = Pace(0 if steps is None else steps - done)
+
+    def described(step: LoadStep) -> str:
+        return _summary(step) + pace.left(step.wall_s)
+
     if comm is not None:
         total = "" if steps is None else f"/{steps}"
         yield (
-            lambda step: say(comm, f"load step {step.step}{total}: {_summary(step)}"),
+            lambda step: say(comm, f"load step {step.step}{total}: {described(step)}"),
             _tenths(comm),
         )
         return
@@ -177,9 +182,30 @@ def progress(
     with Progress(*columns, "{task.description}") as bar:
         task = bar.add_task("", total=steps, completed=done)
         yield (
-            lambda step: bar.update(task, advance=1, description=_summary(step)),
+            lambda step: bar.update(task, advance=1, description=described(step)),
             counting(lambda text: bar.update(task, description=text)),
         )
+
+
+class Pace:
+    """The pace of a task, which tells how long the rest of it will take.
+
+    Args:
+        parts: Its parts, such as load steps; 0 where their number is not known.
+    """
+
+    def __init__(self, parts: int) -> None:
+        self._parts, self._done, self._spent = parts, 0, 0.0
+
+    def left(self, spent: float) -> str:
+        """Count a part that is done, and say how long the rest will take, where that is known.
+
+        Args:
+            spent: Time that the part took [s].
+        """
+        self._done, self._spent = self._done + 1, self._spent + spent
+        rest = self._parts - self._done
+        return f"; about {duration(rest * self._spent / self._done)} left" if rest > 0 else ""
 
 
 def _summary(step: LoadStep) -> str:
@@ -226,7 +252,8 @@ def show_history(comm: Any, history: History) -> None:
     console = _console(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
     console.print(table)
     for note in history.notes:
-        console.print(f"note: {escape(note)}")
+        label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
+        console.print(f"{label} {escape(note)}")
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:

@@ -1,16 +1,16 @@
-"""Resolves auto values by errors that are measured at the largest load.
+"""Resolves auto values by a rule from errors that are measured at the largest load.
 
-The contact problem on the scene's body is solved on coarse cells, its errors are measured
-(`multiscale.measured_errors`), and the cells are refined until the sum of the errors keeps the
-accuracy. Where causes other than the cells exceed it, or where meshing the roughness is predicted
-to take less time, the meshes of a reference are refined in the same way.
+What the scene states is kept. The contact problem on the scene's body is solved on coarse cells,
+its errors are measured (`multiscale.measured_errors`), and the cells are refined until the sum of
+the errors keeps the accuracy. Where causes other than the cells exceed it, and the scene leaves the
+coupling open, the roughness is meshed, and the meshes of this reference are refined in the same
+way. Neither clocks nor the machine take part: the same scene gets the same values everywhere, or
+is refused where their memory is missing. The rule in words: docs/choosing.md.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import replace
 
 from geometry.errors import InputError, NotConverged
@@ -20,15 +20,15 @@ from multiscale.measured_errors import error_probe
 from multiscale.planning.auto_keys import (
     MOST_HEIGHTS,
     auto_keys,
-    couplings,
+    chosen_coupling,
     map_grid,
     on_waves,
     with_value,
 )
-from multiscale.planning.costs import predicted_cost
 from multiscale.planning.mesh_accuracy import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import Alternative, Decision, ProblemSetup
+from multiscale.setup.memory import MemoryLacking
+from multiscale.setup.problem import Decision, ProblemSetup
 from multiscale.setup.surface_and_block import make_surface
 
 _TRIALS = 6
@@ -44,10 +44,8 @@ _FIRST_CELLS = 4
 """Coarsening of a given grid for the first trial, along a side."""
 _LEAST_CELLS = 48
 """Cells along a side at least."""
-_CHEAPER = 0.7
-"""Time of a reference, relative to that of another coupling, below which it is taken."""
-_NOTHING_TO_SAVE = 4.0
-"""Time of a run below which no reference is tried to save time [s]."""
+_LAWS = 0.1
+"""Interpolation error of laws over the accuracy."""
 
 
 def setup_by_accuracy(
@@ -62,20 +60,22 @@ def setup_by_accuracy(
         mesh_error: Measures the relative error of the meshes of a reference.
 
     Raises:
-        InputError: When nothing that the scene allows can be made.
+        InputError: When nothing that the scene allows can be made, or the memory is missing.
         NotConverged: When a contact problem cannot be solved.
     """
     search, auto = _Search(given, build, mesh_error), auto_keys(given)
     if "surface.grid" in auto:
         on_cells = start.micro.model == "half-space" and start.coupling.kind != "reference"
         start = on_waves(start, _COARSE if on_cells else _FINE)
+    if start.coupling.kind == "consistent" and start.coupling.table_tolerance is None:
+        start = with_value(start, "coupling.table_tolerance", _LAWS * search.accuracy)
     setup = build(start)
     if "patches.grid" in auto:
         setup = build(with_value(start, "patches.grid", map_grid(setup.surface)))
     if setup.meshes is not None:
         return search.decided(*search.with_refined_meshes(setup))
     if isinstance(setup.micro, HalfSpaceModel):
-        return search.cheapest(*search.refined_cells(setup, setup.micro))
+        return search.kept_or_meshed(*search.refined_cells(setup, setup.micro))
     return search.decided(setup, {})
 
 
@@ -124,36 +124,31 @@ class _Search(MeshSearch):
             worst = max(worst, errors, key=lambda each: sum(each.values()))
         return worst
 
-    def cheapest(self, setup: ProblemSetup, errors: Errors) -> ProblemSetup:
-        """Choose the coupling that is predicted to take the least time, or a reference.
+    def kept_or_meshed(self, setup: ProblemSetup, errors: Errors) -> ProblemSetup:
+        """Return the problem, or that of a reference where the errors exceed the accuracy.
 
-        A reference is tried where the errors exceed the accuracy, or to save time.
+        The reference is taken where its own error is smaller. None is tried where the scene states
+        its coupling or micro model, or needs more unknowns than are chosen.
+
+        Raises:
+            MemoryLacking: When the meshes that would be tried do not fit into the memory.
         """
-        by_cost = sorted(self._coupled(setup), key=_seconds)
-        taken, others, missed = by_cost[0], by_cost[1:], None
-        keeps = sum(errors.values()) <= self.accuracy
-        if not self._may_be_meshed or (keeps and _seconds(taken) < _NOTHING_TO_SAVE):
-            return self.decided(taken, errors, others)
-        with suppress(InputError, NotConverged):  # the block or the memory may not allow meshes
-            reference = type(taken.scene.coupling)(kind="reference")
-            scene = taken.scene.model_copy(update={"coupling": reference})
+        if sum(errors.values()) <= self.accuracy or not self._may_be_meshed:
+            return self.decided(setup, errors)
+        reference = type(setup.scene.coupling)(kind="reference")
+        scene = setup.scene.model_copy(update={"coupling": reference})
+        try:
             meshed = self.with_first_meshes(self.build(scene))
-            if keeps and _seconds(meshed) > _CHEAPER * _seconds(taken):
-                return self.decided(taken, errors, [*others, meshed])
+            if not self.is_small(meshed):
+                return self.decided(setup, errors)
             meshed, mesh_errors = self.with_refined_meshes(meshed)
-            if keeps or sum(mesh_errors.values()) <= sum(errors.values()):
-                missed = None if keeps else errors
-                taken, others, errors = meshed, by_cost, mesh_errors
-        return self.decided(taken, errors, others, missed)
-
-    def _coupled(self, setup: ProblemSetup) -> Iterator[ProblemSetup]:
-        """Yield the problem with every coupling that may be chosen."""
-        chosen = "coupling.kind" in auto_keys(self.given)
-        tolerance = {"table_tolerance": 0.1 * self.accuracy}
-        for section in couplings(self.given) if chosen else iter([setup.scene.coupling]):
-            if section.kind == "consistent" and section.table_tolerance is None:
-                section = section.model_copy(update=tolerance)
-            yield replace(setup, scene=setup.scene.model_copy(update={"coupling": section}))
+        except MemoryLacking:  # another machine would take the reference
+            raise
+        except (InputError, NotConverged):  # the block has no such meshes
+            return self.decided(setup, errors)
+        if sum(mesh_errors.values()) > sum(errors.values()):
+            return self.decided(setup, errors)
+        return self.decided(meshed, mesh_errors, missed=errors)
 
     @property
     def _may_be_meshed(self) -> bool:
@@ -164,18 +159,17 @@ class _Search(MeshSearch):
         return {"coupling.kind", "micro.model"} <= auto_keys(self.given) and not stated
 
     def decided(
-        self,
-        setup: ProblemSetup,
-        errors: Errors,
-        others: Sequence[ProblemSetup] = (),
-        missed: Errors | None = None,
+        self, setup: ProblemSetup, errors: Errors, missed: Errors | None = None
     ) -> ProblemSetup:
         """Return the problem with what was decided for it."""
+        why = ""
+        if "coupling.kind" in auto_keys(self.given) and setup.meshes is None:
+            why = chosen_coupling(self.given)[1]
         decision = Decision(
             accuracy=self.accuracy,
-            taken=_alternative(setup),
+            taken=_label(setup),
+            why=why,
             errors=errors,
-            others=tuple(map(_alternative, others)),
             missed=missed or {},
         )
         return replace(setup, decision=decision)
@@ -190,19 +184,13 @@ def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
     return x, y
 
 
-def _seconds(setup: ProblemSetup) -> float:
-    return predicted_cost(setup).total
-
-
-def _alternative(setup: ProblemSetup) -> Alternative:
-    """Return a problem as one of the ways to compute its scene."""
+def _label(setup: ProblemSetup) -> str:
+    """Return the coupling of a problem, with the cells, meshes or micro model it works on."""
     kind = setup.scene.kind
     if setup.meshes is not None:
         size = 1e3 * float(setup.meshes.sizes[-1])
-        label = f"reference, meshed with edges of {size:.3g} µm"
-    elif isinstance(setup.micro, HalfSpaceModel):
+        return f"reference, meshed with edges of {size:.3g} µm"
+    if isinstance(setup.micro, HalfSpaceModel):
         x, y = setup.micro.surface.grid
-        label = f"{kind} on {x} × {y} cells"
-    else:
-        label = f"{kind}, {setup.model.name}"
-    return Alternative(label=label, seconds=_seconds(setup))
+        return f"{kind} on {x} × {y} cells"
+    return f"{kind}, {setup.model.name}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
-from pydantic import ValidationError
-
+from geometry.errors import InputError
 from geometry.surface import Surface
 from micro import HalfSpaceModel
+from multiscale.planning.memory_costs import step_count
 from multiscale.scene.coupling_sections import CouplingSection
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SpectrumSection
@@ -20,6 +21,9 @@ DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""
 PATCHES_ACROSS = 8
 """Patches along the shorter side, enough for a map."""
+SOLUTIONS_OF_LAWS = 84
+"""Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
+45 to 65 rows, models of summits 60 to 150."""
 LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
 """Heights along a side of grids that are chosen."""
 
@@ -29,7 +33,8 @@ _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.
 def auto_keys(scene: Scene) -> frozenset[str]:
     """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
 
-    The block's cells are one of them only under laws on its mesh.
+    The block's cells are one of them only under laws on its mesh, the grid of the surface only
+    where it is a spectrum's.
 
     Args:
         scene: The scene as it was given.
@@ -43,7 +48,9 @@ def auto_keys(scene: Scene) -> frozenset[str]:
         unstated = scene.accuracy is not None and field not in section.model_fields_set
         if name == "micro":  # its other keys belong to a model that is stated
             unstated = unstated and not section.model_fields_set
-        if getattr(section, field) == "auto" or (unstated and name != "surface"):
+        if name == "surface":
+            unstated = scene.accuracy is not None and scene.surface.lacks_grid
+        if getattr(section, field) == "auto" or unstated:
             found.add(key)
     return frozenset(found if scene.on_mesh else found - {"block.cells"})
 
@@ -60,8 +67,9 @@ def accuracy_of(scene: Scene) -> float:
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
-    Without an accuracy, a micro model that is the only auto value besides patches and cells is
-    chosen by its own error, see `micro.choose`.
+    With an accuracy they are wherever a key is open that errors depend on, the edges of a
+    reference's meshes among them. Without an accuracy, a micro model that is the only auto value
+    besides patches and cells is chosen by its own error, see `micro.choose`.
 
     Args:
         scene: The scene as it was given.
@@ -69,9 +77,8 @@ def is_measured(scene: Scene) -> bool:
     auto = auto_keys(scene)
     if scene.accuracy is None:
         return not auto <= {"micro.model", "patches.grid", "block.cells"}
-    return bool(auto & {"surface.grid", "micro.model", "coupling.kind"}) or (
-        scene.kind == "reference"
-    )
+    meshed = scene.kind == "reference" and scene.reference.sizes_are_open
+    return meshed or bool(auto & {"surface.grid", "micro.model", "coupling.kind"})
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
@@ -89,7 +96,7 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
     }
     changed = scene
     if "coupling.kind" in auto:
-        changed = scene.model_copy(update={"coupling": next(couplings(scene))})
+        changed = scene.model_copy(update={"coupling": chosen_coupling(scene)[0]})
     for key in auto & set(start):
         changed = with_value(changed, key, start[key])
     return changed
@@ -111,7 +118,7 @@ def with_value(scene: Scene, key: str, value: Any) -> Scene:
 def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     """Return what the auto values of a scene became, so that a run goes on as it began.
 
-    The speed of the machine decides near ties, and another session may run on another machine.
+    It need not measure errors again.
 
     Args:
         setup: The problem.
@@ -153,20 +160,28 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
     return scene.model_copy(update=changed)
 
 
-def couplings(scene: Scene) -> Iterator[CouplingSection]:
-    """Yield the couplings that may be chosen beside what a scene states of its coupling.
+def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
+    """Return the coupling that is chosen beside what a scene states, and why.
 
-    They are concurrent and consistent; neither isolated laws nor meshed roughness are among them.
+    It is concurrent, which has neither laws nor their error, unless the scene has more load steps
+    than consistent laws take solutions, or states what belongs to laws.
 
     Args:
-        scene: The scene as it was given.
+        scene: The scene as it was given, whose coupling is open.
     """
-    stated = scene.coupling.model_dump(exclude_unset=True)
+    fitting = {}
     for kind in ("concurrent", "consistent"):
-        try:
-            yield CouplingSection.model_validate(stated | {"kind": kind})
-        except ValidationError:  # another key does not go with it
-            continue
+        with suppress(InputError):  # another key does not go with it
+            fitting[kind] = scene.with_({"coupling.kind": kind}).coupling
+    steps = step_count(scene.loading.load_history)
+    if len(fitting) < 2:
+        kind = next(iter(fitting), "consistent")
+        return fitting.get(kind, scene.coupling), "what the scene states goes with no other"
+    if steps > SOLUTIONS_OF_LAWS:
+        why = f"laws take about {SOLUTIONS_OF_LAWS} contact problems, fewer than {steps} load steps"
+        return fitting["consistent"], why
+    why = f"no laws, which take about {SOLUTIONS_OF_LAWS} contact problems for {steps} load steps"
+    return fitting["concurrent"], why
 
 
 def map_grid(surface: Surface) -> tuple[int, int]:

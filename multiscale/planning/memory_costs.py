@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from micro import HalfSpaceModel
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
-from multiscale.planning.mesh_costs import face_work
-from multiscale.planning.solved_boxes import checks_finer, solved_boxes
+from multiscale.measured_errors import MOST_CHECKED_CELLS
 from multiscale.scene.body_sections import CounterBodySection
 from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
@@ -21,12 +20,14 @@ _LIBRARIES = {"dolfinx": 70e6, "matplotlib": 70e6}
 """Memory of libraries that runs import when they need them [B]."""
 _SURFACE, _SUMMITS = 37.0, 100.0
 """Memory per height of the surface with its spline, and of finding its summits [B]."""
-_SOLVED, _ON_BOX, _BODY, _MAPS, _SLOPES = 55.0, 35.0, 40.0, 35.0, 40.0
-"""Memory per cell of a contact problem with its kernel and work array, of it per cell of the box
-that is solved, of free sides and body, of the maps of a load step, and of finite slopes [B]. In
-sum 95 were measured where the box was small, 101 where it was 9/16 of 512² and of 1024² cells."""
-_FACE = 1.25e9
-"""Memory of the compliance of a meshed body's face for `face_work` 1 [B]."""
+_SOLVED, _BODY, _MAPS, _SLOPES = 90.0, 40.0, 35.0, 40.0
+"""Memory per cell of a contact problem with its kernel, work array and arrays of the cells that can
+touch, of free sides and body, of the maps of a load step, and of finite slopes [B]. With maps 95
+were measured where few cells could touch, 101 where 9/16 of 512² and of 1024² cells could."""
+_FACE, _CUBE, _FACTORISATION = 1.25e9, 11_271, 1.2
+"""Memory of the compliance of the face of a cube in 64 modes [B], the unknowns of its 16 × 16 × 12
+trilinear hexahedra, which are raised to quadratic ones and whose stiffness is factorised, and the
+power of them that the memory grows with."""
 _KEPT = 60.0
 """Memory per cell that the run keeps while an error check solves a finer grid [B]."""
 _FIGURES = 25.0
@@ -118,10 +119,28 @@ def memory_parts(setup: ProblemSetup, launch: Launch) -> dict[str, float]:
         "program": program,
         "surface": (_SURFACE + summits) * heights,
         "meshes and laws": asked,
-        "body term": face_work(setup) * _FACE if launch.solves_face else 0.0,
+        "body term": _face_bytes(setup) if launch.solves_face else 0.0,
         **_contact_or_figures(setup, figures),
     }
     return {part: size for part, size in parts.items() if size}
+
+
+def checks_finer(setup: ProblemSetup, cells: int) -> bool:
+    """Tell whether an error check is expected to solve a grid twice as fine.
+
+    Where finite slopes are left out their error outweighs that of the grid.
+
+    Args:
+        setup: The problem.
+        cells: Cells of the half-space.
+    """
+    return setup.finite_slopes and 4 * cells <= MOST_CHECKED_CELLS
+
+
+def _face_bytes(setup: ProblemSetup) -> float:
+    """Return the memory of the compliance of the meshed bodies' faces [B]."""
+    faces = [face for face in (setup.face, setup.counter_face) if face is not None and face.digest]
+    return _FACE * sum((face.unknowns / _CUBE) ** _FACTORISATION for face in faces)
 
 
 def _contact_or_figures(setup: ProblemSetup, figures: float) -> dict[str, float]:
@@ -129,7 +148,7 @@ def _contact_or_figures(setup: ProblemSetup, figures: float) -> dict[str, float]
     if not isinstance(setup.micro, HalfSpaceModel):
         return {"figures": figures}
     cells = setup.micro.surface.heights.size
-    solved = _SOLVED + _ON_BOX * solved_boxes(setup)[-1].part
+    solved = _SOLVED
     if setup.scene.kind == "isolated":
         return {"contact problem": solved * cells / setup.patches.count, "figures": figures}
     solved += _BODY * (setup.has_block and not setup.samples)

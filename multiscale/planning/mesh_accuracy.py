@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from geometry.errors import InputError
 from multiscale.couplings.reference import make_reference
 from multiscale.planning.auto_keys import accuracy_of, with_value
+from multiscale.results.accuracy_verdict import relative_error
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 
@@ -19,6 +19,8 @@ _TRIALS = 6
 """Most trials of the size of meshes."""
 _LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
 """Limits of the refinement from one trial to the next."""
+_MOST_UNKNOWNS = 1_000_000
+"""Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
 _DEFAULT_MESHES = 0.005
 """Error, roughly, of the meshes that a reference has by default."""
 _COARSEST_MESH = 1.8
@@ -49,11 +51,8 @@ def measured_mesh_error(setup: ProblemSetup) -> float:
     (found,) = coupling.record([step]).with_errors([step])
     if not step.force_N > 0.0:
         return 0.0
-    if found.force_error_N is None or found.approach_error_mm is None:
-        return 1.0
-    if load_history.quantity == "force":
-        return 1.5 * found.approach_error_mm / abs(found.approach_mm)  # F grows as δ^1.5
-    return found.force_error_N / found.force_N
+    error = relative_error(found, by_force=load_history.quantity == "force")
+    return 1.0 if error is None else error
 
 
 @dataclass(frozen=True)
@@ -86,11 +85,16 @@ class MeshSearch:
             if error <= self.accuracy or not self._may_refine(setup) or fine is None:
                 break
             finer = refinement(error / self.accuracy, setup.meshes.force_order)
-            try:
-                setup = self.build(with_value(setup.scene, "reference.fine", fine / finer))
-            except InputError:  # more memory than there is
+            refined = self.build(with_value(setup.scene, "reference.fine", fine / finer))
+            if not self.is_small(refined):
                 break
+            setup = refined
         return setup, {"mesh": error}
+
+    def is_small(self, setup: ProblemSetup) -> bool:
+        """Tell whether the meshes of a reference have no more unknowns than are chosen."""
+        assert setup.meshes is not None
+        return sum(setup.meshes.unknowns) <= _MOST_UNKNOWNS
 
     def _may_refine(self, setup: ProblemSetup) -> bool:
         """Tell whether the scene leaves the size of tetrahedra open."""

@@ -8,23 +8,24 @@ from geometry.materials import Material
 from geometry.statistics import roughness
 from micro import MODELS, AsperityModel, HalfSpaceModel
 from multiscale.couplings.assembly import newton_choice
+from multiscale.measured_errors import unmeasured
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
 from multiscale.planning.body_plan import body_term_statement, sample_statement
-from multiscale.planning.costs import Cost
-from multiscale.readable import duration, number, quantity
+from multiscale.planning.work import Work
+from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.setup.problem import ProblemSetup
 
 _INTERACTING = ("elliptic", "circular")
 
 
-def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[str, str]]:
+def statements(setup: ProblemSetup, work: Work | None = None) -> Iterator[tuple[str, str]]:
     """Yield pairs of topic and sentence that say what will be done and why.
 
     Args:
         setup: The problem.
-        cost: What the run is predicted to take; None leaves it out.
+        work: What the run computes, counted; None leaves it out.
     """
     yield "inputs", inputs_statement(setup)
     yield "surface", surface_statement(setup)
@@ -44,29 +45,9 @@ def statements(setup: ProblemSetup, cost: Cost | None = None) -> Iterator[tuple[
     yield "load", _load(setup)
     if setup.decision is not None:
         yield "choice", setup.decision.sentence
-    if cost is not None:
-        yield from cost_statements(cost)
+    if work is not None:
+        yield from work.statements()
     yield "error", _error(setup)
-
-
-def cost_statements(cost: Cost) -> Iterator[tuple[str, str]]:
-    """Yield what a run is predicted to take, and what other programs do to it.
-
-    Args:
-        cost: The prediction.
-    """
-    phases = ", ".join(f"{phase} {duration(seconds)}" for phase, seconds in cost.seconds.items())
-    count = "one core" if cost.cores == 1 else f"{cost.cores} cores"
-    largest = max(cost.parts, key=lambda part: cost.parts[part])
-    memory = f"{cost.memory / 1e6:.0f} MB, most of it for the {largest}"
-    yield "cost", f"about {duration(cost.total)} on {count} ({phases}) and {memory}"
-    if cost.competition.busy:
-        others, cores = cost.competition.others, cost.competition.cores
-        yield (
-            "busy",
-            f"other programs would use {others:.2g} of the {cores} cores; the times above are for "
-            f"that, idle cores would take about {duration(cost.idle)}",
-        )
 
 
 def warnings(setup: ProblemSetup) -> Iterator[str]:
@@ -79,14 +60,16 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     if bare := list(bare_quantities(setup.scene)):
         yield f"numbers without a unit: {', '.join(bare)}"
     excess = setup.surface.highest - setup.surface.heights.max()
-    if excess > 0.1 * setup.largest_interference:
+    known = setup.plane_at_largest_load is not None
+    size = setup.largest_interference if known else roughness(setup.surface).sq
+    if excess > 0.1 * size:
         x, y = setup.surface.highest_point
         yield (
             "the approach counts from the interpolant's highest point, "
             f"{quantity(excess, 'mm', 3)} above the highest of the given heights, at "
             f"x = {x:.4g} mm, y = {y:.4g} mm: the heights are too coarse or too noisy there"
         )
-    if not setup.interfering_patches:
+    if known and not setup.interfering_patches:
         yield "nothing lies within the largest approach: no force will act"
     if setup.ignores_border and setup.interfering_border_maxima:
         yield (
@@ -181,6 +164,8 @@ def _contact(setup: ProblemSetup) -> str:
     if setup.uses_summits:
         within = f"{int(setup.interfering_summits.sum())} within the largest approach"
         return f"{len(setup.asperities)} summits, {within}; the others cost nothing"
+    if setup.plane_at_largest_load is None:
+        return f"{setup.surface.heights.size} cells"
     within = f"{int((setup.cell_interference > 0.0).sum())} within the largest approach"
     return f"{setup.surface.heights.size} cells, {within}"
 
@@ -241,16 +226,15 @@ def _coupling(setup: ProblemSetup) -> str:
     if coupling.kind == "isolated":
         made = f"every patch alone, Love's {coupling.love} displacement"
     else:
-        made, tilt = "all from one solution of the whole surface", setup.plane_at_largest_load.tilt
-        if setup.scene.loading.tilt == "free":
-            made += f" under the tilt that the plane takes on a half-space, {_slopes(tilt)}"
+        made, tilt = "all from one solution of the whole surface", setup.scene.loading.tilt
+        if tilt == "free":
+            made += " under the tilt that the plane takes at each approach"
         elif any(tilt):
             made += " under the load's tilt"
-    laws = setup.interfering_patches
-    return (
-        f"{coupling.kind}: {grid}, {laws} get a law, {patches.count - laws} stay open; {made}; "
-        f"{coupling.interface} closure"
-    )
+    if setup.plane_at_largest_load is not None:
+        laws = setup.interfering_patches
+        grid += f", {laws} get a law, {patches.count - laws} stay open"
+    return f"{coupling.kind}: {grid}; {made}; {coupling.interface} closure"
 
 
 def _load(setup: ProblemSetup) -> str:
@@ -266,8 +250,8 @@ def _load(setup: ProblemSetup) -> str:
         text += ", the plane free to tilt"
     elif any(load_history.tilt):
         text += f", tilted by {_slopes(load_history.tilt)}"
-    if forced:
-        approach = quantity(setup.plane_at_largest_load.approach, "mm", 3)
+    if forced and setup.plane_at_largest_load is not None:
+        approach = quantity(setup.plane.approach, "mm", 3)
         text += f"; on a half-space its approach is about {approach}"
     return text
 
@@ -278,17 +262,10 @@ def _slopes(tilt: tuple[float, float]) -> str:
 
 def _error(setup: ProblemSetup) -> str:
     """Say how the run will know its error."""
-    check = setup.scene.output.check
-    if setup.samples:
-        return "not measured; the notes have that of the laws between rows, and their scatter"
+    if why := unmeasured(setup):
+        return f"not measured: {why}"
     if setup.meshes is not None:
-        if len(setup.meshes.shapes) > 1:
-            return "the meshes of the reference tell it, at every load step"
-        return "not known: one mesh has no error bar (reference.meshes = 2)"
-    if not isinstance(setup.micro, HalfSpaceModel):
-        return f"not known: {setup.model.name} contacts have no measure of it, half-space has"
-    if check == "none":
-        return "not measured (output.check = 'none')"
-    which = "every load step" if check == "all" else "the last load step"
+        return "the meshes of the reference tell it, at every load step"
+    which = "every load step" if setup.scene.output.check == "all" else "the last load step"
     body = ", body" if setup.has_block else "; there is no block"
     return f"measured at {which}, by cause: grid, slopes{body}{' and laws' * setup.uses_laws}"

@@ -78,12 +78,12 @@ def make_setup(
         NotConverged: When a contact problem cannot be solved.
     """
     began, nodes, known = time.perf_counter(), nodes or ClusterNodes(), resolved or {}
-    auto = frozenset() if known else auto_keys(scene)
+    auto: frozenset[str] = frozenset() if known else auto_keys(scene)
     start = provisional(with_resolved(scene, known), auto)
     faces = scene_bodies(scene, None).facts if faces is None else faces
     if scene.law.representative:
         return representative_setup(scene, nodes, faces)
-    if auto and is_measured(scene):
+    if not known and is_measured(scene):
         found = setup_by_accuracy(
             scene, start, lambda stated: _setup(stated, nodes, faces), mesh_error
         )
@@ -137,11 +137,11 @@ def _setup(
     )
     made = time.perf_counter()
     seconds = {"surface": made - began}
-    if scene.kind == "reference":
-        plane = estimated_plane(scene, surface, modulus)
+    if scene.kind == "reference":  # whose meshes are small where contact can occur
+        known_plane = estimated_plane(scene, surface, modulus)
         seconds["load estimate"] = time.perf_counter() - made
-        meshes = reference_meshes(scene, surface, plane, nodes)
-        return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
+        meshes = reference_meshes(scene, surface, known_plane, nodes)
+        return setup(micro=None, plane_at_largest_load=known_plane, meshes=meshes, seconds=seconds)
     choice = None
     if scene.micro.model == "auto":
         choice = _chosen_model(scene, surface, patches, known, modulus)
@@ -151,11 +151,9 @@ def _setup(
         model = model.resampled((int(known[0]), int(known[1])))
     _refuse_without_summits(scene, model)
     chosen = time.perf_counter()
-    if isinstance(model, HalfSpaceModel) and scene.kind in ("analytic", "concurrent"):
-        plane = estimated_plane(
-            scene, surface, modulus
-        )  # its load steps need no plane ahead of them
-    else:
+    plane = prescribed_plane(scene.loading.load_history, surface)
+    isolated_or_meshed = scene.kind == "isolated" or scene.on_mesh  # whose laws end there
+    if plane is None and (isolated_or_meshed or not isinstance(model, HalfSpaceModel)):
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
     seconds["load estimate"] = time.perf_counter() - chosen
@@ -194,6 +192,18 @@ def stated_model(scene: Scene, surface: Surface, contact_modulus: float) -> Micr
     return model
 
 
+def prescribed_plane(load_history: LoadHistory, surface: Surface) -> RigidPlane | None:
+    """Return the rigid plane at the largest load; None where force or moments are prescribed.
+
+    Args:
+        load_history: The loads.
+        surface: The surface.
+    """
+    if load_history.quantity == "force" or load_history.tilt is None:
+        return None
+    return RigidPlane.above(surface, load_history.largest, load_history.tilt)
+
+
 def plane_at_largest_load(
     load_history: LoadHistory, coupling: Coupling, surface: Surface
 ) -> RigidPlane:
@@ -207,8 +217,8 @@ def plane_at_largest_load(
     Raises:
         NotConverged: When the plane is not found in smaller steps either.
     """
-    if load_history.quantity == "approach" and load_history.tilt is not None:
-        return RigidPlane.above(surface, load_history.largest, load_history.tilt)
+    if plane := prescribed_plane(load_history, surface):
+        return plane
     largest = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
     (step,) = load_steps(coupling, largest)
     return RigidPlane.above(surface, step.approach_mm, step.tilt)

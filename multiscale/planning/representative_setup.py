@@ -23,9 +23,6 @@ from multiscale.setup.surface_and_block import (
     sample_surface,
 )
 
-_ESTIMATE_CELLS = 96
-"""Cells along a side, at most, of the sample that estimates the approach under a force."""
-
 
 def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> ProblemSetup:
     """Set up the problem of a scene whose laws are those of periodic samples.
@@ -55,8 +52,6 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         periodic=True,
         upper=scene.micro.upper,
     )
-    made = time.perf_counter()
-    plane = _sample_plane(scene, model, face.area)
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return ProblemSetup(
         scene=scene,
@@ -70,8 +65,8 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         face=face,
         counter_face=counter,
         samples=samples,
-        plane_at_largest_load=plane,
-        seconds={"surface": made - began, "load estimate": time.perf_counter() - made},
+        plane_at_largest_load=_sample_plane(scene, model),
+        seconds={"surface": time.perf_counter() - began},
     )
 
 
@@ -99,16 +94,13 @@ def face_of_block(scene: Scene, shape: BlockShape) -> FaceFacts:
     )
 
 
-def _sample_plane(scene: Scene, model: HalfSpaceModel, area: float) -> RigidPlane:
-    """Return the plane on a sample at the largest load, as if that were uniform on the face.
+def _sample_plane(scene: Scene, model: HalfSpaceModel) -> RigidPlane | None:
+    """Return the plane on a sample at the largest approach, or None under a force.
 
-    Under a prescribed approach the body takes part of it, and the plane is an upper bound.
+    The body takes part of the approach, and the plane is an upper bound.
     """
     surface, history = model.surface, scene.loading.load_history
+    if history.quantity == "force":
+        return None
     mean = model.reference_height - surface.mean_height
-    if history.quantity == "approach":
-        return RigidPlane.above(surface, min(history.largest, mean))
-    nx, ny = surface.grid
-    coarse = model.resampled((min(nx, _ESTIMATE_CELLS), min(ny, _ESTIMATE_CELLS)))
-    state = coarse.solve_force(history.largest / area * surface.area)
-    return RigidPlane.above(surface, state.plane.approach)
+    return RigidPlane.above(surface, min(history.largest, mean))

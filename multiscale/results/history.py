@@ -15,6 +15,7 @@ from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
+from multiscale.results.accuracy_verdict import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
@@ -119,6 +120,7 @@ class History:
         patches: The partition of the interface, or regions of a contact face.
         seconds: Wall time of each phase of the run [s].
         notes: Remarks of the run on its own approximations.
+        accuracy: Whether the accuracy that was asked for is kept; None where none was.
         reference: Results of all meshes of a reference; None with other couplings.
         contact_records: The contacts of those load steps that the scene asks for.
     """
@@ -190,6 +192,7 @@ class History:
     patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    accuracy: AccuracyVerdict | None = None
     reference: ReferenceRecord | None = None
     contact_records: tuple[ContactRecord, ...] = ()
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -35,6 +35,8 @@ class MaterialSection(Section):
 class SupportSection(Section):
     """A face that is held."""
 
+    grid_is_open: ClassVar[bool] = False
+
     surface: Tag
     """Physical name or number of the face."""
     displacement: tuple[Component, Component, Component] = (0.0, 0.0, 0.0)
@@ -43,6 +45,8 @@ class SupportSection(Section):
 
 class TractionSection(Section):
     """A face that is loaded."""
+
+    grid_is_open: ClassVar[bool] = False
 
     surface: Tag
     """Physical name or number of the face."""
@@ -134,6 +138,8 @@ class RegionSection(SurfaceSection):
 
     Its other keys are those of ``[surface]``.
     """
+
+    grid_is_open: ClassVar[bool] = False
 
     surface: Tag
     """Physical name or number of the face."""

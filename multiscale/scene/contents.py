@@ -35,10 +35,12 @@ class SceneSections(Section):
     """
 
     accuracy: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
-    """Allowed relative error of the force. Keys that are ``"auto"`` or, with an accuracy, not
-    stated (``surface.grid``, ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws
-    on a mesh, ``block.cells``) get the values that are predicted to keep it at the least cost.
-    Without it, ``auto`` means 2 %."""
+    """Allowed relative error of the force. What is stated is kept. Keys that are ``"auto"`` or,
+    with an accuracy, not stated (``surface.grid`` of a spectrum, ``micro.model``,
+    ``coupling.kind``, ``patches.grid`` and, under laws on a mesh, ``block.cells``) get values by a
+    rule from errors that are measured before the run, the same on every machine. The results say
+    whether the error that is measured in the run keeps the accuracy. Without it, ``auto`` means
+    2 %."""
     surface: SurfaceSection
     """The rough surface."""
     counter_surface: CounterSurfaceSection | None = None
@@ -129,6 +131,8 @@ class SceneSections(Section):
                 "law.kind = 'representative')",
             )
         other = self.counter_surface
+        if self.surface.lacks_grid and (self.accuracy is None or other is not None):
+            yield "surface", "a 'spectrum' needs 'grid' and 'lengths' beside it"
         if other is None:
             return
         if other.periodic != self.surface.periodic:

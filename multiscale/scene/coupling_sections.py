@@ -23,16 +23,16 @@ class CouplingSection(Section):
     the load (where the plane is free, under the tilt that it takes at each approach); ``isolated``
     takes every patch's law from what lies in it alone (Waddad et al. 2016); ``analytic`` is the
     micro model alone on a half-space; ``reference`` meshes the rough surface itself, see the
-    section reference; ``auto`` is concurrent or consistent, whichever keeps the scene's accuracy at
-    less cost."""
+    section reference; ``auto`` is concurrent, consistent where there are more load steps than laws
+    take solutions, or reference where neither keeps the scene's accuracy."""
     compliance: Literal["auto", "finite-element", "decomposed"] = "auto"
     """Compliance of the block under its patches: ``finite-element`` takes it from a mesh with a
     flat top; ``decomposed`` adds few smooth modes of the finite body to the exact half-space. Auto
     is decomposed, except for isolated laws and for laws at points."""
     newton: Literal["auto", "condensed", "full"] = "auto"
     """How laws find the load steps: ``condensed`` solves for the patches alone, with a compliance
-    computed once; ``full`` for all displacements of the mesh. Auto is what is predicted to cost
-    less."""
+    computed once; ``full`` for all displacements of the mesh. Auto is what takes fewer multigrid
+    cycles, counted from patches and load steps."""
     love: Literal["mean", "centre"] = "mean"
     """Displacement under its own pressure that is subtracted from an isolated patch: the mean one,
     or that at its centre."""
@@ -125,6 +125,11 @@ class ReferenceSection(Section):
                 "(allowed: one of them)"
             )
         return self
+
+    @property
+    def sizes_are_open(self) -> bool:
+        """Whether the size of the meshes is left to surface, load and accuracy."""
+        return self.fine is None and not self.hexahedral
 
     @property
     def hexahedral(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
@@ -122,8 +122,12 @@ class SurfaceSection(Section):
     ``resample``.
     """
 
+    grid_is_open: ClassVar[bool] = True
+    """Whether a spectrum may be without a grid, for an accuracy to choose it."""
+
     spectrum: SpectrumSection | None = None
-    """Recipe of a synthesised surface; it needs ``grid`` and ``lengths``."""
+    """Recipe of a synthesised surface; it needs ``lengths``, and ``grid`` unless an ``accuracy``
+    chooses it."""
     file: str | None = None
     """File of a measured map: .npy, text, .xyz, or an instrument's format. A relative path starts
     in the folder of the scene."""
@@ -134,7 +138,8 @@ class SurfaceSection(Section):
     channel: str | Annotated[int, Field(ge=0, strict=True)] | None = None
     """Name or number, counted from 0, of the channel of a file that has several."""
     grid: tuple[Heights, Heights] | Auto | None = None
-    """Numbers of heights along x and y: what a spectrum is sampled on, or what a file must have."""
+    """Numbers of heights along x and y: what a spectrum is sampled on, or what a file must have.
+    With an ``accuracy`` a spectrum needs none."""
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     """Sides of the surface along x and y; needed where a file does not state them."""
     crop: CropSection = CropSection()
@@ -163,7 +168,8 @@ class SurfaceSection(Section):
             )
         if self.heights is not None and self.lengths is None:
             raise ValueError("'heights' need 'lengths' beside them")
-        if self.spectrum is not None and (self.grid is None or self.lengths is None):
+        without_grid = self.grid is None and not self.grid_is_open
+        if self.spectrum is not None and (without_grid or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
         fields = type(self).model_fields
         for key in ("height_unit", "channel", "crop", "missing", "outliers", "resample"):
@@ -186,6 +192,11 @@ class SurfaceSection(Section):
         return self
 
     @property
+    def lacks_grid(self) -> bool:
+        """Whether a spectrum is sampled on a grid that only an accuracy decides."""
+        return self.spectrum is not None and self.grid is None
+
+    @property
     def preparation(self) -> Preparation:
         """What is done to the map."""
         return Preparation(
@@ -204,6 +215,8 @@ class CounterSurfaceSection(SurfaceSection):
 
     Its other keys are those of ``[surface]``.
     """
+
+    grid_is_open: ClassVar[bool] = False
 
     shift: tuple[Length, Length] = (0.0, 0.0)
     """Way along x and y that it is moved, once it lies on the surface: over the borders of a

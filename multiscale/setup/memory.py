@@ -35,6 +35,10 @@ _BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 8, 32, 100
 vectors of Newton's method [B]. Two load steps took 107."""
 
 
+class MemoryLacking(InputError):
+    """What a scene asks for does not fit into the memory of the nodes; others may have more."""
+
+
 def check_memory(
     scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest] | None = None
 ) -> None:
@@ -46,12 +50,12 @@ def check_memory(
         requests: The memory that is needed; by default `memory_requests` of the scene.
 
     Raises:
-        InputError: Names the key, its value and what is allowed.
+        MemoryLacking: Names the key, its value and what is allowed.
     """
     for request in memory_requests(scene) if requests is None else requests:
         if not nodes.fits(request):
             value, other = request.value, request.alternative
-            raise InputError(
+            raise MemoryLacking(
                 request.sentence,
                 key=request.key,
                 value=list(value) if isinstance(value, tuple) else value,

@@ -21,7 +21,6 @@ from geometry import (
 )
 from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
-from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies
 from multiscale.setup.reference_meshes import ReferenceMeshes
@@ -39,40 +38,23 @@ _SUMMITS_ROWS = 400
 
 
 @dataclass(frozen=True, kw_only=True)
-class Alternative:
-    """A way to compute a scene.
-
-    Attributes:
-        label: The coupling, and the cells, meshes or micro model that it works on.
-        seconds: Predicted time of the run [s].
-    """
-
-    label: str
-    seconds: float
-
-    @property
-    def text(self) -> str:
-        """The alternative in words."""
-        return f"{self.label}, in about {duration(self.seconds)}"
-
-
-@dataclass(frozen=True, kw_only=True)
 class Decision:
-    """What was taken, the errors that were measured for it, and what else there was.
+    """What was taken, and the errors that were measured for it before the run.
 
     Attributes:
         accuracy: Relative error of the force that was requested.
-        taken: What was taken.
+        taken: The coupling, and the cells, meshes or micro model that it works on.
+        why: Why this coupling was taken; empty where the scene states it or it was missed for.
         errors: Measured errors of the force by cause, relative to it, at the load where they are
-            worst; empty where they cannot be measured beforehand.
-        others: What was predicted to take longer, or could not keep the accuracy.
+            worst; empty where they cannot be measured beforehand. That of laws is among them only
+            after the run.
         missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
     """
 
     accuracy: float
-    taken: Alternative
+    taken: str
     errors: Mapping[str, float]
-    others: tuple[Alternative, ...] = ()
+    why: str = ""
     missed: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -87,15 +69,13 @@ class Decision:
 
     @property
     def sentence(self) -> str:
-        """What was taken, what was measured for it, and what else there was."""
+        """What was taken, why, and what was measured for it."""
         parts = [
-            self.taken.text,
+            self.taken + f" ({self.why})" * bool(self.why),
             f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
         ]
         if self.missed:
             parts.append(f"without meshing the roughness {_listed(self.missed)}")
-        if self.others:
-            parts.append(f"instead, {'; '.join(each.text for each in self.others)}")
         return "; ".join(parts)
 
     @property
@@ -123,8 +103,8 @@ class ProblemSetup:
         block_shape: Shape and mesh of the block; None where the body is a mesh of its own.
         materials: The materials on both sides of the interface.
         plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
-            prescribed, it is the plane in equilibrium on a half-space, estimated on few of its
-            cells where load steps solve the half-space model itself and need no plane before.
+            prescribed, it is the plane in equilibrium on a half-space, or None where nothing
+            before the load steps needs it.
         counter_surface: What of the surface is the counter-body's; None where that is smooth.
         face: What is known of the body and its contact face where the surface does not say it: of
             a mesh, and under laws of samples; None otherwise.
@@ -144,7 +124,7 @@ class ProblemSetup:
     mean_heights: Array
     block_shape: BlockShape | None
     materials: MaterialPair
-    plane_at_largest_load: RigidPlane
+    plane_at_largest_load: RigidPlane | None
     counter_surface: Surface | None = None
     face: FaceFacts | None = None
     counter_face: FaceFacts | None = None
@@ -235,6 +215,17 @@ class ProblemSetup:
         """Most rows of a table of laws."""
         return _SUMMITS_ROWS if self.uses_summits else MOST_ROWS
 
+    @property
+    def plane(self) -> RigidPlane:
+        """The rigid plane at the largest load.
+
+        Raises:
+            ValueError: Where it is not known before the load steps.
+        """
+        if self.plane_at_largest_load is None:
+            raise ValueError("the plane under this force is not known before the load steps")
+        return self.plane_at_largest_load
+
     def interference(self, x: Array, y: Array, z: Array) -> Array:
         """Return how far points lie above the undeformed plane at the largest load [mm].
 
@@ -243,7 +234,7 @@ class ProblemSetup:
             y: Second coordinate [mm].
             z: Height [mm].
         """
-        return self.plane_at_largest_load.at(x, y) - (self.surface.highest - z)
+        return self.plane.at(x, y) - (self.surface.highest - z)
 
     @property
     def cell_interference(self) -> Array:
@@ -258,7 +249,7 @@ class ProblemSetup:
         Under a tilted plane the approach at the middle may be negative while its lower side
         touches.
         """
-        return max(self.plane_at_largest_load.approach, float(self.cell_interference.max()))
+        return max(self.plane.approach, float(self.cell_interference.max()))
 
     @property
     def interfering_summits(self) -> NDArray[np.bool_]:
@@ -293,7 +284,7 @@ class ProblemSetup:
         need the approach at the corners of the patch. So do isolated laws under a force, whose
         contacts may lie at a corner. A free plane may tilt further than on a half-space.
         """
-        plane, loading = self.plane_at_largest_load, self.scene.loading
+        plane, loading = self.plane, self.scene.loading
         ends = plane.means(self.patches)
         isolated_force = self.scene.kind == "isolated" and loading.force is not None
         if self.scene.coupling.interface == "pointwise" or isolated_force:

@@ -1,0 +1,94 @@
+"""Whether a run kept the accuracy that was asked for, by the errors that it measured itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from multiscale.loading.load_step import LoadStep
+from multiscale.readable import Caution, percent
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AccuracyVerdict:
+    """The accuracy that was asked for, and the error that was measured in the run.
+
+    Attributes:
+        requested: Relative error of the force that was asked for.
+        error: Measured relative error of the force, the larger of those of the last load step and
+            of that of the largest force; None where neither was measured.
+        step: Number of the load step that has it; 0 where it was not measured.
+        causes: Relative errors by cause there; empty where they are not told apart.
+        unknown: Why it was not measured; empty where it was.
+    """
+
+    requested: float
+    error: float | None = None
+    step: int = 0
+    causes: Mapping[str, float] = field(default_factory=dict)
+    unknown: str = ""
+
+    @property
+    def kept(self) -> bool | None:
+        """Whether the error keeps the accuracy; None where it was not measured."""
+        return None if self.error is None else self.error <= self.requested
+
+    @property
+    def sentence(self) -> str:
+        """The verdict in words, a caution unless the accuracy is kept."""
+        asked = f"accuracy of {percent(self.requested, 3)}"
+        if self.error is None:
+            return Caution(f"whether the {asked} is kept is not known: {self.unknown}")
+        found = percent(self.error)
+        if self.kept:
+            return f"{asked} kept: measured at load step {self.step}, the force is within {found}"
+        largest = max(self.causes, key=lambda cause: self.causes[cause], default="")
+        most = f", most of it by {largest}" * bool(largest)
+        return Caution(
+            f"the {asked} is not kept: measured at load step {self.step}, the force may be off by "
+            f"{found}{most}"
+        )
+
+
+def relative_error(step: LoadStep, *, by_force: bool) -> float | None:
+    """Return the measured error of a load step relative to its force; None where it has none.
+
+    Args:
+        step: The load step, under a force.
+        by_force: Whether the force is prescribed. The error of a reference is then that of the
+            approach, whose power 3/2 the force grows with.
+    """
+    if step.errors:
+        return sum(error for _, error in step.errors) / step.force_N
+    if not by_force:
+        return None if step.force_error_N is None else step.force_error_N / step.force_N
+    if step.approach_error_mm is None or not step.approach_mm:
+        return None
+    return 1.5 * step.approach_error_mm / abs(step.approach_mm)
+
+
+def verdict(
+    steps: Sequence[LoadStep], accuracy: float | None, unknown: str, *, by_force: bool
+) -> AccuracyVerdict | None:
+    """Return whether load steps keep an accuracy; None where none was asked for.
+
+    Args:
+        steps: The load steps, with the errors that were measured.
+        accuracy: Relative error of the force that was asked for, or None.
+        unknown: Why errors are not measured; empty where they should have been.
+        by_force: Whether the force is prescribed.
+    """
+    if accuracy is None:
+        return None
+    loaded = [step for step in steps if step.force_N > 0.0]
+    if not loaded:
+        return AccuracyVerdict(requested=accuracy, unknown="no load step has a force")
+    decisive = (loaded[-1], max(loaded, key=lambda step: step.force_N))
+    found = [(relative_error(step, by_force=by_force), step) for step in decisive]
+    known = [(error, step) for error, step in found if error is not None]
+    if unknown or not known:
+        why = unknown or "the errors of its load steps were not measured"
+        return AccuracyVerdict(requested=accuracy, unknown=why)
+    error, step = max(known, key=lambda each: each[0])
+    causes = {cause: part / step.force_N for cause, part in step.errors}
+    return AccuracyVerdict(requested=accuracy, error=error, step=step.step, causes=causes)
