@@ -71,7 +71,7 @@ def setup_by_accuracy(
         start = with_value(start, "coupling.table_tolerance", _LAWS * search.accuracy)
     setup = build(start)
     if "patches.grid" in auto:
-        setup = build(with_value(start, "patches.grid", map_grid(setup.surface)))
+        setup = build(with_value(start, "patches.grid", map_grid(start, setup.surface)))
     if setup.meshes is not None:
         return search.decided(*search.with_refined_meshes(setup))
     if isinstance(setup.micro, HalfSpaceModel):

@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from contextlib import suppress
 from typing import Any
 
+import numpy as np
+
 from geometry.errors import InputError
 from geometry.surface import Surface
 from micro import HalfSpaceModel
@@ -15,7 +17,7 @@ from multiscale.scene.coupling_sections import CouplingSection
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SpectrumSection
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import PROVISIONAL_PATCHES
+from multiscale.setup.surface_and_block import PROVISIONAL_PATCHES, patch_limits
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""
@@ -184,16 +186,18 @@ def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
     return fitting["concurrent"], why
 
 
-def map_grid(surface: Surface) -> tuple[int, int]:
-    """Return nearly square patches that make a map, no more than heights.
+def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
+    """Return nearly square patches that make a map, no more than heights or elements below.
 
     Args:
-        surface: The surface.
+        scene: The scene.
+        surface: Its surface.
     """
     shorter = min(surface.lengths)
+    most = np.min(list(patch_limits(scene, surface).values()), axis=0)
     x, y = (
-        min(max(round(PATCHES_ACROSS * length / shorter), 1), most)
-        for length, most in zip(surface.lengths, surface.grid, strict=True)
+        min(max(round(PATCHES_ACROSS * length / shorter), 1), int(limit))
+        for length, limit in zip(surface.lengths, most, strict=True)
     )
     return x, y
 

@@ -89,7 +89,7 @@ def make_setup(
         )
         return replace(found, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
-        start = with_value(start, "patches.grid", map_grid(make_surface(start)))
+        start = with_value(start, "patches.grid", map_grid(start, make_surface(start)))
     return _setup(start, nodes, faces, known.get("micro"), like)
 
 

@@ -206,13 +206,23 @@ class Bulk(NamedTuple):
     young_modulus: float
 
 
-def check_patches(scene: Scene, surface: Surface) -> None:
-    """Refuse more patches than heights of the surface or cells of the interface."""
+def patch_limits(scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
+    """Return what limits the numbers of patches along x and y, each with these limits.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+    """
     limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
     if scene.block is not None and meshes_block(scene):
         limits["cells of the interface (block.cells)"] = block_cells(scene)[:2]
+    return limits
+
+
+def check_patches(scene: Scene, surface: Surface) -> None:
+    """Refuse more patches than heights of the surface or cells of the interface."""
     grid = patch_grid(scene)
-    for what, limit in limits.items():
+    for what, limit in patch_limits(scene, surface).items():
         if np.any(np.greater(grid, limit)):
             raise InputError(
                 f"more patches than {what}",

@@ -1,4 +1,4 @@
-"""A sweep over seeds of the paper's scene on several ranks: time, memory, files, and the model.
+"""A sweep over seeds of the paper's scene on several ranks: time, memory and files.
 
     .venv/bin/python tests/benchmarks/sweep_scale.py [--cases 1000] [--ranks 1 2 4] [KEY=VALUE …]
 
@@ -33,9 +33,7 @@ def of_rank(cases: int, keys: list[str], folder: Path) -> None:
 
     from multiscale import Scene, sweep
     from multiscale.machine import peak_memory
-    from multiscale.planning.costs import step_count
     from multiscale.results.history import COLUMNS
-    from multiscale.sweeps.forecast import SweepForecast
 
     comm = MPI.COMM_WORLD
     scene = Scene.load(ROOT / "demos/scenes/paper.toml", [*SCENE, *keys])
@@ -67,18 +65,12 @@ def of_rank(cases: int, keys: list[str], folder: Path) -> None:
     ]
     if comm.rank == 0:
         once = float(every[:, 2].mean() - every[:, 3].mean())
-        forecast = SweepForecast(
-            cases=cases, ranks=comm.size, steps=step_count(scene.loading.load_history),
-            case_seconds=float(np.average(every[:, 3], weights=every[:, 0])),
-            set_up_seconds=max(once, 0.0), run_bytes=float(every[:, 5].max()),
-        )  # fmt: skip
         print(json.dumps({
             "ranks": comm.size, "wall": every[:, 7].max(), "cpu": every[:, 1].sum(),
-            "case": forecast.case_seconds, "scatter": float(every[:, 4].max()), "once": once,
+            "case": float(np.average(every[:, 3], weights=every[:, 0])), "scatter": float(every[:, 4].max()), "once": once,
             "most": every[:, 0].max(), "fewest": every[:, 0].min(),
             "memory": every[:, 6].max() / 1e6, "grown": (every[:, 6] - every[:, 5]).max() / 1e6,
             "files": len(list((folder / "cases").iterdir())),
-            "model": forecast.seconds, "model_memory": forecast.rank_bytes / 1e6,
             "table": hashlib.sha256(table.tobytes() + b"".join(values)).hexdigest()[:12],
         }))  # fmt: skip
 
@@ -95,7 +87,7 @@ def main() -> None:
         of_rank(choice.cases, choice.keys, choice.folder)
         return
     print("| ranks | wall [s] | CPU [s] | a case, CPU | once a rank | cases of a rank | MB a rank |"
-          " files | model [s], MB | results |")  # fmt: skip
+          " files | results |")  # fmt: skip
     for ranks in choice.ranks:
         with tempfile.TemporaryDirectory() as folder:
             words = [__file__, "--cases", str(choice.cases), "--folder", folder, *choice.keys]
@@ -109,7 +101,7 @@ def main() -> None:
             f"| {ranks} | {one['wall']:.1f} | {one['cpu']:.1f} | {1e3 * one['case']:.0f} ± "
             f"{1e3 * one['scatter']:.0f} ms | {one['once']:.2f} s | {one['fewest']:.0f} … "
             f"{one['most']:.0f} | {one['memory']:.0f} (+{one['grown']:.0f}) | {one['files']} | "
-            f"{one['model']:.1f}, {one['model_memory']:.0f} | {one['table']} |"
+            f"{one['table']} |"
         )
 
 

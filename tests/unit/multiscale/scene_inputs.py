@@ -9,9 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from geometry.errors import InputError, NotConverged
-from multiscale.planning.costs import predicted_cost
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import make_setup
+from multiscale.planning.work import work_of
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 
@@ -232,9 +232,9 @@ def planned(path, overrides=()):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        made = predicted_cost(setup)
+        made = work_of(setup)
         told = [*(text for _, text in statements(setup, made)), *warnings(setup)]
-        assert all(np.isfinite(part) for part in (made.total, made.memory)), told
+        assert all(np.isfinite(part) for part in (made.seconds, made.memory)), told
     except InputError as error:
         told = str(error)
         of_heights = error.key == "surface.file"  # which names the file of heights

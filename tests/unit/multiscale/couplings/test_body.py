@@ -11,7 +11,6 @@ from multiscale import Scene, make_setup
 from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import contact_model
 from multiscale.couplings.patch_compliance import patch_displacements
-from multiscale.planning.contact_costs import ContactCosts
 
 
 def setup(
@@ -84,22 +83,6 @@ def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
     model = contact_model(found, None)
     assert (model.slopes is not None) == (slopes is not False)
     assert (model.body is not None) == (kind != "analytic")
-
-
-class Steady:
-    """A machine of one speed."""
-
-    arrays = sparse = 1.0
-
-    def product(self, cells):
-        return 30e-9 * cells
-
-
-def test_slopes_and_bodies_are_more_work():
-    flat, rough = setup(slopes=False), setup()
-    alone = setup("analytic", slopes=False)
-    times = [ContactCosts(one, Steady()).step() for one in (rough, flat, alone)]
-    assert times[0] > 2.0 * times[1] > 2.0 * times[2]
 
 
 @pytest.mark.parametrize("way", ["decomposed", "finite-element"])

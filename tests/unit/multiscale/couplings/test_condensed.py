@@ -172,7 +172,7 @@ def test_fields_are_those_of_the_patch_pressures():
         (["coupling.compliance=decomposed"], True, "the decomposed block is its compliance"),
     ],
 )
-def test_newton_is_chosen_by_cost(overrides, condensed, why):
+def test_newton_is_chosen_by_counted_cycles(overrides, condensed, why):
     choice = newton_choice(make_setup(scene(*overrides)))
     assert choice.condensed == condensed
     assert why in choice.why

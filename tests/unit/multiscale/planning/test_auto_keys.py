@@ -10,7 +10,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Scene, make_setup
 from multiscale.machine import ClusterNodes
-from multiscale.planning.auto_keys import auto_keys, couplings, resolved_sections
+from multiscale.planning.auto_keys import auto_keys, resolved_sections
 from multiscale.planning.plan import statements, warnings
 
 
@@ -93,13 +93,18 @@ def test_finite_slopes_left_out_are_an_error():
     assert "most of it by slopes" in said
 
 
-def test_few_steps_press_together_and_many_steps_make_laws():
-    for steps, kind in ((1, "concurrent"), (3000, "consistent")):
-        load = {"approach": 0.004, "steps": steps}
-        setup = make_setup(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
-        assert setup.decision.kept
-        assert setup.scene.coupling.kind == kind
-    assert setup.table_tolerance == pytest.approx(0.02)  # a tenth of the accuracy
+def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
+    load = {"approach": 0.004, "steps": 3000}
+    setup = make_setup(scene(load=load, accuracy=0.2, micro={"model": "half-space"}))
+    assert setup.decision.kept
+    assert setup.scene.coupling.kind == "consistent"
+    assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
+
+
+def test_patches_are_no_more_than_the_elements_that_are_stated():
+    meshed = {"kind": "isolated"}
+    given = scene(accuracy=0.05, coupling=meshed, block=block(cells=[5, 9, 4]))
+    assert make_setup(given).patches.grid == (5, 8)
 
 
 def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
@@ -130,21 +135,6 @@ def test_stated_keys_are_respected(stated):
     assert resolved.surface.grid == (48, 48)
 
 
-@pytest.mark.parametrize(
-    ("coupling", "kinds"),
-    [
-        ({"compliance": "finite-element"}, {"consistent"}),
-        ({"newton": "full"}, {"consistent"}),
-        ({"table_tolerance": 0.01}, {"consistent"}),
-        ({"compliance": "decomposed"}, {"concurrent", "consistent"}),
-    ],
-)
-def test_other_keys_narrow_the_couplings(coupling, kinds):
-    given = scene(coupling=coupling | {"kind": "auto"})
-    assert {section.kind for section in couplings(given)} == kinds
-    assert make_setup(given).scene.coupling.kind in kinds
-
-
 def test_without_accuracy_and_auto_nothing_is_open():
     assert auto_keys(scene()) == frozenset()
     assert auto_keys(scene(accuracy=0.1)) == {"micro.model", "coupling.kind", "patches.grid"}
@@ -170,7 +160,7 @@ def test_models_without_measure_say_so():
     assert not setup.decision.errors
     assert not setup.decision.kept
     assert "which is not measured beforehand" in setup.decision.sentence
-    assert dict(statements(setup))["error"].startswith("not known: elliptic")
+    assert dict(statements(setup))["error"].startswith("not measured: elliptic")
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():

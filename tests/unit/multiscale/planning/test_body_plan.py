@@ -9,10 +9,10 @@ from geometry import BlockShape
 from macro.compliance.cache import cached
 from multiscale import Scene
 from multiscale.couplings.body import scene_body
-from multiscale.planning.costs import predicted_cost
 from multiscale.planning.memory_costs import Launch, run_memory_requests
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.set_up import set_up
+from multiscale.planning.work import work_of
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
 SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
@@ -39,12 +39,12 @@ def setup_of(mesh, **sections):
 
 def test_a_plan_says_size_faces_and_body_term(mesh):
     setup = setup_of(mesh, coupling={"kind": "consistent"})
-    cost = predicted_cost(setup)
-    said = dict(statements(setup, cost))
+    work = work_of(setup)
+    said = dict(statements(setup, work))
     assert "18 hexahedra (linear), 144 unknowns, contact face of 1 mm²" in said["body"]
     assert "the body lies below the plane of its contact face" in said["body term"]
     assert "E = 4 GPa, ν = 0.48" in said["inputs"] and "body 1 mm high" in said["inputs"]
-    assert cost.total > 0.0
+    assert "cells × products" in said["work"]  # no mesh: the body's term is known
     assert [one.key for one in run_memory_requests(setup)].count("body.mesh") == 1
     assert any("linear elements lock" in warning for warning in warnings(setup))
 
@@ -77,10 +77,9 @@ def test_a_face_that_is_yet_to_be_solved_for_is_planned(mesh, tmp_path, monkeypa
     terms = scene_body(setup)
     assert not terms.is_cached()
     first, later = (
-        predicted_cost(setup, launch=Launch.anew(1e8, solves_face=solves))
-        for solves in (True, False)
+        work_of(setup, Launch.anew(1e8, solves_face=solves)) for solves in (True, False)
     )
-    assert first.seconds["block"] > later.seconds["block"]
+    assert first.cycles > later.cycles == 0.0
     assert "body term" in first.parts and "body term" not in later.parts
     key = terms._key(terms._count(None))
     cached("mesh-face", key, lambda: {"found": np.zeros(1)}, MPI.COMM_SELF)

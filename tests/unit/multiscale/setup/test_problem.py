@@ -24,7 +24,7 @@ def scene(seed=1, coupling="consistent", **load):
     return Scene.from_dict(data | {"load": {"steps": 1} | load})
 
 
-@pytest.mark.parametrize(("seed", "coupling"), [(1, "isolated"), (3, "consistent")])
+@pytest.mark.parametrize(("seed", "coupling"), [(1, "isolated"), (3, "isolated")])
 def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
     asked = scene(seed, coupling, force=5e-3, tilt=[0.01, 0.01])
     setup = make_setup(asked)
@@ -55,7 +55,7 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     ("tilt", "coupling", "load"),
     [
         ([0.01, -0.0025], "under the load's tilt;", "tilted by 10 and -2.5 µm/mm along x and y"),
-        ("free", "under the tilt that the plane takes on a half-space, ", "the plane free to tilt"),
+        ("free", "under the tilt that the plane takes at each approach;", "the plane free to tilt"),
         ([0.0, 0.0], "one solution of the whole surface;", "an approach of 8 µm"),
     ],
 )
@@ -112,8 +112,11 @@ class Shy(ContactCoupling):
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
     coupling = Shy(setup.model, setup.patches, setup.mean_heights)
-    load_history, known = setup.scene.loading.load_history, setup.plane_at_largest_load
-    found = plane_at_largest_load(load_history, coupling, setup.surface)
+    load_history = setup.scene.loading.load_history
+    plain = ContactCoupling(setup.model, setup.patches, setup.mean_heights)
+    known, found = (
+        plane_at_largest_load(load_history, one, setup.surface) for one in (plain, coupling)
+    )
     assert found.approach == known.approach
     # moments to 1e-8 of force times length
     np.testing.assert_allclose(found.tilt, known.tilt, rtol=1e-5)
@@ -155,15 +158,8 @@ def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
     assert told.value.key == "load.approach"
 
 
-@pytest.mark.parametrize("coupling", ["analytic", "concurrent"])
-def test_a_force_that_load_steps_solve_for_is_only_estimated_ahead(coupling):
-    asked = Scene.from_dict(
-        scene(coupling=coupling, force=1.0).model_dump(by_alias=True, exclude={"surface"})
-        | {"surface": {"spectrum": PEAKS, "grid": [160, 160], "lengths": [1.0, 1.0]}}
-    )
-    setup = make_setup(asked)
-    solved = setup.model.solve_force(1.0)
-    found = setup.plane_at_largest_load.approach
-    assert found == pytest.approx(solved.approach, rel=0.03)  # 96² of 160² cells
-    assert found != solved.approach
-    assert f"about {1e3 * found:.3g} µm" in dict(statements(setup))["load"]
+@pytest.mark.parametrize("coupling", ["analytic", "concurrent", "consistent"])
+def test_a_plane_that_load_steps_find_is_not_solved_for_ahead(coupling):
+    setup = make_setup(scene(coupling=coupling, force=1.0))
+    assert (setup.plane_at_largest_load is None) == (not setup.scene.on_mesh)
+    assert "approach" not in dict(statements(setup))["load"] or setup.scene.on_mesh

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from multiscale.results.history import COLUMNS
-from multiscale.sweeps.forecast import SweepForecast
 from multiscale.sweeps.statistics import BINS, NUMBERS, column_statistics
 
 NAMES = [column.name for column in COLUMNS]
@@ -69,12 +68,3 @@ def test_ensembles_are_apart_and_the_order_of_cases_does_not_matter(cases):
 def test_nothing_done_has_no_statistics():
     (found,) = column_statistics(None, {}, [range(3)])
     assert found.values.shape[0] == 0
-
-
-def test_forecast_counts_cases_files_and_memory():
-    of = {"cases": 10_000, "steps": 8, "case_seconds": 0.25, "run_bytes": 2e8}
-    alone, many = (SweepForecast(ranks=ranks, **of) for ranks in (1, 1000))
-    assert alone.seconds == pytest.approx(2500, rel=0.01)
-    assert many.seconds == pytest.approx(2.5 + 0.125, abs=0.1 + 19e-6 * 80_000)
-    assert (alone.files, many.files) == (1, 1000)
-    assert many.rank_bytes < 2.1e8 < 3.2e8 < alone.rank_bytes

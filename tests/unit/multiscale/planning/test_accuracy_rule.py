@@ -1,0 +1,253 @@
+"""What an accuracy chooses, beside every stated key of every coupling, and what is said of it."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+
+import pytest
+
+from geometry.errors import InputError
+from multiscale import Run, Scene, make_setup
+from multiscale.machine import ClusterNodes
+from multiscale.output import terminal
+from multiscale.output.provenance import provenance
+from multiscale.output.report import report_html
+from multiscale.planning import mesh_accuracy, work
+from multiscale.planning.auto_keys import (
+    SOLUTIONS_OF_LAWS,
+    auto_keys,
+    chosen_coupling,
+    resolved_sections,
+)
+from multiscale.readable import Caution
+
+SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
+KINDS = ("open", "analytic", "concurrent", "consistent", "isolated", "reference")
+STATED = {
+    "nothing": {},
+    "grid": {"surface": {"grid": [40, 40]}},
+    "cells": {"surface": {"grid": [40, 40]}, "micro": {"model": "half-space"}},
+    "model": {"micro": {"model": "circular-independent"}},
+    "patches": {"patches": {"grid": [3, 2]}},
+    "model and patches": {"micro": {"model": "half-space"}, "patches": {"grid": [3, 2]}},
+    "grid and patches": {"surface": {"grid": [40, 40]}, "patches": {"grid": [3, 2]}},
+    "all": {"surface": {"grid": [40, 40]}, "micro": {"model": "half-space"},
+            "patches": {"grid": [3, 2]}, "reference": {"fine": 0.05}},
+    "slopes": {"micro": {"model": "half-space", "finite_slopes": False}},
+    "edges": {"reference": {"fine": 0.05}},
+    "one mesh": {"reference": {"meshes": 1}},
+}  # fmt: skip
+
+
+def scene(kind="open", accuracy=0.03, **sections):
+    given = {
+        "accuracy": accuracy,
+        "surface": {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]},
+        "block": {"young_modulus": 4037.0, "poisson_ratio": 0.21},
+        "load": {"approach": 0.0061, "steps": 2},
+        "output": {"figures": False},
+    }
+    if kind != "open":
+        given["coupling"] = {"kind": kind}
+    for name, section in sections.items():
+        given[name] = given.get(name, {}) | section
+    return Scene.from_dict({key: value for key, value in given.items() if value is not None})
+
+
+def mesh_error(setup):
+    """An error of third order in the edges, 1 % at 25 µm."""
+    return 0.01 * (float(setup.meshes.sizes[-1]) / 0.025) ** 3
+
+
+@pytest.mark.parametrize(("kind", "stated"), list(itertools.product(KINDS, STATED)))
+def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
+    """In every coupling: measured before the run, and refined, wherever a key is open for it."""
+    keys = STATED[stated]
+    given = scene(kind, **keys)
+    setup = make_setup(given, mesh_error=mesh_error)
+    for name, section in keys.items():
+        for key, value in section.items():
+            found = getattr(getattr(setup.scene, name), key)
+            assert (list(found) if isinstance(value, list) else found) == value
+    assert kind in ("open", setup.scene.kind)
+    fixed = keys.get("surface", {}).get("grid")
+    if fixed is None:  # a spectrum, sampled as its waves or its errors ask for
+        assert min(setup.surface.grid) >= 40
+    grid, model = "surface" not in keys, keys.get("micro", {}).get("model")
+    if kind == "reference":
+        refined = "fine" not in keys.get("reference", {})
+        measured = (refined or grid) and keys.get("reference", {}).get("meshes") != 1
+    else:
+        measured = model in (None, "half-space") and (grid or model is None or kind == "open")
+    if not measured:
+        assert setup.decision is None or not setup.decision.errors
+        return
+    decision = setup.decision
+    assert decision.errors
+    if kind == "reference" and refined:
+        assert decision.error <= 0.03 and setup.meshes.sizes[-1] < 0.037
+    if kind != "reference" and setup.meshes is None and (grid or model is None):
+        grid_error = decision.errors["grid"]
+        # refined to a share of the accuracy, or until other causes are what is left
+        others = decision.error - grid_error
+        assert grid_error <= max(0.8 * 0.03 - others, 0.5 * others) * (1.0 + 1e-12)
+    assert decision.kept == (decision.warning is None) == (decision.error <= 0.03)
+
+
+RUNS = {
+    "analytic": {},
+    "concurrent": {},
+    "consistent": {"coupling": {"table_tolerance": 0.01}},
+    "isolated": {"block": {"cells": [6, 6, 4]}},
+    "reference": {},
+}
+
+
+@pytest.mark.parametrize(("kind", "force"), list(itertools.product(RUNS, (False, True))))
+def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force, capsys):
+    """With everything stated nothing is refined; every coupling's own measure decides."""
+    load = {"approach": None, "force": 1.037} if force else {}
+    run = Run(scene(kind, 1e-5, **STATED["all"], **RUNS[kind], load=load))
+    assert auto_keys(run.given) == frozenset()
+    list(run.load_steps())
+    history = run.history()
+    verdict, last = history.accuracy, history.steps[-1]
+    assert verdict.kept is False
+    if kind == "reference" and not force:
+        expected = last.force_error_N / last.force_N
+    elif kind == "reference":
+        expected = 1.5 * last.approach_error_mm / last.approach_mm
+    else:
+        expected = sum(error for _, error in last.errors) / last.force_N
+    assert verdict.error == pytest.approx(expected, rel=1e-12) and verdict.error > 1e-5
+    (said,) = [note for note in history.notes if "accuracy" in note]
+    assert isinstance(said, Caution) and "accuracy of 0.001 % is not kept" in said
+    if kind == "isolated":  # cut contacts outweigh all else
+        assert "most of it by laws" in said
+    recorded = provenance(run, options=[])["accuracy"]
+    assert recorded["kept"] is False and recorded["error"] == verdict.error
+    assert f'<p class="warning">{said}</p>' in report_html(run, {}, options=[])
+    terminal.show_history(None, history)
+    assert "caution: the accuracy of 0.001 % is not kept" in " ".join(
+        capsys.readouterr().out.split()
+    )
+    run.close()
+
+
+@pytest.mark.parametrize(
+    ("kind", "sections", "why"),
+    [
+        ("analytic", {"output": {"check": "none"}}, "output.check = 'none'"),
+        ("consistent", {"accuracy": 0.3, "output": {"check": "none"}}, "output.check = 'none'"),
+        ("analytic", {"micro": {"model": "circular"}}, "circular contacts have no measure of it"),
+        ("isolated", {"micro": {"model": "elliptic-independent"}}, "contacts have no measure"),
+        ("reference", {"reference": {"meshes": 1, "fine": 0.08}}, "one mesh has no error bar"),
+        ("concurrent", {"load": {"approach": 1e-7}}, "no load step has a force"),
+    ],
+)
+def test_an_error_that_is_not_measured_is_said(kind, sections, why):
+    stated = {"surface": {"grid": [40, 40]}, "block": {"cells": [4, 4, 3]}}
+    run = Run(scene(kind, **stated | sections))
+    list(run.load_steps())
+    history = run.history()
+    assert history.accuracy.kept is None and history.accuracy.error is None
+    (said,) = [note for note in history.notes if "accuracy" in note]
+    assert isinstance(said, Caution) and "is not known" in said and why in said
+    assert provenance(run, options=[])["accuracy"]["kept"] is None
+    run.close()
+
+
+def test_an_accuracy_that_is_kept_is_said_without_a_caution():
+    run = Run(scene("analytic", 0.2, **STATED["cells"]))
+    assert run.history().accuracy.kept is None  # before the first load step
+    list(run.load_steps())
+    history = run.history()
+    assert history.accuracy.kept and 0.0 < history.accuracy.error < 0.2
+    (said,) = [note for note in history.notes if "accuracy" in note]
+    assert said.startswith("accuracy of 20 % kept") and not isinstance(said, Caution)
+    assert Run(scene("analytic", None, **STATED["cells"])).history().accuracy is None
+
+
+def test_laws_are_chosen_where_they_take_fewer_solutions():
+    for steps, kind in ((SOLUTIONS_OF_LAWS, "concurrent"), (SOLUTIONS_OF_LAWS + 1, "consistent")):
+        section, why = chosen_coupling(scene(load={"steps": steps}))
+        assert section.kind == kind
+        assert f"about {SOLUTIONS_OF_LAWS} contact problems" in why and f"{steps} load" in why
+
+
+@pytest.mark.parametrize(
+    ("coupling", "kind"),
+    [
+        ({"compliance": "finite-element"}, "consistent"),
+        ({"newton": "full"}, "consistent"),
+        ({"table_tolerance": 0.01}, "consistent"),
+        ({"compliance": "decomposed"}, "concurrent"),
+    ],
+)
+def test_keys_of_laws_choose_laws(coupling, kind):
+    given = scene(accuracy=None, surface={"grid": [48, 48]}, coupling=coupling | {"kind": "auto"})
+    assert chosen_coupling(given)[0].kind == kind
+    assert make_setup(given).scene.coupling.kind == kind
+
+
+def test_a_coupling_that_other_sections_refuse_is_not_chosen():
+    """Laws of a hardness know rising loads alone, however many load steps there are."""
+    load = {"approach": [0.006, 0.001], "steps": 2 * SOLUTIONS_OF_LAWS}
+    free = scene(load=load, surface={"grid": [48, 48]}, coupling={"kind": "concurrent"})
+    hard = free.with_({"micro.hardness": 400.0})
+    opened = hard.model_copy(
+        update={"coupling": type(hard.coupling).model_construct(**{"kind": "consistent"})}
+    )
+    assert chosen_coupling(free)[0].kind == "consistent"
+    assert chosen_coupling(opened)[0].kind == "concurrent"
+
+
+@pytest.mark.parametrize("speed", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, speed, threads):
+    """Clocks that run slow or fast, rates, threads: the resolved sections are the same text."""
+    for name in ("perf_counter", "monotonic", "process_time", "time"):
+        clock = getattr(time, name)
+        monkeypatch.setattr(time, name, lambda clock=clock: clock() * speed)
+    for rate in ("CELL_PRODUCTS", "UNKNOWN_CYCLES"):
+        monkeypatch.setattr(work, rate, speed * getattr(work, rate))
+    monkeypatch.setenv("OMP_NUM_THREADS", threads)
+    for many in (2, 200):
+        given = scene(load={"steps": many})
+        found = resolved_sections(make_setup(given), given)
+        kind = "concurrent" if many == 2 else "consistent"
+        assert found["coupling"]["kind"] == kind
+        known = CHOSEN.setdefault(many, json.dumps(found, sort_keys=True))
+        assert json.dumps(found, sort_keys=True) == known
+
+
+CHOSEN: dict[int, str] = {}
+
+
+FEW_WAVES = {"accuracy": 0.002, "surface": {"spectrum": SPECTRUM | {"waves": [2, 3]}}}
+
+
+def test_a_choice_does_not_know_how_much_memory_there_is():
+    """The rule's meshes are taken, or refused with what they need; no other way is taken."""
+    given = scene(**FEW_WAVES)
+    chosen = make_setup(given, mesh_error=lambda setup: 0.001)
+    assert chosen.scene.kind == "reference"
+    with pytest.raises(InputError, match=r"reference needs about .* GB of memory"):
+        make_setup(given, nodes=ClusterNodes(memory=3e7), mesh_error=lambda setup: 0.001)
+
+
+def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
+    monkeypatch.setattr(mesh_accuracy, "_MOST_UNKNOWNS", 1000)
+    setup = make_setup(scene(**FEW_WAVES), mesh_error=lambda setup: 0.001)
+    assert setup.scene.kind == "concurrent"
+    assert not setup.decision.kept and "is not kept" in setup.decision.warning
+
+
+def test_a_spectrum_needs_no_grid_beside_an_accuracy():
+    open_grid, auto = scene("analytic"), scene("analytic", surface={"grid": "auto"})
+    assert auto_keys(open_grid) == auto_keys(auto)
+    assert make_setup(open_grid).surface.grid == make_setup(auto).surface.grid
+    with pytest.raises(InputError, match="a 'spectrum' needs 'grid' and 'lengths' beside it"):
+        scene("analytic", None)

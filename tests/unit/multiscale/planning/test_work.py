@@ -1,0 +1,192 @@
+"""Counted work against what runs compute, and what is said of it."""
+
+from __future__ import annotations
+
+import math
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from geometry import BlockShape
+from micro import HalfSpaceModel
+from multiscale import Run, Scene, make_setup
+from multiscale.loading.stepper import LoadHistory
+from multiscale.output.terminal import Pace
+from multiscale.planning import work
+from multiscale.planning.auto_keys import SOLUTIONS_OF_LAWS
+from multiscale.planning.memory_costs import Launch, step_count
+from multiscale.planning.work import magnitude, work_of
+from multiscale.setup.reference_meshes import mesh_unknowns
+
+
+def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 8], "rms_slope": 0.215, "seed": 1}
+    return Scene.from_dict(
+        {
+            "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
+            "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": list(cells)},
+            "micro": {"model": "half-space"},
+            "coupling": {"kind": kind},
+            "load": {"approach": 0.008, "steps": 4},
+            "output": {"figures": False, "check": "none"},
+        }
+        | sections
+    )
+
+
+@pytest.fixture
+def solved(monkeypatch):
+    """Load steps that half-spaces are solved for, by their number of cells."""
+    made: dict[int, int] = {}
+    press = HalfSpaceModel.press
+
+    def counted(self, *given, **options):
+        cells = self.surface.heights.size
+        made[cells] = made.get(cells, 0) + 1
+        return press(self, *given, **options)
+
+    monkeypatch.setattr(HalfSpaceModel, "press", counted)
+    return made
+
+
+@pytest.mark.parametrize("kind", ["analytic", "concurrent"])
+@pytest.mark.parametrize(
+    "load", [{"approach": 0.008}, {"force": 2.0}, {"approach": 0.008, "tilt": "free"}]
+)
+def test_a_load_step_is_one_solution(solved, load, kind):
+    run = Run(scene(kind, load=load | {"steps": 4}))
+    solved.clear()
+    list(run.load_steps())
+    counted = work_of(run.setup)
+    assert solved == {counted.cells: counted.solutions} == {64**2: 4}
+
+
+@pytest.mark.parametrize("kind", [pytest.param("consistent", marks=pytest.mark.long), "isolated"])
+def test_rows_of_laws_are_about_as_many_as_counted(solved, kind):
+    run = Run(scene(kind))
+    solved.clear()
+    sizes = [len(law.rows) for law in run.make_laws().laws if len(law.rows)]
+    # the laws of a whole surface share its rows, and each takes some of them
+    rows = solved[64**2] if kind == "consistent" else np.mean(sizes)
+    # refinement takes 33 to 65 rows, and some solutions to find its ends
+    assert SOLUTIONS_OF_LAWS / 1.7 <= rows <= 1.7 * SOLUTIONS_OF_LAWS
+    assert work_of(run.setup).rows == SOLUTIONS_OF_LAWS
+
+
+@pytest.mark.parametrize("element", ["Q1", "Q2"])
+def test_unknowns_of_a_mesh(element):
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 4, 5), element=element)
+    degree = int(element[1])
+    assert mesh_unknowns(shape) == 3 * math.prod(degree * n + 1 for n in (3, 4, 5))
+
+
+@pytest.mark.parametrize("kind", ["analytic", "concurrent"])
+@pytest.mark.parametrize("grid", [64, 128])
+def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind):
+    run = Run(scene(kind, grid=grid, micro={"model": "half-space", "finite_slopes": False}))
+    counted = sum(step.newton_iterations for step in run.load_steps()) * grid**2
+    assert work_of(run.setup).products / 2.0 <= counted <= 2.0 * work_of(run.setup).products
+
+
+@pytest.mark.parametrize("way", ["reference", "full", "condensed"])
+def test_cycles_on_meshes_are_about_as_many_as_counted(way):
+    """An order of magnitude is promised: a factor of 3, the set-up of multigrid aside."""
+    if way == "reference":
+        mesh = {"mesh": "hexahedra", "cells": [16, 16, 8], "meshes": 1}
+        given = scene("reference", reference=mesh)
+    else:
+        coupling = {"kind": "isolated", "newton": way}
+        given = scene(cells=(8, 8, 5), coupling=coupling, micro={"model": "circular"})
+    run = Run(given)
+    list(run.load_steps())
+    counted = work_of(run.setup)
+    assert counted.unknowns == (run.unknowns or counted.unknowns)
+    cycles = counted.cycles / counted.unknowns - work._SET_UP
+    done = sum(step.linear_iterations for step in run.steps)
+    if way == "condensed":  # whose cycles make the compliance, before the first load step
+        assert done == 0
+        assert cycles == work.CYCLES_PER_PATCH * 16
+    else:
+        assert cycles / 3.0 <= done <= 3.0 * cycles
+    run.close()
+
+
+def test_work_grows_with_what_is_asked():
+    def counted(**sections):
+        return work_of(make_setup(scene(**sections)))
+
+    few = counted()
+    assert counted(load={"approach": 0.008, "steps": 40}).products == 10.0 * few.products
+    assert counted(grid=128).products == 4.0 * few.products
+    assert counted(micro={"finite_slopes": False}).products < few.products
+    assert counted(output={"check": "last"}).solutions > few.solutions
+    assert counted(output={"figures": True, "check": "none"}).seconds > few.seconds
+    meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
+    coarse, fine = (counted(kind="reference", reference=mesh) for mesh in meshes)
+    assert coarse.cycles < fine.cycles and coarse.products == 0.0
+    two = work_of(make_setup(scene("reference", reference=meshes[0])), Launch(ranks=2))
+    assert coarse.seconds - coarse.besides == pytest.approx(
+        2.0 * (two.seconds - two.besides), rel=1e-12
+    )
+
+
+def test_steps_that_may_be_halved_are_counted():
+    plain = LoadHistory(quantity="approach", points=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
+    assert step_count(plain) == 6
+    fine = LoadHistory(
+        quantity="approach", points=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05
+    )
+    assert step_count(fine) == 20
+
+
+def test_the_plan_says_work_order_of_time_and_the_largest_part_of_the_memory():
+    launch = Launch(memory=1e6, imported=lambda _: True)
+    flat = {"model": "half-space", "finite_slopes": False}
+    counted = work_of(make_setup(scene(grid=512, cells=(4, 4, 4), micro=flat)), launch)
+    said = dict(counted.statements())
+    # 4 load steps of 30 products each on 512² cells
+    assert "about 4 contact problems, on 262144 cells each: 31000000 cells" in said["work"]
+    assert "of the order of 3 s" in said["cost"]
+    assert "most of it for the contact problem" in said["cost"]
+    assert counted.memory == pytest.approx(sum(counted.parts.values()), rel=1e-12)
+    meshed = make_setup(scene(coupling={"kind": "consistent", "compliance": "finite-element"}))
+    counted = work_of(meshed, launch)
+    assert counted.parts["meshes and laws"] > 0.0
+    assert f"{SOLUTIONS_OF_LAWS} of them rows of laws" in dict(counted.statements())["work"]
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0, "1 s"),
+        (1.8, "3 s"),
+        (50.0, "30 s"),
+        (700.0, "15 min"),
+        (6000.0, "1 h"),
+        (1e9, "240 h"),
+    ],
+)
+def test_orders_of_magnitude(seconds, text):
+    assert magnitude(seconds) == text
+
+
+def test_the_pace_of_a_run_tells_what_is_left_of_it():
+    pace = Pace(4)
+    assert [pace.left(spent) for spent in (30.0, 10.0, 5.0, 1.0)] == [
+        "; about 1 min 30 s left", "; about 40 s left", "; about 15 s left", "",
+    ]  # fmt: skip
+    assert Pace(0).left(3.0) == ""  # of how many parts is not known
+
+
+def test_memory_of_the_contact_problem_is_what_a_run_allocates():
+    data = scene("analytic", grid=256, load={"approach": 0.008, "steps": 1},
+                 micro={"model": "half-space", "finite_slopes": False},
+                 output={"figures": False, "check": "none", "contact": "none"})  # fmt: skip
+    run = Run(data)
+    tracemalloc.start()
+    list(run.load_steps())
+    allocated = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    counted = work_of(run.setup).parts["contact problem"]
+    assert counted / 2.0 < allocated < 2.0 * counted
