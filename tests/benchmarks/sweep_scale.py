@@ -67,7 +67,8 @@ def of_rank(cases: int, keys: list[str], folder: Path) -> None:
         once = float(every[:, 2].mean() - every[:, 3].mean())
         print(json.dumps({
             "ranks": comm.size, "wall": every[:, 7].max(), "cpu": every[:, 1].sum(),
-            "case": float(np.average(every[:, 3], weights=every[:, 0])), "scatter": float(every[:, 4].max()), "once": once,
+            "case": float(np.average(every[:, 3], weights=every[:, 0])),
+            "scatter": float(every[:, 4].max()), "once": once,
             "most": every[:, 0].max(), "fewest": every[:, 0].min(),
             "memory": every[:, 6].max() / 1e6, "grown": (every[:, 6] - every[:, 5]).max() / 1e6,
             "files": len(list((folder / "cases").iterdir())),

@@ -14,7 +14,7 @@ from multiscale.machine import ClusterNodes
 from multiscale.output import terminal
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
-from multiscale.planning import mesh_accuracy, work
+from multiscale.planning import accuracy, mesh_accuracy, work
 from multiscale.planning.auto_keys import (
     SOLUTIONS_OF_LAWS,
     auto_keys,
@@ -41,9 +41,9 @@ STATED = {
 }  # fmt: skip
 
 
-def scene(kind="open", accuracy=0.03, **sections):
+def scene(kind="open", error=0.03, **sections):
     given = {
-        "accuracy": accuracy,
+        "accuracy": error,
         "surface": {"spectrum": SPECTRUM, "lengths": [1.0, 1.0]},
         "block": {"young_modulus": 4037.0, "poisson_ratio": 0.21},
         "load": {"approach": 0.0061, "steps": 2},
@@ -140,7 +140,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
     ("kind", "sections", "why"),
     [
         ("analytic", {"output": {"check": "none"}}, "output.check = 'none'"),
-        ("consistent", {"accuracy": 0.3, "output": {"check": "none"}}, "output.check = 'none'"),
+        ("consistent", {"error": 0.3, "output": {"check": "none"}}, "output.check = 'none'"),
         ("analytic", {"micro": {"model": "circular"}}, "circular contacts have no measure of it"),
         ("isolated", {"micro": {"model": "elliptic-independent"}}, "contacts have no measure"),
         ("reference", {"reference": {"meshes": 1, "fine": 0.08}}, "one mesh has no error bar"),
@@ -187,7 +187,7 @@ def test_laws_are_chosen_where_they_take_fewer_solutions():
     ],
 )
 def test_keys_of_laws_choose_laws(coupling, kind):
-    given = scene(accuracy=None, surface={"grid": [48, 48]}, coupling=coupling | {"kind": "auto"})
+    given = scene(error=None, surface={"grid": [48, 48]}, coupling=coupling | {"kind": "auto"})
     assert chosen_coupling(given)[0].kind == kind
     assert make_setup(given).scene.coupling.kind == kind
 
@@ -226,21 +226,24 @@ def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, speed, thre
 CHOSEN: dict[int, str] = {}
 
 
-FEW_WAVES = {"accuracy": 0.002, "surface": {"spectrum": SPECTRUM | {"waves": [2, 3]}}}
+HARD = 2e-4
+"""An accuracy that finite slopes alone exceed, on any cells."""
 
 
-def test_a_choice_does_not_know_how_much_memory_there_is():
+def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
     """The rule's meshes are taken, or refused with what they need; no other way is taken."""
-    given = scene(**FEW_WAVES)
-    chosen = make_setup(given, mesh_error=lambda setup: 0.001)
+    monkeypatch.setattr(accuracy, "_TRIALS", 1)  # of cells
+    given = scene(error=HARD)
+    chosen = make_setup(given, mesh_error=lambda setup: 1e-4)
     assert chosen.scene.kind == "reference"
     with pytest.raises(InputError, match=r"reference needs about .* GB of memory"):
-        make_setup(given, nodes=ClusterNodes(memory=3e7), mesh_error=lambda setup: 0.001)
+        make_setup(given, nodes=ClusterNodes(memory=3e7), mesh_error=lambda setup: 1e-4)
 
 
 def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
     monkeypatch.setattr(mesh_accuracy, "_MOST_UNKNOWNS", 1000)
-    setup = make_setup(scene(**FEW_WAVES), mesh_error=lambda setup: 0.001)
+    monkeypatch.setattr(accuracy, "_TRIALS", 1)
+    setup = make_setup(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"
     assert not setup.decision.kept and "is not kept" in setup.decision.warning
 

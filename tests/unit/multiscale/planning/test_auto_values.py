@@ -61,14 +61,6 @@ def test_the_model_is_chosen_for_the_largest_approach_anywhere():
     assert_chosen_for(load, approach=0.009, solutions=9)
 
 
-@pytest.mark.parametrize("tilt", [[0.0, 0.0], "free"])
-def test_under_a_force_a_half_space_tells_the_largest_approach(tilt):
-    load = {"force": 1.0, "tilt": tilt}
-    plane = make_setup(scene(load, model="half-space")).plane_at_largest_load
-    rise = 0.5 * (abs(plane.tilt[0]) + abs(plane.tilt[1]))
-    assert_chosen_for(load, approach=plane.approach + rise, solutions=8)  # both on 64² cells
-
-
 def test_a_chosen_asperity_model_counts_and_warns_as_a_stated_one():
     load, waves = {"approach": 0.01}, (2, 4)
     setup = make_setup(scene(load, waves=waves, model="auto", tolerance=0.45))

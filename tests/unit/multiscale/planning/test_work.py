@@ -29,7 +29,7 @@ def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
             "micro": {"model": "half-space"},
             "coupling": {"kind": kind},
             "load": {"approach": 0.008, "steps": 4},
-            "output": {"figures": False, "check": "none"},
+            "output": {"figures": False, "report": False, "check": "none"},
         }
         | sections
     )
@@ -105,7 +105,6 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     cycles = counted.cycles / counted.unknowns - work._SET_UP
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step
-        assert done == 0
         assert cycles == work.CYCLES_PER_PATCH * 16
     else:
         assert cycles / 3.0 <= done <= 3.0 * cycles
@@ -121,7 +120,8 @@ def test_work_grows_with_what_is_asked():
     assert counted(grid=128).products == 4.0 * few.products
     assert counted(micro={"finite_slopes": False}).products < few.products
     assert counted(output={"check": "last"}).solutions > few.solutions
-    assert counted(output={"figures": True, "check": "none"}).seconds > few.seconds
+    figures = {"figures": True, "report": False, "check": "none"}
+    assert counted(output=figures).seconds > few.seconds
     meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
     coarse, fine = (counted(kind="reference", reference=mesh) for mesh in meshes)
     assert coarse.cycles < fine.cycles and coarse.products == 0.0
