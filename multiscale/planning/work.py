@@ -50,15 +50,17 @@ class Work:
     """What a run computes.
 
     Attributes:
-        cells: Cells of its contact problem, of one patch under isolated laws; 0 without cells.
+        cells: Cells of its contact problem, which isolated laws share; of asperities the pairs that
+            interact; 0 where contact is meshed.
         solutions: Contact problems that are solved, error check and rows of laws included.
         rows: Rows of laws; 0 without laws.
-        products: Cells times products with the compliance, of all contact problems.
+        products: Cells or pairs times products with the compliance, of all contact problems.
         unknowns: Degrees of freedom of all meshes; 0 without meshes.
         cycles: Unknowns times multigrid cycles, of all meshes.
         besides: Time of imports and output [s].
         ranks: Processes that share the meshes.
         parts: Memory of each part of the first process, held together at its largest [B].
+        of_pairs: Whether pairs of asperities are counted instead of cells.
     """
 
     cells: int
@@ -70,6 +72,7 @@ class Work:
     besides: float
     ranks: int
     parts: dict[str, float]
+    of_pairs: bool = False
 
     @property
     def seconds(self) -> float:
@@ -87,14 +90,15 @@ class Work:
         counted = []
         if self.cells:
             laws = f", {self.rows} of them rows of laws" if self.rows else ""
+            what = "pairs" if self.of_pairs else "cells"
             counted.append(
-                f"about {self.solutions:.0f} contact problems{laws}, on {self.cells} cells each: "
-                f"{number(self.products, 2)} cells × products"
+                f"about {self.solutions:.0f} contact problems{laws}, on {self.cells} {what} each: "
+                f"{_millions(self.products)} {what} × products"
             )
-        if self.unknowns:
+        if self.cycles:
             counted.append(
-                f"meshes of about {number(self.unknowns, 2)} unknowns: "
-                f"{number(self.cycles, 2)} unknowns × multigrid cycles"
+                f"meshes of about {_millions(self.unknowns)} unknowns: "
+                f"{_millions(self.cycles)} unknowns × multigrid cycles"
             )
         if counted:
             yield "work", "; ".join(counted)
@@ -105,6 +109,10 @@ class Work:
             f"its own pace after its first load step; {self.memory / 1e6:.0f} MB, most of it for "
             f"the {largest}",
         )
+
+
+def _millions(count: float) -> str:
+    return f"{number(1e-6 * count, 2)} million"
 
 
 def magnitude(seconds: float) -> str:
@@ -139,6 +147,7 @@ def work_of(setup: ProblemSetup, launch: Launch | None = None) -> Work:
         besides=_START + _PICTURES * bool(output.figures or output.report),
         ranks=launch.ranks,
         parts=memory_parts(setup, launch),
+        of_pairs=not isinstance(setup.micro, HalfSpaceModel),
     )
 
 
@@ -157,7 +166,7 @@ def _contact_work(setup: ProblemSetup, steps: int, rows: int) -> tuple[int, floa
     pairs = 0
     if isinstance(setup.micro, AsperityModel):  # which interact by a matrix of pairs
         pairs = int(setup.interfering_summits.sum()) ** 2
-    return setup.surface.heights.size, solutions, solutions * pairs * _PRODUCTS
+    return pairs, solutions, solutions * pairs * _PRODUCTS
 
 
 def _mesh_work(setup: ProblemSetup, steps: int, rows: int, launch: Launch) -> tuple[int, float]:

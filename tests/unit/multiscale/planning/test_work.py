@@ -146,7 +146,7 @@ def test_the_plan_says_work_order_of_time_and_the_largest_part_of_the_memory():
     counted = work_of(make_setup(scene(grid=512, cells=(4, 4, 4), micro=flat)), launch)
     said = dict(counted.statements())
     # 4 load steps of 30 products each on 512² cells
-    assert "about 4 contact problems, on 262144 cells each: 31000000 cells" in said["work"]
+    assert "about 4 contact problems, on 262144 cells each: 31 million cells" in said["work"]
     assert "of the order of 3 s" in said["cost"]
     assert "most of it for the contact problem" in said["cost"]
     assert counted.memory == pytest.approx(sum(counted.parts.values()), rel=1e-12)
