@@ -27,9 +27,6 @@ HEIGHTS_PER_WAVE = 3
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""
 
-FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
-"""Elliptic asperities with curvatures at the scale of contacts, those on the border included."""
-
 _NO_OUTPUT: Content = {
     "figures": False,
     "report": False,
@@ -101,7 +98,7 @@ def name_of(content: Content) -> str:
     name = kind
     if kind in ("isolated", "consistent"):
         name += f", {_times(content['patches']['grid'])} patches"
-    name += f", {model}" + ", fitted" * (micro == FITTED)
+    name += f", {model}"
     if model == "half-space":
         name += f" {_times(surface['grid'])}"
     name += f", {_times(cells)} elements" if cells else ""

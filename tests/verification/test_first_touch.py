@@ -9,7 +9,7 @@ import pytest
 from hard_cases import KINDS, history, scene
 
 from geometry import PatchGrid, patch_means
-from micro.choice.models import MODEL_NAMES
+from micro import MODEL_NAMES
 from multiscale.planning.problem_setup import stated_model
 from multiscale.setup.surface_and_block import make_surface
 

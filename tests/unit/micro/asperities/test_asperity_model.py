@@ -6,7 +6,7 @@ from asperity_states import displacement, interference, surface_displacement
 
 from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, micro_model
-from micro.interaction.patch_sums import patch_loads
+from micro.asperities.patch_sums import patch_loads
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

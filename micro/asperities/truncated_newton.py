@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
 from geometry.errors import NotConverged
-from micro.interaction.contact_problem import (
+from micro.asperities.contact_problem import (
     TOLERANCE,
     ContactProblem,
     InteractionDisplacement,

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from asperity_states import places
+from micro.interaction import contact_problem
 
 from geometry import InputError, NotConverged
-from micro.closed_forms.hertz import shape_factors
-from micro.interaction import contact_problem
-from micro.interaction.contact_problem import (
+from micro.asperities.contact_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,
     ContactProblem,
@@ -15,7 +14,8 @@ from micro.interaction.contact_problem import (
     checked_pairs,
     solve,
 )
-from micro.interaction.hertz_pairs import HertzPairs
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.closed_forms.hertz import shape_factors
 
 
 @pytest.fixture
