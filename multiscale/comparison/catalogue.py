@@ -106,7 +106,8 @@ class _Catalogue:
     def __init__(self, scene: Scene) -> None:
         content, self._scene, self._patches = content_of(scene), scene, patch_grid(scene)
         # Every key of a configuration is stated, so that no accuracy chooses one.
-        self._accuracy = content.pop("accuracy", None)
+        self._accuracy, self._own_micro = content.pop("accuracy", None), content["micro"]
+        content["micro"] = scene.micro.model_dump(mode="json", exclude_none=True)
         # Only laws need a mesh of the block.
         content["block"].pop("cells", None)
         cells = block_section(scene).cells
@@ -122,7 +123,8 @@ class _Catalogue:
     def proposals(self) -> Iterator[Configuration]:
         """Yield all proposals, the scene itself first."""
         own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
-        made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
+        open_or_stated = {"accuracy": self._accuracy, "micro": self._own_micro}
+        made = self._proposal(self._base["coupling"], **open_or_stated, **own)
         yield replace(made, name=f"{OWN}: {made.name}")
         for model in MODELS:
             yield self._proposal({"kind": "analytic"}, {"model": model})

@@ -70,7 +70,7 @@ class Configuration:
     @property
     def model(self) -> str:
         """The micro model; empty for an explicit reference."""
-        return "" if self.kind == "reference" else str(self.content["micro"]["model"])
+        return "" if self.kind == "reference" else self.scene.micro.model
 
     @property
     def heights(self) -> Grid:

@@ -11,8 +11,8 @@ from typing import Any, get_origin
 from pydantic import BaseModel, ValidationError
 
 from geometry.errors import InputError
+from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
-from multiscale.scene.removed import refuse_removed
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")

@@ -31,7 +31,6 @@ def block(**keys):
 
 OPEN = {
     "patches": {"grid": "auto"},
-    "micro": {"model": "auto"},
     "coupling": {"kind": "auto"},
     "block": block(cells="auto"),
 }
@@ -118,7 +117,7 @@ def test_cells_are_left_to_the_plan_only_under_laws_on_a_mesh():
         {"coupling": {"kind": "isolated"}},
         {"block": block(cells=[10, 10, 6])},
         {"micro": {"model": "elliptic"}},
-        {"micro": {"border": "include"}},
+        {"micro": {"model": "half-space", "finite_slopes": False}},
     ],
 )
 def test_stated_keys_are_respected(stated):

@@ -34,9 +34,6 @@ COUPLINGS = {
     "half-space": ALONE,
     "half-space, balanced force": ALONE | {"load": FORCE},
     "asperities": ALONE | {"micro": {"model": "elliptic"}},
-    "asperities fitted to the contacts": ALONE
-    | {"micro": {"model": "elliptic", "curvature": "contact", "border": "include"}},
-    "islands": ALONE | {"micro": {"model": "islands"}},
     "condensed, halved steps": CUBE
     | {"coupling": {"kind": "isolated", "newton": "condensed"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
@@ -449,7 +446,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
         "block": {"cells": "auto"},
         "patches": {"grid": "auto"},
         "coupling": {"kind": "auto"},
-        "micro": {"model": "auto"},
+        "micro": None,
     }).model_copy(update={"accuracy": 0.4})  # fmt: skip
     whole = Run(left_open)
     next(steps := whole.load_steps())
