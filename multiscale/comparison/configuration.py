@@ -70,7 +70,11 @@ class Configuration:
     @property
     def model(self) -> str:
         """The micro model; empty for an explicit reference."""
-        return "" if self.kind == "reference" else self.scene.micro.model
+        return (
+            ""
+            if self.kind == "reference"
+            else str(self.content["micro"].get("model", "half-space"))
+        )
 
     @property
     def heights(self) -> Grid:

@@ -14,7 +14,7 @@ from filelock import FileLock, Timeout
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from multiscale.removed import refuse_removed, without_removed
+from multiscale.removed import refuse_removed_results, without_removed
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, read_checkpoint
 from multiscale.run import Run
 from multiscale.scene.keys import dotted
@@ -136,12 +136,9 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
         return None
     found = read_checkpoint(path)
     try:
-        refuse_removed(without_removed(found.scene))
+        refuse_removed_results(found.scene)
     except InputError as error:
-        problem = f"{error.problem}, and so are runs with it; run without --resume to begin anew"
-        raise InputError(
-            problem, file=str(path), key=error.key, value=error.value, allowed=error.allowed
-        ) from None
+        raise error.located(file=str(path)) from None
     _refuse_changed_keys(folder, scene, found.scene)
     return found
 

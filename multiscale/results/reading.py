@@ -14,7 +14,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.removed import refuse_removed, without_removed
+from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
 
 _TEXT = "reason"
@@ -39,7 +39,7 @@ def read_history(folder: str | Path) -> History:
     path = folder / "provenance.json"
     try:
         provenance = json.loads(path.read_text(encoding="utf-8"))
-        refuse_removed(without_removed(provenance["scene_given"]))
+        refuse_removed_results(provenance["scene_given"])
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
         patches: PatchGrid | Regions
         if grid is None:

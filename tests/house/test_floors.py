@@ -45,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "readable",
+        "readable removed",
         "figures installation machine storage",
         "doctor laws loading",
         "compiled_forms exports results scene",

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
+from micro import MODEL_NAMES
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.compare import resolved_scene
 from multiscale.comparison.configuration import Curves, RunResult
