@@ -24,6 +24,7 @@ from multiscale.restart.checkpoint import (
     write_checkpoint,
 )
 from multiscale.restart.results_folder import FolderLock, find_checkpoint, go_on
+from multiscale.scene.sections import MicroSection
 from multiscale.storage import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -446,8 +447,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
         "block": {"cells": "auto"},
         "patches": {"grid": "auto"},
         "coupling": {"kind": "auto"},
-        "micro": None,
-    }).model_copy(update={"accuracy": 0.4})  # fmt: skip
+    }).model_copy(update={"accuracy": 0.4, "micro": MicroSection()})  # fmt: skip
     whole = Run(left_open)
     next(steps := whole.load_steps())
     path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.state()))
