@@ -105,7 +105,7 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def stiffness(self, state: Any, *, turns: bool) -> tuple[float | None, int]:
+    def stiffness(self, state: Any, *, turns: bool) -> tuple[float, int]:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
         Args:
@@ -113,7 +113,7 @@ class MicroModel(Protocol):
             turns: Whether the plane turns without moment; otherwise its slopes stay.
 
         Returns:
-            The stiffness [N/mm], None where no linear solution gives it, and the iterations.
+            The stiffness [N/mm], and the iterations.
         """
 
 

@@ -7,10 +7,10 @@ from typing import Any
 
 from geometry.errors import InputError
 
+_INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
 _MODELS = ("islands", "auto")
 _KEYS: Mapping[str, Any] = {"curvature": "summit", "border": "ignore", "tolerance": None}
 """Keys of ``[micro]`` that are gone, with what they were when not given."""
-_INSTEAD = "micro.model = 'half-space', on a coarser surface.grid where speed matters"
 
 
 def refuse_removed(scene: Any) -> None:
@@ -27,9 +27,10 @@ def refuse_removed(scene: Any) -> None:
         return
     if micro.get("model") in _MODELS:
         raise InputError("is gone", key="micro.model", value=micro["model"], allowed=_INSTEAD)
-    for name in _KEYS.keys() & micro:
-        allowed = "leave it out" if micro[name] == _KEYS[name] else _INSTEAD
-        raise InputError("is gone", key=f"micro.{name}", value=micro[name], allowed=allowed)
+    for name, default in _KEYS.items():
+        if name in micro:
+            allowed = "leave it out" if micro[name] == default else _INSTEAD
+            raise InputError("is gone", key=f"micro.{name}", value=micro[name], allowed=allowed)
 
 
 def refuse_removed_results(scene: Mapping[str, Any]) -> None:

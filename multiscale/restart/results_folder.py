@@ -253,10 +253,8 @@ def _scene_of_results(folder: Path) -> dict[str, Any]:
 
 def _changes(now: Scene, then: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
     """Yield the keys that have changed and can matter, with their present and former values."""
-    old, new = (
-        dict(dotted(without_removed(then))),
-        dict(dotted(now.model_dump(by_alias=True, mode="json"))),
-    )
+    old = dict(dotted(without_removed(then)))
+    new = dict(dotted(now.model_dump(by_alias=True, mode="json")))
     for key in dict.fromkeys((*new, *old)):
         if not key.startswith("output.") and old.get(key) != new.get(key):
             yield key, new.get(key), old.get(key)

@@ -55,11 +55,10 @@ def press(model, **given):
     return model.press(Control(**given), patches=PATCHES, mean_heights=MEANS)
 
 
-@pytest.mark.parametrize("name", ["elliptic", "circular"])
-def test_keeps_the_error_it_has_on_a_half_space(bodies, name):
+def test_keeps_the_error_it_has_on_a_half_space(bodies):
     """Contacts at a tenth of the face are not points to a body 0.1 mm high: 5 % for them."""
     body, reference = bodies
-    alone = micro_model(name, SURFACE, contact_modulus=MODULUS)
+    alone = micro_model("elliptic", SURFACE, contact_modulus=MODULUS)
     model = replace(alone, body=body)
     endless = replace(reference, sides=None, body=None)
     known = press(alone, approach=APPROACH).response.force[0]
