@@ -17,7 +17,7 @@ from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 from multiscale.comparison.launch import check_launchable, launch_process
-from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
+from multiscale.planning.auto_keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
@@ -114,17 +114,16 @@ def compare(
 
 
 def resolved_scene(scene: Scene, folder: Path) -> Scene:
-    """Return a scene with values for all keys that are ``auto``, but for the micro model.
+    """Return a scene with values for all keys that are ``auto``.
 
-    The values are stored. Another call might measure other times on a busy machine, and then
-    choose, for example, other patches.
+    The values are stored, so that another call need not measure errors again.
 
     Args:
         scene: The scene.
         folder: Folder of the results.
     """
-    auto = auto_keys(scene)
-    if auto <= {"micro.model"}:
+    sized = scene.kind != "reference" or not is_measured(scene)
+    if auto_keys(scene) <= {"micro.model"} and sized:
         return scene
     path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
     values = None
@@ -134,7 +133,7 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     if values is None:
         values = resolved_sections(make_setup(scene), scene)
         write_json(path, {"scene": given, "sections": values})
-    return provisional(with_resolved(scene, values), auto & {"micro.model"})
+    return with_resolved(scene, values)
 
 
 def reference_within(

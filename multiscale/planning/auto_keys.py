@@ -69,18 +69,15 @@ def accuracy_of(scene: Scene) -> float:
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
-    With an accuracy they are wherever a key is open that errors depend on, the edges of a
-    reference's meshes among them. Without an accuracy, a micro model that is the only auto value
-    besides patches and cells is chosen by its own error, see `micro.choose`.
+    They are wherever a key is open that errors depend on, with an accuracy the edges of a
+    reference's meshes among them.
 
     Args:
         scene: The scene as it was given.
     """
-    auto = auto_keys(scene)
-    if scene.accuracy is None:
-        return not auto <= {"micro.model", "patches.grid", "block.cells"}
-    meshed = scene.kind == "reference" and scene.reference.sizes_are_open
-    return meshed or bool(auto & {"surface.grid", "micro.model", "coupling.kind"})
+    opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
+    sized = scene.accuracy is None or not scene.reference.sizes_are_open
+    return opened or (scene.kind == "reference" and not sized)
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
@@ -90,12 +87,7 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
         scene: The scene as it was given.
         auto: Its auto keys.
     """
-    measured = is_measured(scene) and scene.micro.tolerance is None
-    start: dict[str, Any] = {
-        "micro.model": "half-space" if measured else "auto",
-        "block.cells": None,
-        "patches.grid": PROVISIONAL_PATCHES,
-    }
+    start: dict[str, Any] = {"block.cells": None, "patches.grid": PROVISIONAL_PATCHES}
     changed = scene
     if "coupling.kind" in auto:
         changed = scene.model_copy(update={"coupling": chosen_coupling(scene)[0]})
@@ -128,7 +120,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
 
     Returns:
         The sections with auto values by name, as JSON can hold them. That of the micro model is the
-        label of the candidate that was chosen, or the cells of the half-space.
+        cells of the half-space.
     """
     names = {key.partition(".")[0] for key in auto_keys(given)}
     if is_measured(given):
@@ -137,9 +129,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     for name in sorted(names):
         section = getattr(setup.scene, name)
         found[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    if setup.choice is not None:
-        found["micro"] = setup.choice.taken.label
-    elif "micro" in names:
+    if "micro" in names:
         model = setup.micro
         found["micro"] = list(model.surface.grid) if isinstance(model, HalfSpaceModel) else None
     return found
@@ -157,8 +147,6 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         for name, content in resolved.items()
         if name != "micro"
     }
-    if isinstance(resolved.get("micro"), list):
-        changed["micro"] = scene.micro.model_copy(update={"model": "half-space"})
     return scene.model_copy(update=changed)
 
 

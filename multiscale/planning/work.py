@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from micro import AsperityModel, HalfSpaceModel
+from micro import HalfSpaceModel
 from multiscale.couplings.assembly import CYCLES_PER_PATCH, full_cycles, newton_choice
 from multiscale.planning.auto_keys import SOLUTIONS_OF_LAWS
 from multiscale.planning.memory_costs import Launch, checks_finer, memory_parts, step_count
@@ -163,9 +163,7 @@ def _contact_work(setup: ProblemSetup, steps: int, rows: int) -> tuple[int, floa
             solutions += each * (steps if output.check == "all" else 1)
         factor = _SLOPES if setup.finite_slopes else 1.0
         return cells, solutions, solutions * cells * _PRODUCTS * factor
-    pairs = 0
-    if isinstance(setup.micro, AsperityModel):  # which interact by a matrix of pairs
-        pairs = int(setup.interfering_summits.sum()) ** 2
+    pairs = int(setup.interfering_summits.sum()) ** 2  # which interact by a matrix
     return pairs, solutions, solutions * pairs * _PRODUCTS
 
 
