@@ -89,7 +89,7 @@ def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Config
     cost, refusal, surface = float("inf"), "", json.dumps(proposal.content["surface"])
     try:
         setup = make_setup(proposal.scene, like=setups.get(surface))
-        cost = work_of(setup).seconds
+        cost = work_of(setup).computing
         setups.setdefault(surface, setup)
     except (InputError, NotConverged) as error:
         if proposal.kind != "reference" or not isinstance(error, MemoryLacking):

@@ -155,7 +155,7 @@ def accuracies(numbers):
         off = step.force_N / true - 1.0
         rows.append((wanted, off, bar / true))
         print(
-            f"{number:3d} {kind:10s} {run.setup.decision.taken.label}: asked {wanted:.0%}, off by "
+            f"{number:3d} {kind:10s} {run.setup.decision.taken}: asked {wanted:.0%}, off by "
             f"{off:+.2%} ± {bar / true:.2%}, promised {run.setup.decision.error:.2%}, {own:.0f} s "
             f"and {time.perf_counter() - began - own:.0f} s for the truth",
             flush=True,

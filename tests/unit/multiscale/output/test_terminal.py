@@ -15,7 +15,7 @@ from multiscale.loading.stepper import LoadHistory
 from multiscale.output import terminal
 
 LOADS = LoadHistory(quantity="approach", points=(8e-3,), steps=4, tilt=(0.0, 0.0))
-STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5)
+STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)
 
 
 def shown_on(rank, capsys):
@@ -33,7 +33,7 @@ def test_a_line_for_each_tenth_under_mpirun(capsys):
         "10", "20", "30", "39", "49", "59", "68", "78", "88", "97",
     ]  # fmt: skip
     assert tenths[0] == "rows of laws: 10 of at most 97"
-    assert step == "load step 1/4: 8 µm, 1.234 kN"
+    assert step == "load step 1/4: 8 µm, 1.234 kN; about 21 s left"
 
 
 def test_other_ranks_are_silent(capsys):

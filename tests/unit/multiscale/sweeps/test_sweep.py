@@ -208,7 +208,7 @@ def test_command_writes_cases_histories_and_statistics(file, tmp_path, capsys, m
     words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(out)]
     assert main([*words, "--set", "output.figures=true"]) == 0
     shown = capsys.readouterr().out
-    assert "3 cases on 1 rank: about " in shown
+    assert "3 cases on 1 rank\n" in shown
     assert "3 of 3 cases are done" in shown
     cases, steps, found = (rows(out / f"{name}.csv") for name in ("cases", "history", "statistics"))
     assert [case["status"] for case in cases] == 3 * ["done"]
