@@ -124,7 +124,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     """
     names = {key.partition(".")[0] for key in auto_keys(given)}
     if is_measured(given):
-        names.add("reference")
+        names |= {"coupling", "reference"}  # the tolerance of laws, and the edges of meshes
     found = {}
     for name in sorted(names):
         section = getattr(setup.scene, name)

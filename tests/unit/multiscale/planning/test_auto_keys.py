@@ -98,6 +98,10 @@ def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
     assert setup.decision.kept
     assert setup.scene.coupling.kind == "consistent"
     assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
+    stated = scene(accuracy=0.2, coupling={"kind": "consistent"}, load=load)
+    begun = make_setup(stated)
+    again = make_setup(stated, json.loads(json.dumps(resolved_sections(begun, stated))))
+    assert again.table_tolerance == begun.table_tolerance == setup.table_tolerance
 
 
 def test_patches_are_no_more_than_the_elements_that_are_stated():
