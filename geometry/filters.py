@@ -7,9 +7,11 @@ import math
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import uniform_filter
 
+from geometry.checks import is_level
 from geometry.interpolant import Interpolant
+from geometry.missing import filled
 
 Array = NDArray[np.float64]
 
@@ -20,8 +22,13 @@ _REACH = 1.0
 """Distance at which the Gaussian weight is cut, over the cut-off; 6e-7 of its height is left."""
 
 _NEIGHBOURHOOD, _SPIKE = 5, 10.0
-"""Cells along a side of the neighbourhood whose median a height is compared with, and robust
-standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
+"""Cells along a side of the neighbourhood whose median a height is compared with, and standard
+deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
+
+_AT_ONCE = 2**20
+"""Heights whose medians are taken at once; they take 120 bytes each."""
+_FEWEST_CODES = 3
+"""Heights of exactly the same value that make it a code."""
 
 
 def smoothed(
@@ -58,24 +65,85 @@ def smoothed(
     return np.ascontiguousarray(heights)
 
 
-def spikes(heights: Array, *, periodic: bool = False) -> NDArray[np.bool_]:
-    """Find heights that stand out of their neighbourhood: dust and errors of an instrument.
+def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+    """Find heights that stand out of their neighbourhood: dust, errors of an instrument, codes.
 
-    A spike differs from the median around it by more than 10 robust standard deviations of such
-    differences. The median is taken along x, then along y; it keeps steps and edges.
+    * A height that differs from the median around it by more than 10 robust standard deviations of
+      such differences. The median is taken along x, then along y; it keeps steps and edges. Where a
+      neighbour is missing, the height itself stands for it.
+    * A height most of whose neighbours are missing, when it is further than 10 standard deviations
+      of the others from the membrane that hangs between those.
+    * The lowest or highest value, when several heights have exactly it and its distance from all
+      others is more than their range: it means "no data".
 
     Args:
-        heights: Heights without gaps, shape (nx, ny) [mm].
-        periodic: Whether the heights continue periodically.
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
+        spacing: Sides (dx, dy) of a cell [mm].
     """
-    mode, median = "wrap" if periodic else "nearest", heights
-    for size in ((_NEIGHBOURHOOD, 1), (1, _NEIGHBOURHOOD)):
-        median = median_filter(median, size, mode=mode)
-    difference = np.abs(heights - median)
-    some = difference[difference > 0.0]
-    if not some.size:
-        return np.zeros(heights.shape, dtype=np.bool_)
-    return np.asarray(difference > _SPIKE * 1.4826 * float(np.median(some)))
+    known = np.isfinite(heights)
+    difference = np.abs(heights - _median(_median(heights).T).T)
+    some = difference[known & (difference > 0.0)]
+    found = np.zeros(heights.shape, dtype=np.bool_)
+    if some.size:
+        found = known & (difference > _SPIKE * 1.4826 * float(np.median(some)))
+    found |= _lonely_spikes(np.where(found, np.nan, heights), spacing)
+    return found | _codes(np.where(found, np.nan, heights))
+
+
+def _median(rows: Array) -> Array:
+    """Return medians of five along the first axis.
+
+    What is missing, or beyond the border, lies on the line through the two heights on the other
+    side; where these are missing too the middle one stands for it.
+    """
+    if rows.size > _AT_ONCE and rows.shape[1] > 1:
+        half = rows.shape[1] // 2
+        return np.hstack([_median(rows[:, :half]), _median(rows[:, half:])])
+    padded = np.pad(rows, ((2, 2), (0, 0)), constant_values=np.nan)
+    far_below, below, here, above, far_above = (padded[k : k + len(rows)] for k in range(5))
+    window = np.stack(
+        [
+            np.where(np.isnan(far_below), 4.0 * above - 3.0 * far_above, far_below),
+            np.where(np.isnan(below), 3.0 * above - 2.0 * far_above, below),
+            here,
+            np.where(np.isnan(above), 3.0 * below - 2.0 * far_below, above),
+            np.where(np.isnan(far_above), 4.0 * below - 3.0 * far_below, far_above),
+        ]
+    )
+    window = np.where(np.isnan(window), here, window)
+    return np.where(np.isnan(rows), np.nan, np.partition(window, 2, axis=0)[2])
+
+
+def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+    """Find heights among missing ones that are far from the membrane between all others."""
+    known = np.isfinite(heights)
+    lonely = np.zeros_like(known)
+    if known.all():
+        return lonely
+    around = [
+        uniform_filter(part.astype(float), _NEIGHBOURHOOD, mode="constant")
+        for part in (known, np.ones_like(known))
+    ]
+    lonely = known & (around[0] < 0.5 * around[1])
+    others = heights[known & ~lonely]
+    if not (lonely.any() and others.size):
+        return lonely & False
+    membrane, _ = filled(np.where(lonely, np.nan, heights), spacing)
+    return np.asarray(lonely & (np.abs(heights - membrane) > _SPIKE * float(others.std())))
+
+
+def _codes(heights: Array) -> NDArray[np.bool_]:
+    """Find a lowest or highest value that means "no data"."""
+    known = np.isfinite(heights)
+    found = np.zeros(heights.shape, dtype=np.bool_)
+    for code in (heights[known].min(), heights[known].max()) if known.any() else ():
+        same = heights == code
+        others = heights[known & ~same]
+        if np.count_nonzero(same) < _FEWEST_CODES or not others.size or is_level(others):
+            continue
+        if float(np.abs(others - code).min()) > float(np.ptp(others)):
+            found |= same
+    return found
 
 
 def regridded(

@@ -59,7 +59,7 @@ def test_scenes_are_equal_when_their_heights_are(heights):
     ("value", "problem"),
     [
         ([1.0, 2.0], "surface.heights.*is no map of heights"),
-        ([["a", "b"]], "is no map of heights"),
+        ([["a", "b"]], "surface.heights.*not an array of real numbers"),
         (np.zeros((2, 2, 2)), "is no map of heights"),
     ],
 )
