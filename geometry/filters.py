@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import scipy.fft
@@ -69,8 +70,7 @@ def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
     """Find heights that stand out of their neighbourhood: dust, errors of an instrument, codes.
 
     * A height that differs from the median around it by more than 10 robust standard deviations of
-      such differences. The median is taken along x, then along y; it keeps steps and edges. Where a
-      neighbour is missing, the height itself stands for it.
+      such differences. The median is taken along x, then along y; it keeps steps and edges.
     * A height most of whose neighbours are missing, when it is further than 10 standard deviations
       of the others from the membrane that hangs between those.
     * The lowest or highest value, when several heights have exactly it and its distance from all
@@ -80,14 +80,21 @@ def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
         heights: Heights, shape (nx, ny) [mm]; not a number where missing.
         spacing: Sides (dx, dy) of a cell [mm].
     """
-    known = np.isfinite(heights)
-    difference = np.abs(heights - _median(_median(heights).T).T)
-    some = difference[known & (difference > 0.0)]
     found = np.zeros(heights.shape, dtype=np.bool_)
-    if some.size:
-        found = known & (difference > _SPIKE * 1.4826 * float(np.median(some)))
-    found |= _lonely_spikes(np.where(found, np.nan, heights), spacing)
-    return found | _codes(np.where(found, np.nan, heights))
+    lonely = partial(_lonely_spikes, spacing=spacing)
+    with np.errstate(over="ignore", invalid="ignore"):  # heights of no scale are refused later
+        for found_by in (_codes, _local_spikes, lonely, _codes):  # what is found misleads no other
+            found |= found_by(np.where(found, np.nan, heights))
+    return found
+
+
+def _local_spikes(heights: Array) -> NDArray[np.bool_]:
+    """Find heights that differ much from the median of their neighbours."""
+    difference = np.abs(heights - _median(_median(heights).T).T)  # not a number where missing
+    some = difference[difference > 0.0]
+    if not some.size:
+        return np.zeros(heights.shape, dtype=np.bool_)
+    return np.asarray(difference > _SPIKE * 1.4826 * float(np.median(some)))
 
 
 def _median(rows: Array) -> Array:
@@ -117,17 +124,14 @@ def _median(rows: Array) -> Array:
 def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
     """Find heights among missing ones that are far from the membrane between all others."""
     known = np.isfinite(heights)
-    lonely = np.zeros_like(known)
-    if known.all():
-        return lonely
-    around = [
+    near, cells = (
         uniform_filter(part.astype(float), _NEIGHBOURHOOD, mode="constant")
         for part in (known, np.ones_like(known))
-    ]
-    lonely = known & (around[0] < 0.5 * around[1])
+    )
+    lonely = known & (near < 0.5 * cells)
     others = heights[known & ~lonely]
     if not (lonely.any() and others.size):
-        return lonely & False
+        return np.zeros_like(known)
     membrane, _ = filled(np.where(lonely, np.nan, heights), spacing)
     return np.asarray(lonely & (np.abs(heights - membrane) > _SPIKE * float(others.std())))
 

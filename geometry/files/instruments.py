@@ -81,7 +81,7 @@ def _library(file: Path) -> Any:
         raise InputError(
             f"the content of this {file.suffix or 'file'} is not known here; ./setup.sh "
             "--instruments installs the readers of instruments' formats",
-            allowed=".npy; text of numbers, under lines that begin with # or have words alone",
+            allowed=".npy; text of numbers, as .txt, .csv or .xyz, under words or comments after #",
         ) from None
 
 

@@ -21,7 +21,7 @@ class _Unit(NamedTuple):
 
 
 _UNITS = {
-    "mm": _Unit('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3, "nm": 1e-6}),
+    "mm": _Unit('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3}),
     "MPa": _Unit('"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3}),
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
