@@ -11,6 +11,7 @@ from pydantic import BaseModel, ValidationError
 
 from geometry.errors import InputError, did_you_mean
 from multiscale.scene.contents import SceneSections
+from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
@@ -154,8 +155,6 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
 
 def _unknown_key(path: list[str], model: type[BaseModel]) -> InputError:
     """Return the error on a key that a section does not have; a very near one may be elsewhere."""
-    from multiscale.scene.keys import scene_keys  # which is made from the scene
-
     known = _known_keys(model, path[:-1])
     tries = ((known, 0.7), (scene_keys(), 0.7), (known, 0.5))
     hints = (did_you_mean(path[-1], names, cutoff=cutoff) for names, cutoff in tries)

@@ -37,7 +37,7 @@ def read_scene_file(path: Path) -> dict[str, Any]:
     content = _content(path)
     if path.suffix.lower() != ".toml" and _may_be_heights(content):
         raise InputError(
-            f"is no scene, it looks like a height map: 'patchlaw init {path}' writes a scene for it",
+            f"is no scene, it looks like a height map: 'patchlaw init {path}' writes one for it",
             file=str(path),
         )
     if len(content) > MOST_BYTES:
