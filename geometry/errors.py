@@ -131,8 +131,8 @@ def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
         known: What could have been meant, the likelier first; of dotted names the last part counts.
         cutoff: Likeness from which words are near, 1 when they differ by case alone.
     """
-    words = {one.rpartition(".")[2].lower(): one for one in reversed(list(known))}
-    near = difflib.get_close_matches(word.lower(), words, n=1, cutoff=cutoff)
+    words = {one.rpartition(".")[2].casefold(): one for one in reversed(list(known))}
+    near = difflib.get_close_matches(word.casefold(), words, n=1, cutoff=cutoff)
     return f"; did you mean '{words[near[0]]}'?" if near else ""
 
 

@@ -116,9 +116,9 @@ def _correction(text: str, target: _Unit) -> str:
     """Return a question where a unit has letters of the wrong case, or a number a decimal comma."""
     number = re.match(r"[\s\d.,+-]*(?:[eE][+-]?\d+)?", text)[0].strip()  # type: ignore[index]
     unit = text.strip()[len(number) :].strip()
-    cased = {one.lower(): one for one in reversed(target.common)}
+    cased = {one.casefold(): one for one in reversed(target.common)}
     pointed = re.sub(r"^([+-]?\d+),(\d+)$", r"\1.\2", number)
-    right = f"{pointed} {cased.get(unit.lower(), unit)}"
+    right = f"{pointed} {cased.get(unit.casefold(), unit)}"
     if right == f"{number} {unit}" or re.search(r",\d{3}$", number):  # which may mark thousands
         return ""
     return f"; did you mean '{right.strip()}'?"
