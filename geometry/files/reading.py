@@ -153,6 +153,11 @@ def _content(file: Path, channel: str | int | None) -> FileContent:
     rows run along x. Any other text is a matrix with the row index ix.
     """
     text = None
+    if file.suffix.lower() == ".npz":
+        raise InputError(
+            "an .npz may hold several arrays, and of masked ones no mask",
+            allowed="one array, by numpy.save to an .npy; masked.filled(numpy.nan) of a masked one",
+        )
     if file.suffix.lower() != ".npy":
         text = load_text(file)
         matrix = text is not None and bool(text.rows)

@@ -135,6 +135,14 @@ def test_arrays_of_other_kinds_are_refused(tmp_path, array):
         read_surface(file, lengths=SIDES)
 
 
+def test_archives_of_arrays_are_refused_as_they_lose_masks(tmp_path):
+    np.savez(tmp_path / "a.npz", np.ma.masked_less(HEIGHTS, 0.0))
+    with pytest.raises(
+        InputError, match=r"a\.npz: an .npz may hold .* \(allowed: one array, by nump"
+    ):
+        read_surface(tmp_path / "a.npz", lengths=SIDES)
+
+
 @pytest.mark.parametrize("name", ["scan.npy", "scan.txt"])
 def test_lengths_are_needed_where_the_file_has_none(tmp_path, name):
     np.save(tmp_path / "scan.npy", HEIGHTS)
