@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from collections.abc import Iterator
 
 import numpy as np
@@ -67,8 +68,10 @@ def number_table(lines: list[Line]) -> tuple[Array, list[str]]:
     if separator != "," and any("," in row for row in rows):
         rows, remarks = _with_points(lines, rows, separator), ["decimal commas"]
     try:
-        matrix = np.loadtxt(io.StringIO("\n".join(rows)), delimiter=separator, ndmin=2)
-    except ValueError as error:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", UserWarning)  # of rows without any number
+            matrix = np.loadtxt(io.StringIO("\n".join(rows)), delimiter=separator, ndmin=2)
+    except (ValueError, UserWarning) as error:
         raise _complaint(lines, rows, separator, str(error)) from None
     check_memory(matrix.size * BYTES_PER_HEIGHT)
     return matrix, remarks

@@ -80,6 +80,7 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.csv", "1,234;2,345\n", "column 1: it is not clear what the comma in '1,234' means"),
         ("a.csv", "1,5;2.5\n", "column 1: it is not clear what the comma in '1,5' means"),
         ("a.txt", "1 2\n1 2,3,4\n", "line 2, column 2: it is not clear .* '2,3,4' means"),
+        ("a.csv", ";\n;\n", "line 1, column 1: the cell is empty"),
         ("a.txt", "1 2 3\n" * 4 + "Mean: 5\n", "line 5, column 1: 'Mean:' is no number"),
         (
             "a.csv",
