@@ -121,10 +121,36 @@ def cells_between(
     return slice(lo, hi)
 
 
-def frozen_array(value: Any) -> NDArray[np.float64]:
-    """Return a contiguous, read-only float64 copy."""
+def real_array(value: Any) -> NDArray[np.float64]:
+    """Return real numbers in double precision; what is masked becomes not a number.
+
+    All arrays of users enter by this way: numpy drops masks and units of others in silence.
+
+    Args:
+        value: Numbers, an array of any memory order and byte order, or a masked one; they are
+            copied only where they have to be.
+
+    Raises:
+        InputError: When it has a unit, or is complex, logical, ragged, or of objects.
+    """
+    allowed = "whole or floating-point numbers"
+    for unit in (getattr(value, "units", None), getattr(value, "unit", None)):
+        if unit is not None:  # of pint, astropy or xarray
+            raise InputError(f"an array with the unit '{unit}'", allowed=f"{allowed} without one")
+    try:
+        array = np.ma.asarray(value)
+    except ValueError:
+        raise InputError("not an array of numbers: its rows differ", allowed=allowed) from None
+    if array.dtype.kind not in "iuf":
+        kind = str(array.dtype)
+        raise InputError("not an array of real numbers", value=kind, allowed=allowed)
     with np.errstate(over="ignore", invalid="ignore"):  # long doubles may become infinite
-        array = np.array(value, dtype=np.float64, order="C")
+        return np.asarray(array.astype(np.float64, copy=False).filled(np.nan))
+
+
+def frozen_array(value: Any) -> NDArray[np.float64]:
+    """Return a contiguous, read-only float64 copy of real numbers, see `real_array`."""
+    array = np.array(real_array(value), order="C")
     array.setflags(write=False)
     return array
 

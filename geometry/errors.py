@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import difflib
+from collections.abc import Iterable, Iterator
 from enum import Enum
 from typing import Any
 
@@ -120,6 +121,19 @@ class OutOfMemory(PatchlawError, RuntimeError):
     """The system gave no more memory; what a run had accepted before is in its last checkpoint."""
 
     exit_code = 5
+
+
+def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str:
+    """Return the end of a sentence that offers the nearest known word; empty when none is near.
+
+    Args:
+        word: What was written; case does not count.
+        known: What could have been meant, the likelier first; of dotted names the last part counts.
+        cutoff: Likeness from which words are near, 1 when they differ by case alone.
+    """
+    words = {one.rpartition(".")[2].casefold(): one for one in reversed(list(known))}
+    near = difflib.get_close_matches(word.casefold(), words, n=1, cutoff=cutoff)
+    return f"; did you mean '{words[near[0]]}'?" if near else ""
 
 
 def _shortened(value: Any) -> str:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter
+from scipy.ndimage import uniform_filter
 
+from geometry.checks import is_level
 from geometry.interpolant import Interpolant
+from geometry.missing import filled
 
 Array = NDArray[np.float64]
 
@@ -20,8 +23,13 @@ _REACH = 1.0
 """Distance at which the Gaussian weight is cut, over the cut-off; 6e-7 of its height is left."""
 
 _NEIGHBOURHOOD, _SPIKE = 5, 10.0
-"""Cells along a side of the neighbourhood whose median a height is compared with, and robust
-standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
+"""Cells along a side of the neighbourhood whose median a height is compared with, and standard
+deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
+
+_AT_ONCE = 2**20
+"""Heights whose medians are taken at once; they take 120 bytes each."""
+_FEWEST_CODES = 3
+"""Heights of exactly the same value that make it a code."""
 
 
 def smoothed(
@@ -58,24 +66,88 @@ def smoothed(
     return np.ascontiguousarray(heights)
 
 
-def spikes(heights: Array, *, periodic: bool = False) -> NDArray[np.bool_]:
-    """Find heights that stand out of their neighbourhood: dust and errors of an instrument.
+def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+    """Find heights that stand out of their neighbourhood: dust, errors of an instrument, codes.
 
-    A spike differs from the median around it by more than 10 robust standard deviations of such
-    differences. The median is taken along x, then along y; it keeps steps and edges.
+    * A height that differs from the median around it by more than 10 robust standard deviations of
+      such differences. The median is taken along x, then along y; it keeps steps and edges.
+    * A height most of whose neighbours are missing, when it is further than 10 standard deviations
+      of the others from the membrane that hangs between those.
+    * The lowest or highest value, when several heights have exactly it and its distance from all
+      others is more than their range: it means "no data".
 
     Args:
-        heights: Heights without gaps, shape (nx, ny) [mm].
-        periodic: Whether the heights continue periodically.
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
+        spacing: Sides (dx, dy) of a cell [mm].
     """
-    mode, median = "wrap" if periodic else "nearest", heights
-    for size in ((_NEIGHBOURHOOD, 1), (1, _NEIGHBOURHOOD)):
-        median = median_filter(median, size, mode=mode)
-    difference = np.abs(heights - median)
+    found = np.zeros(heights.shape, dtype=np.bool_)
+    lonely = partial(_lonely_spikes, spacing=spacing)
+    with np.errstate(over="ignore", invalid="ignore"):  # heights of no scale are refused later
+        for found_by in (_codes, _local_spikes, lonely, _codes):  # what is found misleads no other
+            found |= found_by(np.where(found, np.nan, heights))
+    return found
+
+
+def _local_spikes(heights: Array) -> NDArray[np.bool_]:
+    """Find heights that differ much from the median of their neighbours."""
+    difference = np.abs(heights - _median(_median(heights).T).T)  # not a number where missing
     some = difference[difference > 0.0]
     if not some.size:
         return np.zeros(heights.shape, dtype=np.bool_)
     return np.asarray(difference > _SPIKE * 1.4826 * float(np.median(some)))
+
+
+def _median(rows: Array) -> Array:
+    """Return medians of five along the first axis.
+
+    What is missing, or beyond the border, lies on the line through the two heights on the other
+    side; where these are missing too the middle one stands for it.
+    """
+    if rows.size > _AT_ONCE and rows.shape[1] > 1:
+        half = rows.shape[1] // 2
+        return np.hstack([_median(rows[:, :half]), _median(rows[:, half:])])
+    padded = np.pad(rows, ((2, 2), (0, 0)), constant_values=np.nan)
+    far_below, below, here, above, far_above = (padded[k : k + len(rows)] for k in range(5))
+    window = np.stack(
+        [
+            np.where(np.isnan(far_below), 4.0 * above - 3.0 * far_above, far_below),
+            np.where(np.isnan(below), 3.0 * above - 2.0 * far_above, below),
+            here,
+            np.where(np.isnan(above), 3.0 * below - 2.0 * far_below, above),
+            np.where(np.isnan(far_above), 4.0 * below - 3.0 * far_below, far_above),
+        ]
+    )
+    window = np.where(np.isnan(window), here, window)
+    return np.where(np.isnan(rows), np.nan, np.partition(window, 2, axis=0)[2])
+
+
+def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+    """Find heights among missing ones that are far from the membrane between all others."""
+    known = np.isfinite(heights)
+    near, cells = (
+        uniform_filter(part.astype(float), _NEIGHBOURHOOD, mode="constant")
+        for part in (known, np.ones_like(known))
+    )
+    lonely = known & (near < 0.5 * cells)
+    others = heights[known & ~lonely]
+    if not (lonely.any() and others.size):
+        return np.zeros_like(known)
+    membrane, _ = filled(np.where(lonely, np.nan, heights), spacing)
+    return np.asarray(lonely & (np.abs(heights - membrane) > _SPIKE * float(others.std())))
+
+
+def _codes(heights: Array) -> NDArray[np.bool_]:
+    """Find a lowest or highest value that means "no data"."""
+    known = np.isfinite(heights)
+    found = np.zeros(heights.shape, dtype=np.bool_)
+    for code in (heights[known].min(), heights[known].max()) if known.any() else ():
+        same = heights == code
+        others = heights[known & ~same]
+        if np.count_nonzero(same) < _FEWEST_CODES or not others.size or is_level(others):
+            continue
+        if float(np.abs(others - code).min()) > float(np.ptp(others)):
+            found |= same
+    return found
 
 
 def regridded(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import cell_counts, finite_pair, positive_lengths
+from geometry.checks import cell_counts, finite_pair, positive_lengths, real_array
 from geometry.errors import InputError
 from geometry.surface import Surface
 
@@ -112,7 +112,7 @@ class UnevenPartition(Partition):
 
     def __post_init__(self) -> None:
         for name in ("ticks_x", "ticks_y"):
-            ticks = np.asarray(getattr(self, name), dtype=np.float64)
+            ticks = real_array(getattr(self, name))
             rises = ticks.ndim == 1 and len(ticks) > 1 and np.all(np.diff(ticks) > 0.0)
             if not (rises and np.all(np.isfinite(ticks))):
                 raise InputError(

@@ -13,11 +13,31 @@ STEEPEST = 2.0
 """Rms gradient of the steepest map that is accepted, a slope of 63°. Heights in µm that are taken
 for mm make a map a thousand times as steep."""
 
+_SQUARE, _OBLONG = 0.02, 0.1
+"""Differences of the sides of a cell, over one of them, that are none and that are seen."""
 _MUCH_TILT, _FLATTEST = 0.5, 3e-4
 _LONGEST, _SHORTEST = 200.0, 1e-4
 """Share of the mean plane in the variance, rms gradient and sides [mm] that deserve a note.
 Coordinates in µm that are taken for mm make a map a thousand times as flat: 0.01 to 0.3 become 1e-5
 to 3e-4."""
+
+
+def reading_notes(grid: tuple[int, int], lengths: tuple[float, float]) -> list[str]:
+    """Return a note where a map has square cells on its sides if x and y are swapped, and only so.
+
+    Args:
+        grid: Numbers of heights (nx, ny), as they were read.
+        lengths: Sides (Lx, Ly) that were given [mm].
+    """
+    (nx, ny), (x, y) = grid, lengths
+    dx, dy, dx_swapped, dy_swapped = x / nx, y / ny, x / ny, y / nx
+    if abs(dx_swapped / dy_swapped - 1.0) > _SQUARE or abs(dx / dy - 1.0) < _OBLONG:
+        return []
+    return [
+        f"{nx} × {ny} heights make cells of {1e3 * dx:.3g} × {1e3 * dy:.3g} µm on these sides; "
+        f"with x and y swapped, {ny} × {nx} heights make square ones of {1e3 * dx_swapped:.3g} × "
+        f"{1e3 * dy_swapped:.3g} µm: is a row of the map one along x? Then swap_xy = true"
+    ]
 
 
 def surface_notes(surface: Surface) -> list[str]:

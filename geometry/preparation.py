@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 Interval = tuple[float, float]
 
 _MUCH_MISSING = 0.3
+_RARE = 1e-3
+"""Share of the heights, at either end, that may be rare but right."""
 
 _ORDERS = {"mean": 0, "plane": 1, "quadratic": 2}
 
@@ -28,11 +30,12 @@ class Preparation:
     """What is done to a map, in the order of the arguments.
 
     Args:
+        swap_xy: Whether x and y are exchanged: the map is read with index [iy, ix].
         crop: Rectangle that is kept, intervals along x and along y [mm]; all along an axis that is
             None. Rounded to whole cells.
         outliers: ``remove`` makes spikes missing heights, which are filled; see `spikes`.
-        missing: What is done with missing heights: refuse the map, or ``fill`` them by a membrane,
-            see `geometry.missing.filled`.
+        missing: What is done with missing heights: refuse the map, or ``fill`` them by a membrane
+            between those that are no spikes, see `geometry.missing.filled`.
         form: Form that is removed by least squares: ``none``, ``mean``, ``plane``, ``quadratic``.
         short: Cut-off wavelength below which waves are removed (S-filter) [mm].
         long: Cut-off wavelength beyond which waves are removed (L-filter) [mm].
@@ -43,6 +46,7 @@ class Preparation:
         disturb the filter along the borders of the map.
     """
 
+    swap_xy: bool = False
     crop: tuple[Interval | None, Interval | None] = (None, None)
     outliers: Literal["keep", "remove"] = "keep"
     missing: Literal["refuse", "fill"] = "refuse"
@@ -86,12 +90,13 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
 def completed(
     heights: Array, lengths: tuple[float, float], steps: Preparation
 ) -> tuple[Array, tuple[float, float], list[str], list[str]]:
-    """Crop a map, remove its spikes and fill its gaps.
+    """Crop a map, remove its spikes, then fill its gaps.
 
     Args:
         heights: Heights, shape (nx, ny) [mm]; not a number where missing.
         lengths: Sides (Lx, Ly) [mm].
-        steps: What is done; what comes after the gaps is left to `prepared`.
+        steps: What is done; x and y are swapped already, and what comes after the gaps is left to
+            `prepared`.
 
     Returns:
         Heights without gaps, their sides [mm], what was done, and what a user should know of it.
@@ -115,26 +120,54 @@ def completed(
             allowed="finite heights; missing = 'fill' closes gaps by a membrane",
         )
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
-    whole, share = filled(heights, spacing)
-    if share:
-        done.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
-    if share > _MUCH_MISSING:
-        notes.append(
-            f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and has no "
-            "summits, and forces and contact areas are those of the rest"
-        )
-    outlying = spikes(whole) & ~gaps
-    count = int(np.count_nonzero(outlying))
-    if count and steps.outliers == "remove":
-        whole, _ = filled(np.where(outlying, np.nan, heights), spacing)
-        done.append(f"{count} spikes removed and filled")
-    elif count and (above := float(whole.max() - whole[~outlying].max())) > 0.0:
-        notes.append(
-            f"{count} heights are spikes, out of line with their neighbours; the highest stands "
-            f"{1e3 * above:.3g} µm above all others and touches first; outliers = 'remove' fills "
-            "their places"
-        )
-    return whole, lengths, done, notes
+    outlying = spikes(heights, spacing)
+    known = np.where(outlying, np.nan, heights)
+    removed, kept = steps.outliers == "remove", known[~np.isnan(known)]
+    if outlying.any() and not removed:
+        notes += _on_spikes(heights[outlying], kept)
+    if gaps.any() or (removed and outlying.any()):
+        whole, _ = filled(known, spacing)  # what is no height must not reach into the gaps
+        share, count = float(gaps.mean()), int(np.count_nonzero(outlying))
+        if share:
+            done.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
+        if removed and count:
+            done.append(f"{count} spikes removed and filled")
+        if share > _MUCH_MISSING:
+            notes.append(
+                f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
+                "has no summits, and forces and contact areas are those of the rest"
+            )
+        notes += _on_filling(whole[np.isnan(known)], kept)
+        heights = whole if removed else np.where(outlying, heights, whole)
+    return heights, lengths, done, notes
+
+
+def _on_spikes(spiking: Array, others: Array) -> list[str]:
+    """Return a note on spikes above all other heights, or far below them as no groove is [mm]."""
+    above, below = float(spiking.max() - others.max()), float(others.min() - spiking.min())
+    sizes = []
+    if above > 0.0:
+        sizes.append(f"the highest stands {1e3 * above:.3g} µm above all others and touches first")
+    if below > float(np.ptp(others)):
+        sizes.append(f"the lowest lies {1e3 * below:.3g} µm below all others")
+    if not sizes:
+        return []
+    return [
+        f"{spiking.size} heights are spikes or mean 'no data', out of line with the others; "
+        f"{', '.join(sizes)}; outliers = 'remove' fills their places"
+    ]
+
+
+def _on_filling(inside: Array, others: Array) -> list[str]:
+    """Return a note where what fills gaps is higher or lower than nearly all heights [mm]."""
+    low, high = np.quantile(others, (_RARE, 1.0 - _RARE))
+    beyond = max(float(inside.max() - high), float(low - inside.min()))
+    if beyond <= float(others.std()):
+        return []
+    return [
+        f"what fills gaps reaches {1e3 * beyond:.3g} µm beyond {100 - 200 * _RARE:g} % of the "
+        "heights, as those on the rims of gaps do: they may be errors of the instrument"
+    ]
 
 
 def _cropped(

@@ -40,8 +40,8 @@ class Surface:
     The sample [ix, iy] lies at x = (ix + ½) Lx/nx, y = (iy + ½) Ly/ny.
 
     Args:
-        heights: Heights, shape (nx, ny) [mm]; kept as a read-only float64 copy. Heights that
-            differ by rounding alone become one height.
+        heights: Heights, shape (nx, ny) [mm]; kept as a read-only float64 copy. Masked ones are
+            not a number. Heights that differ by rounding alone become one height.
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         periodic: Whether the heights continue periodically in both directions.
         source: Where the heights came from and what was done to them, for reports.
@@ -262,12 +262,6 @@ class Surface:
 
 
 def _checked_heights(heights: ArrayLike) -> Array:
-    try:
-        kind = np.asarray(heights).dtype.kind
-    except ValueError:  # ragged rows
-        kind = "O"
-    if kind not in "biuf":
-        raise InputError("the heights are not an array of real numbers")
     array = frozen_array(heights)
     if array.ndim != 2 or min(array.shape) < _FEWEST:
         raise InputError(
@@ -279,8 +273,8 @@ def _checked_heights(heights: ArrayLike) -> Array:
     if len(bad):
         first = tuple(int(index) for index in bad[0])
         raise InputError(
-            f"{len(bad)} of {array.size} heights are not finite or of no scale, the first at index "
-            f"{first}",
+            f"{len(bad)} of {array.size} heights are masked, not finite or of no scale, the first "
+            f"at index {first}",
             value=float(array[first]),
             allowed=f"finite heights in mm, within ±{LARGEST:g}",
         )

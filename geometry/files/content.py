@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import process_memory
-from geometry.errors import InputError
+from geometry.checks import process_memory, real_array
+from geometry.errors import InputError, did_you_mean
 
 Array = NDArray[np.float64]
 
@@ -28,16 +28,28 @@ class FileContent:
     """Heights as a file has them.
 
     Args:
-        heights: Heights, shape (nx, ny), in the unit of the file; not a number where missing.
+        heights: Heights, shape (nx, ny), in the unit of the file; not a number where missing or
+            masked.
         lengths: Sides (Lx, Ly) [mm]; None where the file does not say.
         unit: Unit of the heights, a name in `LENGTH_UNITS`; None where the file does not say.
         channel: Name of the channel that was read; empty where a file has only one.
+        remarks: How the file was understood, where it could be read in another way.
     """
 
     heights: Array
     lengths: tuple[float, float] | None = None
     unit: str | None = None
     channel: str = ""
+    remarks: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "heights", real_array(self.heights))
+
+    def swapped(self) -> FileContent:
+        """Return the content with x and y exchanged."""
+        lengths = None if self.lengths is None else self.lengths[::-1]
+        remarks = (*self.remarks, "x and y swapped")
+        return replace(self, heights=self.heights.T, lengths=lengths, remarks=remarks)
 
 
 def length_unit(text: str) -> str:
@@ -51,8 +63,10 @@ def length_unit(text: str) -> str:
     """
     unit = _SPELLINGS.get(text.strip(), text.strip())
     if unit not in LENGTH_UNITS:
+        hint = did_you_mean(unit, LENGTH_UNITS, cutoff=1.0)
         raise InputError(
-            f"the values are in '{text}': they are no heights", allowed=", ".join(LENGTH_UNITS)
+            f"the values are in '{text}': they are no heights{hint}",
+            allowed=", ".join(LENGTH_UNITS),
         )
     return unit
 

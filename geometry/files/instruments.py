@@ -17,17 +17,25 @@ _BYTES_PER_BYTE = 20
 """Memory that readers and the surface take per byte of a file, roughly; heights take 2 to 8 [B]."""
 
 
-def read_instrument(file: Path, channel: str | int | None = None) -> FileContent:
+class UnknownFormat(InputError):
+    """No reader knows what is in a file."""
+
+
+def read_instrument(
+    file: Path, channel: str | int | None = None, *, states_sides: bool = False
+) -> FileContent:
     """Read a channel of an instrument's file, whichever of its readers knows the content.
 
     Args:
         file: The file.
         channel: Name or number of the channel, counted from 0; when not given, the reader's
             default if it holds heights, or else the first that does.
+        states_sides: Whether a file without sides counts as one that no reader knows.
 
     Raises:
-        InputError: When SurfaceTopography is not installed or cannot read the file, when the file
-            is too large, the channel unknown or none of heights, or when it is a profile.
+        UnknownFormat: When SurfaceTopography cannot read the file.
+        InputError: When SurfaceTopography is not installed, the file is too large, the channel
+            unknown or none of heights, or when it is a profile.
     """
     check_memory(file.stat().st_size * _BYTES_PER_BYTE)
     library = _library(file)
@@ -35,13 +43,16 @@ def read_instrument(file: Path, channel: str | int | None = None) -> FileContent
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of readers, about metadata
             with library.open_topography(str(file)) as reader:
-                return _content(reader, _channel(reader, channel))
+                found = _channel(reader, channel)
+                if states_sides and found.physical_sizes is None:
+                    raise UnknownFormat("the text states no sides that SurfaceTopography knows")
+                return _content(reader, found)
     except InputError:
         raise
     except Exception as error:  # its readers raise errors of many families
         several = len(str(error).splitlines()) > 1  # it tried all its readers in vain
         reason = type(error).__name__ if several else first_line(error)
-        raise InputError(f"SurfaceTopography cannot read it: {reason}") from None
+        raise UnknownFormat(f"SurfaceTopography cannot read it: {reason}") from None
 
 
 def _content(reader: Any, channel: Any) -> FileContent:
@@ -68,9 +79,9 @@ def _library(file: Path) -> Any:
         return importlib.import_module("SurfaceTopography")
     except ImportError:
         raise InputError(
-            f"the format {file.suffix or 'without suffix'} is not known here; ./setup.sh "
+            f"the content of this {file.suffix or 'file'} is not known here; ./setup.sh "
             "--instruments installs the readers of instruments' formats",
-            allowed=".npy, .txt, .dat, .csv, .xyz",
+            allowed=".npy; text of numbers, as .txt, .csv or .xyz, under words or comments after #",
         ) from None
 
 

@@ -10,17 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.checks import cell_counts, check_scale, is_level, positive_lengths
+from geometry.checks import cell_counts, check_scale, is_level, positive_lengths, real_array
 from geometry.errors import InputError
 from geometry.files.arrays import read_array
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
-from geometry.files.instruments import read_instrument
-from geometry.files.text import is_plain, read_text
-from geometry.plausibility import surface_notes
+from geometry.files.instruments import UnknownFormat, read_instrument
+from geometry.files.text import load_text, read_text
+from geometry.plausibility import reading_notes, surface_notes
 from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
-
-_TEXT = (".txt", ".dat", ".csv", ".xyz")
 
 
 def read_surface(
@@ -36,10 +34,10 @@ def read_surface(
     """Read heights at cell centres from a file.
 
     * ``.npy``: an array with index [ix, iy];
-    * ``.txt``, ``.dat``, ``.csv``: numbers in rows, see `geometry.files.text.read_text`;
+    * text: numbers in rows, see `geometry.files.text.read_text`;
     * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order, x, y in mm;
-    * any other, and text that does not begin with numbers: an instrument's format, told by its
-      content, through the optional package SurfaceTopography.
+    * any other, and text under words with numbers: an instrument's format, told by its content,
+      through the optional package SurfaceTopography.
 
     Args:
         path: The file.
@@ -65,6 +63,7 @@ def read_surface(
         if not _is_file(file):  # pipes and devices are refused too: they may never end
             raise InputError("there is no such file")
         content = _content(file, channel)
+        content = content.swapped() if preparation.swap_xy else content
         sides = lengths if lengths is not None else content.lengths
         if sides is None:
             raise InputError(
@@ -72,11 +71,12 @@ def read_surface(
             )
         sides = positive_lengths(sides, "the surface")
         shape = content.heights.shape
-        if grid is not None and shape != cell_counts(grid, "the grid of the surface"):
+        if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
+            hint = "; swap_xy = true exchanges x and y" if shape == asked[::-1] else ""
             raise InputError(
-                "the file's number of heights differs from the grid that was asked for",
+                f"the file's number of heights differs from the grid that was asked for{hint}",
                 value=shape,
-                allowed=f"{tuple(grid)}",
+                allowed=f"{asked}",
             )
         unit = _unit(content, height_unit)
         surface = _surface(str(file), content, sides, unit, preparation, periodic)
@@ -98,7 +98,7 @@ def surface_of(
     """Return the surface of measured heights in memory, as `read_surface` does of a file.
 
     Args:
-        heights: Heights at cell centres, shape (nx, ny); not a number where missing.
+        heights: Heights at cell centres, shape (nx, ny); not a number, or masked, where missing.
         lengths: Sides (Lx, Ly) of the map [mm].
         height_unit: Unit of the heights, such as ``um``.
         periodic: Whether the heights continue periodically.
@@ -107,9 +107,11 @@ def surface_of(
     Raises:
         InputError: When the heights are no surface.
     """
-    content = FileContent(heights=np.asarray(heights), unit=length_unit(height_unit))
+    preparation = Preparation(**steps)
+    content = FileContent(heights=real_array(heights), unit=length_unit(height_unit))
+    content = content.swapped() if preparation.swap_xy else content
     sides = positive_lengths(lengths, "the surface")
-    return _surface("heights", content, sides, _unit(content, None), Preparation(**steps), periodic)
+    return _surface("heights", content, sides, _unit(content, None), preparation, periodic)
 
 
 def _surface(
@@ -121,16 +123,19 @@ def _surface(
     periodic: bool,
 ) -> Surface:
     """Return the surface of what a file or an array holds."""
-    said = [name, *([f"channel {content.channel!r}"] if content.channel else [])]
+    said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit}")
     notes: list[str] = []
     heights = content.heights
-    if heights.ndim == 2 and heights.size and heights.dtype.kind in "iuf":
-        with np.errstate(over="ignore", invalid="ignore"):
-            heights = np.asarray(heights, dtype=np.float64)
-            heights = heights * LENGTH_UNITS[unit] if unit != "mm" else heights
-        heights, sides, done, notes = completed(heights, sides, steps)
+    if heights.ndim == 2 and heights.size:
+        if content.lengths is None:
+            notes += reading_notes((heights.shape[0], heights.shape[1]), sides)
+        if unit != "mm":
+            with np.errstate(over="ignore"):
+                heights = heights * LENGTH_UNITS[unit]
+        heights, sides, done, prepared_notes = completed(heights, sides, steps)
+        notes += prepared_notes
         check_scale(heights)
         if is_level(heights) and 0.0 < np.ptp(heights) < np.inf:
             heights = np.full_like(heights, heights.mean())
@@ -142,15 +147,33 @@ def _surface(
 
 
 def _content(file: Path, channel: str | int | None) -> FileContent:
-    """Read a file by the reader that its suffix, or else its content, asks for."""
-    suffix = file.suffix.lower()
-    if suffix != ".npy" and not (suffix in _TEXT and is_plain(file)):
-        return read_instrument(file, channel)
+    """Read a file by the reader that its suffix, or else its content, asks for.
+
+    Where a text states its sides in words that an instrument's reader knows it is an image, whose
+    rows run along x. Any other text is a matrix with the row index ix.
+    """
+    text = None
+    if file.suffix.lower() == ".npz":
+        raise InputError(
+            "an .npz may hold several arrays, and of masked ones no mask",
+            allowed="one array, by numpy.save to an .npy; masked.filled(numpy.nan) of a masked one",
+        )
+    if file.suffix.lower() != ".npy":
+        text = load_text(file)
+        matrix = text is not None and bool(text.rows)
+        if text is None or text.may_be_foreign:
+            try:
+                return read_instrument(file, channel, states_sides=matrix)
+            except UnknownFormat:
+                if not matrix:
+                    raise
     if channel is not None:
         raise InputError(
             "the file has one channel only", value=channel, allowed="leave out the channel"
         )
-    return read_array(file) if suffix == ".npy" else read_text(file)
+    if text is None:
+        return read_array(file)
+    return read_text(text, as_points=file.suffix.lower() == ".xyz")
 
 
 def _unit(content: FileContent, given: str | None) -> str:

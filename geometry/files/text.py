@@ -2,33 +2,22 @@
 
 from __future__ import annotations
 
-import io
 import re
-import warnings
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from geometry.checks import LARGEST
 from geometry.errors import InputError
-from geometry.files.arrays import first_line
-from geometry.files.content import (
-    BYTES_PER_HEIGHT,
-    LENGTH_UNITS,
-    FileContent,
-    check_memory,
-    length_unit,
-)
-
-Array = NDArray[np.float64]
+from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
+from geometry.files.points import heights_of_points, lists_points
+from geometry.files.table import Line, is_number, number_table, words_of
 
 _BYTES_PER_CHARACTER = 8
 """Memory that a text takes per character while it is read, roughly [B]."""
-_PLACE_TOLERANCE = 0.01
-"""Distance of a point from its place on a regular grid that is accepted [cells]."""
 _START = 4096
 """Bytes at the start of a file that tell text from other formats."""
+_SHOWN = 40
+"""Characters of a heading that are shown."""
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
@@ -36,112 +25,121 @@ _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
 
 
-def is_plain(file: Path) -> bool:
-    """Tell whether a file is text that begins with numbers, after comments that begin with ``#``.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Text:
+    """The lines of a text file by what they are.
+
+    Args:
+        comments: What begins with ``#``.
+        heading: Lines of words before the rows.
+        rows: Rows of numbers, as far as they are right; without comments and empty lines.
+    """
+
+    comments: list[str]
+    heading: list[str]
+    rows: list[Line]
+
+    @property
+    def may_be_foreign(self) -> bool:
+        """Whether its words may state what another program knows, such as sides and units."""
+        spip = any(_FOREIGN.match(line) for line in self.comments)  # its comments scale heights
+        stated = not self.rows or any(re.search(r"\d", line) for line in self.heading)
+        return spip or bool(self.heading and stated)
+
+
+def load_text(file: Path) -> Text | None:
+    """Return the lines of a text in UTF-8, UTF-16 or Latin-1; None of a file that is no text.
 
     Args:
         file: The file.
+
+    Raises:
+        InputError: When it is larger than memory.
     """
     with file.open("rb") as stream:
         start = stream.read(_START)
-    if b"\0" in start and not start.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return False
-    lines = [line.strip() for line in start.decode("utf-8-sig", "replace").splitlines()]
-    if any(_FOREIGN.match(line) for line in lines):  # of SPIP, whose comments scale the heights
-        return False
-    first = next((line for line in lines if line and not line.startswith("#")), "0")
-    return bool(re.match(r"[-+.0-9]|nan|inf", first, re.IGNORECASE))
+    wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if b"\0" in start and not wide:
+        return None
+    check_memory(file.stat().st_size * _BYTES_PER_CHARACTER)
+    content = file.read_bytes()
+    try:
+        whole = content.decode("utf-16" if wide else "utf-8-sig")
+    except UnicodeDecodeError:
+        whole = content.decode("latin-1")
+    lines = whole.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    comments = [line.strip() for line in lines if line.lstrip().startswith("#")]
+    numbered = ((number, line.partition("#")[0].strip()) for number, line in enumerate(lines, 1))
+    rows = [(number, row) for number, row in numbered if row]
+    count = _heading(rows)
+    return Text(comments=comments, heading=[row for _, row in rows[:count]], rows=rows[count:])
 
 
-def read_text(file: Path) -> FileContent:
+def _heading(rows: list[Line]) -> int:
+    """Count the lines of words before the numbers; a row with damaged numbers is none."""
+    lines: list[list[str]] = []
+    for _, row in rows:
+        lines.append(words_of(row))
+        if 2 * sum(map(is_number, lines[-1])) >= len(lines[-1]):
+            break
+    else:
+        return len(rows)
+    *words, numbers = lines
+    for count, cells in enumerate(words):
+        labels = len(set(cells)) > 1 and not any(map(is_number, cells))
+        if len(cells) == len(numbers) and not labels:  # numbers among them, or BAD, BAD, BAD
+            return count
+    return len(words)
+
+
+def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     """Read a matrix of heights, or a list of points in three columns.
 
     The row index of a matrix is ix. White space, commas or semicolons separate its columns, and
-    comments follow ``#``. Where comments state width, height and unit, as Gwyddion's export does,
-    it is an image: a row runs along x.
+    comments follow ``#``; lines of words before the numbers are left out. Where comments state
+    width, height and unit, as Gwyddion's export does, it is an image: a row runs along x.
 
     Args:
-        file: The file; points where it has three columns.
+        text: The lines of a file.
+        as_points: Whether it is no matrix; a list of points has three columns.
 
     Raises:
         InputError: When it is no matrix of numbers, a profile, or points of no regular grid.
     """
-    matrix, comments = _load_text(file)
-    stated = next((found[1] for line in comments if (found := _VALUE_UNIT.fullmatch(line))), None)
-    sizes = [found for line in comments if (found := _SIZE.fullmatch(line))]
-    if file.suffix.lower() == ".xyz" or (matrix.shape[1] == 3 and not sizes):
-        return _points(matrix)
+    matrix, remarks = number_table(text.rows)
+    if text.heading:
+        remarks.insert(0, f"its heading '{text.heading[0][:_SHOWN]}' left out")
+    image, unit = _image(text.comments)
+    if as_points or (matrix.shape[1] == 3 and not image):
+        return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
     if min(matrix.shape) < 3:
         rows, columns = matrix.shape
         raise InputError(
             f"{rows} rows of {columns} numbers are a profile, not a surface",
             allowed="a matrix of heights, or three columns x, y, z",
         )
-    if len(sizes) != 2 or any(size[2] not in {*LENGTH_UNITS, "µm", "μm"} for size in sizes):
-        return FileContent(heights=matrix, unit=stated and length_unit(stated))
-    after = comments[comments.index(sizes[1].string) + 1 :]
-    unit = stated or next((found[1] for line in after if (found := _WORD.fullmatch(line))), None)
-    x, y = (float(size[1].replace(",", ".")) * LENGTH_UNITS[length_unit(size[2])] for size in sizes)
-    return FileContent(heights=matrix.T.copy(), lengths=(x, y), unit=unit and length_unit(unit))
-
-
-def _points(points: Array) -> FileContent:
-    """Return the heights of points x, y, z of a regular grid in any order."""
-    if points.shape[1] != 3:
+    if lists_points(matrix):
         raise InputError(
-            "a point list needs three columns x, y, z",
-            value=points.shape[1],
-            allowed="3 columns; a list of x, z is a profile, not a surface",
+            f"a list of points with {matrix.shape[1]} columns: the first two are the places of a "
+            "regular grid",
+            allowed="three columns x, y, z",
         )
-    if not np.all(np.abs(points[:, :2]) <= LARGEST):
-        raise InputError(f"some coordinates x, y are not finite, or beyond {LARGEST:g} mm")
-    (ix, dx), (iy, dy) = _places(points[:, 0], "x"), _places(points[:, 1], "y")
-    nx, ny = int(ix.max()) + 1, int(iy.max()) + 1
-    taken, times = np.unique(ix * ny + iy, return_counts=True)
-    if taken.size != nx * ny or np.any(times != 1):
-        raise InputError(
-            f"the points do not fill a regular grid of {nx} × {ny}: "
-            f"{nx * ny - taken.size} places are empty, "
-            f"{np.count_nonzero(times > 1)} taken more than once"
-        )
-    heights = np.empty((nx, ny))
-    heights[ix, iy] = points[:, 2]
-    return FileContent(heights=heights, lengths=(nx * dx, ny * dy))
+    heights = matrix.T if image else matrix
+    return FileContent(heights=heights, lengths=image, unit=unit, remarks=tuple(remarks))
 
 
-def _places(coordinate: Array, axis: str) -> tuple[NDArray[np.intp], float]:
-    """Return the index of every coordinate on an even division, and the division's step [mm]."""
-    lowest, span = coordinate.min(), float(np.ptp(coordinate))
-    gaps = np.diff(np.sort(coordinate))
-    if not span:
-        raise InputError(f"all points have the same {axis}, they are a profile, not a surface")
-    count = round(span / float(np.median(gaps[gaps > 0.3 * gaps.max()])))  # without rounding noise
-    step = span / count
-    place = (coordinate - lowest) / step
-    index = np.rint(place).astype(np.intp)
-    if np.max(np.abs(place - index)) > _PLACE_TOLERANCE:
-        raise InputError(f"the points are not evenly spaced along {axis}")
-    return index, step
-
-
-def _load_text(file: Path) -> tuple[Array, list[str]]:
-    """Return a matrix of numbers, whichever of the usual separators it has, and the comments."""
-    check_memory(file.stat().st_size * _BYTES_PER_CHARACTER)
-    try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
-        comments = [line.strip() for line in lines if line.lstrip().startswith("#")]
-        rows = [row for line in lines if (row := line.partition("#")[0].strip())]
-        first = rows[0] if rows else ""
-        # One separator for all rows: a decimal comma is an error then, not another column.
-        separator = next((sign for sign in ";," if sign in first), None)
-        if separator and all(row.endswith(separator) for row in rows):
-            rows = [row[:-1] for row in rows]
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # an empty file is reported below
-            matrix = np.loadtxt(io.StringIO("\n".join(rows)), delimiter=separator, ndmin=2)
-    except (OSError, ValueError) as error:
-        raise InputError(f"not a matrix of numbers: {first_line(error)}") from None
-    if matrix.size == 0:
-        raise InputError("the file is empty")
-    check_memory(matrix.size * BYTES_PER_HEIGHT)
-    return matrix, comments
+def _image(comments: list[str]) -> tuple[tuple[float, float] | None, str | None]:
+    """Return the sides [mm] that two comments in succession state, and the unit of heights."""
+    unit = next((found[1] for line in comments if (found := _VALUE_UNIT.fullmatch(line))), None)
+    known = {*LENGTH_UNITS, "µm", "μm"}
+    for place, pair in enumerate(pairwise(comments)):
+        sizes = [found for line in pair if (found := _SIZE.fullmatch(line)) and found[2] in known]
+        if len(sizes) == 2:
+            after = (_WORD.fullmatch(line) for line in comments[place + 2 :])
+            unit = unit or next((found[1] for found in after if found), None)
+            x, y = (
+                float(size[1].replace(",", ".")) * LENGTH_UNITS[length_unit(size[2])]
+                for size in sizes
+            )
+            return (x, y), unit and length_unit(unit)
+    return None, unit and length_unit(unit)

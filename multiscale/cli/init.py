@@ -33,6 +33,8 @@ _KEYS = {
     "poisson_ratio": "block.poisson_ratio",
     "height_unit": "surface.height_unit",
     "channel": "surface.channel",
+    "lengths": "surface.lengths",
+    "swap_xy": "surface.swap_xy",
 }
 """Keys of a scene that words of the command line set."""
 
@@ -95,11 +97,12 @@ def _given(choice: argparse.Namespace) -> dict[str, Any]:
     if choice.surface is not None:
         source = {"file": str(choice.surface), "detrend": "plane"}
     data: dict[str, Any] = {**START, "surface": source}
-    if choice.lengths:
-        data = changed(data, "surface.lengths", choice.lengths)
     for word, key in _KEYS.items():
-        if (text := getattr(choice, word)) is not None:
-            data = overridden(data, f"{key}={text}")
+        value = getattr(choice, word)
+        if isinstance(value, str):
+            data = overridden(data, f"{key}={value}")
+        elif value:
+            data = changed(data, key, value)
     return data
 
 
@@ -112,11 +115,8 @@ def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, l
     if scene.surface.file is None:
         surface = make_surface(scene)
         return scene, surface, findings(surface)
-    remarks, raw = [], _without_gaps(scene.with_({"surface.detrend": "none"}))
-    if raw is None:
-        remarks = ["Heights are missing: missing = 'fill' closes the gaps by a membrane."]
-        scene = scene.with_({"surface.missing": "fill"})
-        raw = make_surface(scene.with_({"surface.detrend": "none"}))
+    scene, remarks = _readable(scene)
+    raw = make_surface(scene.with_({"surface.detrend": "none"}))
     surface = make_surface(scene)
     if any("spikes" in note for note in surface.notes):
         scene = scene.with_({"surface.outliers": "remove"})
@@ -125,10 +125,29 @@ def _with_surface(data: dict[str, Any], loaded: bool) -> tuple[Scene, Surface, l
     return scene, surface, [*findings(surface), *remarks]
 
 
-def _without_gaps(scene: Scene) -> Surface | None:
-    """Return the surface of a scene, or None where heights are missing in its map."""
-    try:
-        return make_surface(scene)
-    except InputError:
-        make_surface(scene.with_({"surface.missing": "fill"}))  # raises what else is wrong
-        return None
+def _readable(scene: Scene) -> tuple[Scene, list[str]]:
+    """Return the scene with gaps filled and spikes removed where its map needs that to be read.
+
+    Raises:
+        InputError: What is wrong with the map as it is.
+    """
+    fill, remove = {"surface.missing": "fill"}, {"surface.outliers": "remove"}
+    for changes in ({}, fill, remove, fill | remove):
+        tried = scene.with_(changes)
+        try:
+            make_surface(tried.with_({"surface.detrend": "none"}))
+        except InputError as error:
+            problem = error
+            continue
+        remark = "Heights are missing: missing = 'fill' closes the gaps by a membrane."
+        return tried, [remark] if "surface.missing" in changes else []
+    raise _in_words(problem)
+
+
+def _in_words(error: InputError) -> InputError:
+    """Return an error on keys of a scene with the words of this command that set them."""
+    problem = error.problem.replace("height_unit = 'um'", "--height-unit um")
+    if "no lengths" not in problem:
+        return InputError(problem, allowed=error.allowed, key=error.key, file=error.file)
+    allowed = "--lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit UNIT, if not mm"
+    return InputError(problem, allowed=allowed, file=error.file)

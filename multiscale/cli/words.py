@@ -113,6 +113,8 @@ def _add_init(init: argparse.ArgumentParser) -> None:
     sides: dict[str, Any] = {"nargs": 2, "metavar": ("LX", "LY")}
     init.add_argument("--lengths", help="sides of the map, where its file lacks them", **sides)
     init.add_argument("--height-unit", metavar="UNIT", help="of heights, where the file lacks it")
+    swap = "take rows of the map, its first index, along x instead of y"
+    init.add_argument("--swap-xy", action="store_true", help=swap)
     init.add_argument("--channel", help="name or number of a channel of the file")
     where = "the scene to write; by default SURFACE.toml, here"
     init.add_argument("--out", metavar="FILE", help=where, **path)

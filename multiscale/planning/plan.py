@@ -57,7 +57,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         setup: The problem.
     """
     yield from setup.surface.notes
-    if bare := list(bare_quantities(setup.scene)):
+    if bare := list(bare_quantities(setup.scene.written)):
         yield f"numbers without a unit: {', '.join(bare)}"
     excess = setup.surface.highest - setup.surface.heights.max()
     known = setup.plane_at_largest_load is not None

@@ -9,20 +9,22 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainSerializer, PlainValidator
 
+from geometry.checks import real_array
+
 
 class HeightMap:
-    """Heights in memory, equal to others with the same numbers; they are not copied.
+    """Heights in memory, equal to others with the same numbers; float64 is not copied.
 
     Args:
-        values: Heights, shape (nx, ny).
+        values: Heights, shape (nx, ny); not a number, or masked, where they are missing.
 
     Raises:
         ValueError: When they are no map of numbers.
     """
 
     def __init__(self, values: Any) -> None:
-        self.values = np.asarray(values)
-        if self.values.ndim != 2 or self.values.dtype.kind not in "iuf":
+        self.values = real_array(values)
+        if self.values.ndim != 2:
             raise ValueError("is no map of heights (allowed: numbers with an index [ix, iy])")
 
     @cached_property

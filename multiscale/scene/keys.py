@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from multiscale.scene.scene import Scene
+from multiscale.scene.contents import SceneSections
 
 _ANY = 1e9
 """A bound from here on is none that a user meets."""
@@ -63,7 +63,7 @@ class Key:
 @cache
 def scene_keys() -> dict[str, Key]:
     """Return all keys and sections of a scene by dotted name, each section before its keys."""
-    schema = Scene.model_json_schema(by_alias=True)
+    schema = SceneSections.model_json_schema(by_alias=True)
     return {key.name: key for key in _keys(schema, schema["$defs"], "")}
 
 
@@ -135,13 +135,13 @@ def dotted(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield f"{prefix}{name}", value
 
 
-def bare_quantities(scene: Scene) -> Iterator[str]:
+def bare_quantities(data: Mapping[str, Any]) -> Iterator[str]:
     """Yield what bare numbers of a scene were taken for, such as ``height = 1 taken in mm``.
 
     Args:
-        scene: The scene.
+        data: What was written of the scene.
     """
-    for name, value in dotted(scene.written):
+    for name, value in dotted(data):
         numbers = value if isinstance(value, list | tuple) else [value]
         bare = any(isinstance(one, int | float) and one for one in numbers)
         if bare and (unit := _key_of(name).unit):

@@ -25,7 +25,7 @@ _UNITS = {
     "MPa": _Unit('"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3}),
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
-    "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3}),
+    "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6}),
     "W/m/K": _Unit('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
     "ohm*m": _Unit('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
     "K": _Unit('"300 K"', (1e-9, 1e9), {"K": 1.0}),
@@ -93,20 +93,35 @@ def _with_unit(text: str, unit: str) -> float:
     target, common = _UNITS[unit], _COMMON.fullmatch(text)
     if common and common[2] in target.common and len(text) <= _LONGEST:
         return float(common[1]) * target.common[common[2]]
-    allowed = f"(allowed: a quantity in units of {_named(unit)}, such as {target.example})"
+    hint = _correction(text[:_LONGEST], target)
+    allowed = f"{hint} (allowed: a quantity in units of {_named(unit)}, such as {target.example})"
+    if hint and common and len(text) <= _LONGEST:  # Mm and mPa are units too, but hardly meant
+        raise ValueError(f"is in no usual unit{allowed}")
     # pint would also do sums, and 9**9**9 for as long as it takes
     if len(text) > _LONGEST or not _QUANTITY.fullmatch(text):
-        raise ValueError(f"cannot be read as a quantity {allowed}")
+        raise ValueError(f"cannot be read as a quantity{allowed}")
     try:
         quantity = _registry().Quantity(text)
     except Exception as error:  # pint raises whatever its tokenizer meets
-        raise ValueError(f"cannot be read as a quantity {allowed}") from error
+        raise ValueError(f"cannot be read as a quantity{allowed}") from error
     if quantity.unitless and unit and text.strip():
-        raise ValueError(f"has no unit {allowed}")
+        raise ValueError(f"has no unit{allowed}")
     try:
         return float(quantity.to(unit or "dimensionless").magnitude)
     except Exception as error:
-        raise ValueError(f"has the wrong unit {allowed}") from error
+        raise ValueError(f"has the wrong unit{allowed}") from error
+
+
+def _correction(text: str, target: _Unit) -> str:
+    """Return a question where a unit has letters of the wrong case, or a number a decimal comma."""
+    number = re.match(r"[\s\d.,+-]*(?:[eE][+-]?\d+)?", text)[0].strip()  # type: ignore[index]
+    unit = text.strip()[len(number) :].strip()
+    cased = {one.casefold(): one for one in reversed(target.common)}
+    pointed = re.sub(r"^([+-]?\d+),(\d+)$", r"\1.\2", number)
+    right = f"{pointed} {cased.get(unit.casefold(), unit)}"
+    if right == f"{number} {unit}" or re.search(r",\d{3}$", number):  # which may mark thousands
+        return ""
+    return f"; did you mean '{right.strip()}'?"
 
 
 def parse_duration(text: str) -> float:

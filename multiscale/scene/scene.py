@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,9 +9,10 @@ from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from geometry.errors import InputError
+from geometry.errors import InputError, did_you_mean
 from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
+from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
@@ -158,9 +158,11 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError
 
 
 def _unknown_key(path: list[str], model: type[BaseModel]) -> InputError:
+    """Return the error on a key that a section does not have; a very near one may be elsewhere."""
     known = _known_keys(model, path[:-1])
-    close = difflib.get_close_matches(path[-1], known, n=1, cutoff=0.5)
-    hint = f"; did you mean '{close[0]}'?" if close else ""
+    tries = ((known, 0.7), (scene_keys(), 0.7), (known, 0.5))
+    hints = (did_you_mean(path[-1], names, cutoff=cutoff) for names, cutoff in tries)
+    hint = next(filter(None, hints), "")
     return InputError(f"unknown key{hint}", key=".".join(path) or '""', allowed=", ".join(known))
 
 

@@ -13,6 +13,7 @@ MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""
 
 _OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
+_START = 4096  # bytes that tell a scene from heights
 _DEEPEST = 100  # sections within sections
 _EXCLUSIVE = {
     "approach": ("force",),
@@ -34,6 +35,15 @@ def read_scene_file(path: Path) -> dict[str, Any]:
         InputError: When it is no regular file, cannot be read, is too large or no TOML.
     """
     content = _content(path)
+    if path.suffix.lower() != ".toml" and _may_be_heights(content):
+        raise InputError(
+            f"is no scene, it looks like a height map: 'patchlaw init {path}' writes one for it",
+            file=str(path),
+        )
+    if len(content) > MOST_BYTES:
+        allowed = f"{MOST_BYTES} bytes"
+        problem = "cannot be read: it is larger than any scene"
+        raise InputError(problem, allowed=allowed, file=str(path))
     try:
         return parsed(content.decode("utf-8-sig"))  # some editors put a mark before the text
     except UnicodeDecodeError as error:
@@ -44,18 +54,25 @@ def read_scene_file(path: Path) -> dict[str, Any]:
 
 
 def _content(path: Path) -> bytes:
-    """Return the bytes of a regular file, which has an end, if a scene can be that large."""
+    """Return the bytes of a regular file, as many as a scene may have and one more."""
     try:
         if path.exists() and not path.is_file():
             raise ValueError("it is not a regular file")
         with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            raise ValueError(f"it is larger than any scene (allowed: {MOST_BYTES} bytes)")
+            return file.read(MOST_BYTES + 1)
     except (OSError, ValueError) as error:  # ValueError: also a zero byte in the name
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
-    return content
+
+
+def _may_be_heights(content: bytes) -> bool:
+    """Tell whether bytes are no text, or have no line that sets a key or begins a section."""
+    try:
+        text = content[:_START].decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        return error.start < len(content[:_START]) - 4  # the last character may be cut
+    lines = [line for line in map(str.strip, text.splitlines()) if line and line[0] != "#"]
+    return "\0" in text or (bool(lines) and not any("=" in one or one[0] == "[" for one in lines))
 
 
 def overridden(data: dict[str, Any], text: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from geometry.errors import InputError
+from geometry.errors import InputError, did_you_mean
 from geometry.files.content import LENGTH_UNITS, length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
@@ -118,8 +118,8 @@ class FilterSection(Section):
 class SurfaceSection(Section):
     """Exactly one source of heights, the rectangle it covers, and what is done to the map.
 
-    A map is prepared in this order: ``crop``, ``missing``, ``outliers``, ``detrend``, ``filter``,
-    ``resample``.
+    A map is prepared in this order: ``swap_xy``, ``crop``, ``outliers``, ``missing``, ``detrend``,
+    ``filter``, ``resample``.
     """
 
     grid_is_open: ClassVar[bool] = True
@@ -142,13 +142,17 @@ class SurfaceSection(Section):
     With an ``accuracy`` a spectrum needs none."""
     lengths: tuple[PositiveLength, PositiveLength] | None = None
     """Sides of the surface along x and y; needed where a file does not state them."""
+    swap_xy: Flag = False
+    """Whether x and y of the map are exchanged: rows of a text without sides, and the first index
+    of an array, then lie along x. ``lengths``, ``grid`` and ``crop`` are those after it."""
     crop: CropSection = CropSection()
     """The rectangle that is kept, before anything else is done to a map."""
     missing: Literal["refuse", "fill"] = "refuse"
-    """What happens to heights that are not a number: ``refuse`` them, or ``fill`` them by the
-    smoothest membrane between the others."""
+    """What happens to heights that are masked or not a number: ``refuse`` them, or ``fill`` them
+    by the smoothest membrane between the others, spikes aside."""
     outliers: Literal["keep", "remove"] = "keep"
-    """Whether spikes are kept, or removed and filled."""
+    """Whether spikes, and a repeated value that means "no data", are kept, or removed and
+    filled."""
     detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
     """Form that is removed from a map: its mean, its mean plane, or its mean quadratic form."""
     filter: FilterSection = FilterSection()
@@ -172,7 +176,8 @@ class SurfaceSection(Section):
         if self.spectrum is not None and (without_grid or self.lengths is None):
             raise ValueError("a 'spectrum' needs 'grid' and 'lengths' beside it")
         fields = type(self).model_fields
-        for key in ("height_unit", "channel", "crop", "missing", "outliers", "resample"):
+        maps = ("height_unit", "channel", "swap_xy", "crop", "missing", "outliers", "resample")
+        for key in maps:
             if self.spectrum is not None and getattr(self, key) != fields[key].default:
                 raise ValueError(f"'{key}' needs a 'file' (allowed: leave it out)")
         if self.heights is not None and (self.grid, self.channel) != (None, None):
@@ -185,8 +190,9 @@ class SurfaceSection(Section):
             try:
                 length_unit(self.height_unit)
             except InputError:
+                hint = did_you_mean(self.height_unit, LENGTH_UNITS, cutoff=1.0)
                 raise ValueError(
-                    f"height_unit = '{self.height_unit}' is no unit of heights "
+                    f"height_unit = '{self.height_unit}' is no unit of heights{hint} "
                     f"(allowed: {', '.join(LENGTH_UNITS)})"
                 ) from None
         return self
@@ -200,6 +206,7 @@ class SurfaceSection(Section):
     def preparation(self) -> Preparation:
         """What is done to the map."""
         return Preparation(
+            swap_xy=self.swap_xy,
             crop=(self.crop.x, self.crop.y),
             missing=self.missing,
             outliers=self.outliers,

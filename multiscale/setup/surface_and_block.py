@@ -263,6 +263,7 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             file=scene.file,
         )
     _check_hardness(scene, body.area)
+    _check_gap(scene, surface)
     if scene.kind == "analytic":
         return
     if loading.force is not None:
@@ -294,6 +295,22 @@ def _check_hardness(scene: Scene, area: float) -> None:
         allowed=f"> {mean:.6g} MPa, or a smaller load.force",
         file=scene.file,
     )
+
+
+def _check_gap(scene: Scene, surface: Surface) -> None:
+    """Refuse approaches that leave a periodic surface no gap, without a hardness."""
+    points, most = scene.loading.approach, surface.highest - surface.mean_height
+    if points is None or not scene.surface.periodic or scene.law.representative:
+        return
+    if scene.micro.hardness is None and max(points) >= most:
+        raise InputError(
+            "leaves no gap on the periodic surface, whose mean displacement counts as none",
+            key="load.approach",
+            value=list(points),
+            allowed=f"less than {most:.6g} mm, from the highest point to the mean height; beyond "
+            "it load.force",
+            file=scene.file,
+        )
 
 
 @contextmanager

@@ -22,6 +22,8 @@ sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "mu
 import command_words  # noqa: E402
 import compared_inputs  # noqa: E402
 import height_files  # noqa: E402
+import map_round_trips  # noqa: E402
+import misspellings  # noqa: E402
 import mutated_scenes  # noqa: E402
 import scene_inputs  # noqa: E402
 import shell_lines  # noqa: E402
@@ -98,6 +100,26 @@ def doors(folder):
         st.tuples(height_files.anything, height_files.sides),
         lambda drawn: height_files.read(write(folder / f"h{drawn[0][0]}", drawn[0][1]), drawn[1]),
         0.15,
+    )
+    seeds = st.integers(0, 2**32 - 1)
+    yield (
+        "maps with masks and units, read back",
+        seeds,
+        lambda drawn: map_round_trips.came_back(folder, drawn),
+        0.1,
+    )
+    yield (
+        "texts with a damaged cell",
+        seeds,
+        lambda drawn: map_round_trips.damage_was_told(folder, drawn),
+        0.1,
+    )
+    yield ("keys misspelt", misspellings.keys(), misspellings.key_was_offered, 0.05)
+    yield (
+        "units of the wrong case",
+        misspellings.units(),
+        misspellings.unit_was_offered,
+        0.05,
     )
     yield (
         "comparisons",

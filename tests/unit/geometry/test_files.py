@@ -67,10 +67,26 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
-        ("a.txt", "1 2 3 4\n1 2 3\n", "not a matrix of numbers: .*columns changed"),
-        ("a.csv", "1,2,x\n", "not a matrix of numbers: could not convert"),
-        ("a.csv", "1,5;2,5\n1,5;2,5\n", "not a matrix of numbers"),  # decimal commas
-        ("a.csv", "1,5 2,5\n1,5 2,5\n", "not a matrix of numbers"),
+        (
+            "a.txt",
+            "1 2 3 4\n1 2 3\n",
+            "not a matrix of numbers: line 2 has 3 of them, line 1 has 4 ",
+        ),
+        ("a.csv", "1,2,x\n", "not a matrix of numbers: line 1, column 3: 'x' is no number"),
+        ("a.csv", "# \n\n1;2;3\n1;;3\n", "line 4, column 2: the cell is empty .*nan where"),
+        ("a.txt", "1\t2\t3\n1\t\t3\n", "line 2, column 2: the cell is empty"),
+        ("a.txt", "1 BAD 3 4\n" + "1 2 3 4\n" * 4, "line 1, column 2: 'BAD' is no number"),
+        ("a.txt", "BAD BAD BAD BAD\n" + "1 2 3 4\n" * 4, "line 1, column 1: 'BAD' is no number"),
+        ("a.csv", "1,234;2,345\n", "column 1: it is not clear what the comma in '1,234' means"),
+        ("a.csv", "1,5;2.5\n", "column 1: it is not clear what the comma in '1,5' means"),
+        ("a.txt", "1 2\n1 2,3,4\n", "line 2, column 2: it is not clear .* '2,3,4' means"),
+        ("a.csv", ";\n;\n", "line 1, column 1: the cell is empty"),
+        ("a.txt", "1 2 3\n" * 4 + "Mean: 5\n", "line 5, column 1: 'Mean:' is no number"),
+        (
+            "a.csv",
+            "".join(f"{i},{j},0.1,7\n" for i in range(4) for j in range(4)),
+            "a list of points with 4 columns: the first two are the places",
+        ),
         ("a.dat", "", "the file is empty"),
         ("a.dat", "# nothing\n", "the file is empty"),
         (
@@ -87,7 +103,7 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.xyz", "1 2\n3 4\n", "a point list needs three columns x, y, z: 2 .*a profile"),
         ("a.xyz", "0 0 1\n0 1 1\n0 2 1\n", "all points have the same x, they are a profile"),
         ("a.xyz", "0 0 1\n1 0 1\nnan 1 1\n", "some coordinates x, y are not finite"),
-        ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n", "2 × 2: 1 places are empty, 0 taken more than once"),
+        ("a.xyz", "0 0 1\n1 0 1\n2 1 1\n3 2 1\n", "4 × 3: 8 places are empty, 0 taken more"),
         ("a.xyz", "0 0 1\n1 0 1\n1 1 1\n0 1 1\n0 1 1\n", "0 places are empty, 1 taken more"),
         ("a.xyz", "0 0 1\n1 0 1\n2.3 1 1\n3 1 1\n", "the points are not evenly spaced along x"),
     ],
@@ -118,6 +134,14 @@ def test_arrays_of_other_kinds_are_refused(tmp_path, array):
     np.save(file, array)
     with pytest.raises(InputError, match=r"scan\.npy: the heights are not an array of real"):
         read_surface(file, lengths=SIDES)
+
+
+def test_archives_of_arrays_are_refused_as_they_lose_masks(tmp_path):
+    np.savez(tmp_path / "a.npz", np.ma.masked_less(HEIGHTS, 0.0))
+    with pytest.raises(
+        InputError, match=r"a\.npz: an .npz may hold .* \(allowed: one array, by nump"
+    ):
+        read_surface(tmp_path / "a.npz", lengths=SIDES)
 
 
 @pytest.mark.parametrize("name", ["scan.npy", "scan.txt"])
@@ -171,7 +195,7 @@ def test_what_is_no_regular_file_is_not_waited_for(tmp_path):
 
 def test_sizes_of_no_scale_are_refused(tmp_path):
     np.savetxt(tmp_path / "a.txt", 1e200 * HEIGHTS)
-    with pytest.raises(InputError, match=r"20 of 20 heights are not finite or of no scale"):
+    with pytest.raises(InputError, match=r"20 of 20 heights are masked, not finite or of no"):
         read_surface(tmp_path / "a.txt", lengths=(1.0, 1.0))
     np.savetxt(tmp_path / "b.txt", HEIGHTS)
     with pytest.raises(InputError, match="the lengths of the surface do not fit"):

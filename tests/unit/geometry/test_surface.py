@@ -46,7 +46,7 @@ def test_whole_numbers_are_accepted_as_heights():
         (np.zeros(16), r"\(16,\): a surface needs at least 4 × 4 heights"),
         (np.zeros((4, 4, 1)), "a surface needs at least 4 × 4 heights"),
         (np.zeros((4, 4), dtype=complex), "not an array of real numbers"),
-        ([[1.0, 2.0], [3.0]], "not an array of real numbers"),
+        ([[1.0, 2.0], [3.0]], "not an array of numbers: its rows differ"),
         ([["a"] * 4] * 4, "not an array of real numbers"),
     ],
 )
@@ -58,7 +58,7 @@ def test_heights_that_are_no_surface_are_refused(heights, message):
 def test_heights_that_are_not_finite_are_counted_and_located():
     heights = np.zeros((5, 4))
     heights[2, 3], heights[4, 0] = np.nan, np.inf
-    with pytest.raises(InputError, match=r"2 of 20 heights are not finite.*index \(2, 3\)"):
+    with pytest.raises(InputError, match=r"2 of 20 heights are masked, not finite.*index \(2, 3\)"):
         Surface(heights=heights, lengths=(1.0, 1.0))
 
 

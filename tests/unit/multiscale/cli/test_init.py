@@ -81,7 +81,10 @@ def test_file_is_found_from_the_folder_of_the_scene(capsys, rough):
     ("words", "text"),
     [
         (("nowhere.npy",), "there is no such file"),
-        (("maps/my.npy",), "the file has no lengths"),
+        (
+            ("maps/my.npy",),
+            "allowed: --lengths LX LY, such as --lengths '2 mm' '1 mm'; --height-unit",
+        ),
         (("maps/my.npy", *LENGTHS, "--force", "2 mm"), "load.force = '2 mm'"),
         (("maps/my.npy", *LENGTHS, "--poisson-ratio", "0.7"), "block.poisson_ratio = 0.7"),
         (("maps/my.npy", *LENGTHS, "--height-unit", "parsec"), "is no unit of heights"),
@@ -137,3 +140,37 @@ def test_spikes_above_all_else_are_removed(capsys, rough):
     assert "As it was: 1 heights are spikes" in shown
     said = tomllib.loads((rough / "my.toml").read_text(encoding="utf-8"))
     assert said["surface"]["outliers"] == "remove"
+
+
+def test_the_other_reading_of_a_map_is_shown_and_can_be_taken(capsys, rough):
+    np.savetxt("turned.txt", 1e-3 * np.random.default_rng(2).normal(size=(40, 20)))
+    words = ("init", "turned.txt", "--lengths", "1 mm", "2 mm")
+    code, shown, _ = call(capsys, *words)
+    assert code == 0
+    assert "40 × 20 heights make cells of 25 × 100 µm on these sides" in shown
+    assert "20 × 40 heights make square ones of 50 × 50 µm" in shown
+    code, shown, _ = call(capsys, *words, "--swap-xy", "--overwrite")
+    assert code == 0
+    assert "20 × 40 heights on 1 mm × 2 mm" in shown
+    assert "make cells" not in shown
+    said = tomllib.loads((rough / "turned.toml").read_text(encoding="utf-8"))
+    assert said["surface"]["swap_xy"] is True
+
+
+def test_codes_of_no_data_are_removed_where_a_map_would_be_too_steep(capsys, rough):
+    heights = np.load("maps/my.npy")
+    heights[10:15, 5:9] = -9999.0
+    np.save("codes.npy", heights)
+    code, shown, err = call(capsys, "init", "codes.npy", *LENGTHS)
+    assert (code, err) == (0, "")
+    assert "20 spikes removed and filled" in shown
+    said = tomllib.loads((rough / "codes.toml").read_text(encoding="utf-8"))
+    assert (said["surface"]["missing"], said["surface"]["outliers"]) == ("fill", "remove")
+
+
+@pytest.mark.parametrize("command", ["run", "surface", "plan"])
+def test_a_map_is_no_scene(capsys, rough, command):
+    code, shown, err = call(capsys, command, "maps/my.npy")
+    assert (code, shown) == (2, "")
+    assert "maps/my.npy: is no scene, it looks like a height map: 'patchlaw init maps/" in err
+    assert not (rough / "results").exists()

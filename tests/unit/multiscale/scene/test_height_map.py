@@ -6,6 +6,7 @@ import pytest
 from geometry.errors import InputError
 from multiscale import compare, run
 from multiscale.scene.scene import Scene
+from multiscale.setup.surface_and_block import make_surface
 
 
 def scene(heights, **surface):
@@ -46,6 +47,33 @@ def test_heights_have_a_unit_and_are_prepared(heights):
     run(scene(gap, height_unit="um", missing="fill", detrend="plane"))
 
 
+def test_what_a_mask_hides_is_missing(heights):
+    masked = np.ma.array(heights, mask=False)
+    masked.data[3, 4] = 0.9  # junk, 0.89 mm above all others
+    masked[3, 4] = np.ma.masked
+    gap = masked.filled(np.nan)
+    with pytest.raises(InputError, match=r"surface.heights.*1 of 288 heights are missing"):
+        run(scene(masked))
+    force = run(scene(masked, missing="fill")).force_N
+    np.testing.assert_array_equal(force, run(scene(gap, missing="fill")).force_N)
+    assert scene(masked) == scene(gap) != scene(masked.data)
+
+
+def test_the_counter_surface_keeps_its_mask_and_may_be_swapped(heights):
+    masked = np.ma.array(heights, mask=False)
+    masked[3, 4] = np.ma.masked
+    other = {"heights": masked, "lengths": ["1 mm", "0.5 mm"]}
+    with pytest.raises(InputError, match=r"counter_surface.heights.*1 of 288 heights are missing"):
+        make_surface(scene(heights).with_({"counter_surface": other}))
+    turned = {"heights": heights.T, "lengths": ["1 mm", "0.5 mm"], "swap_xy": True}
+    whole = {**other, "heights": heights}
+    both = [
+        make_surface(scene(heights).with_({"counter_surface": one})).heights
+        for one in (turned, whole)
+    ]
+    np.testing.assert_array_equal(*both)
+
+
 def test_scenes_are_equal_when_their_heights_are(heights):
     assert scene(heights) == scene(heights.copy())
     assert scene(heights) != scene(heights + 1e-6)
@@ -59,7 +87,7 @@ def test_scenes_are_equal_when_their_heights_are(heights):
     ("value", "problem"),
     [
         ([1.0, 2.0], "surface.heights.*is no map of heights"),
-        ([["a", "b"]], "is no map of heights"),
+        ([["a", "b"]], "surface.heights.*not an array of real numbers"),
         (np.zeros((2, 2, 2)), "is no map of heights"),
     ],
 )

@@ -19,7 +19,33 @@ PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 REFUSED = {
     "unknown key": ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
     "unknown section": ("bloc.height=3", "bloc: unknown key; did you mean 'block'?"),
-    "unknown nested key": ("surface.spectrum.hurt=1", "surface.spectrum.hurt: unknown key"),
+    "unknown nested key": (
+        "surface.spectrum.hurt=1",
+        "surface.spectrum.hurt: unknown key; did you mean 'hurst'?",
+    ),
+    "key of a section within": (
+        "surface.sede=3",
+        "surface.sede: unknown key; did you mean 'surface.spectrum.seed'?",
+    ),
+    "key of another section": (
+        "surface.force='3 N'",
+        "surface.force: unknown key; did you mean 'load.force'?",
+    ),
+    "case of a key": ("load.Force='3 N'", "load.Force: unknown key; did you mean 'force'?"),
+    "case of a unit": (
+        "block.young_modulus='210 Gpa'",
+        "'210 Gpa': is in no usual unit; did you mean '210 GPa'? (allowed: a quantity in units of",
+    ),
+    "millipascals": ("block.young_modulus='210 mPa'", "did you mean '210 MPa'?"),
+    "megametres": ("load.approach='8 Mm'", "did you mean '8 mm'?"),
+    "decimal comma": (
+        "load.approach='8,5 um'",
+        "'8,5 um': cannot be read as a quantity; did you mean '8.5 um'?",
+    ),
+    "decimal comma or thousands": (
+        "load.approach='1,500 um'",
+        "'1,500 um': cannot be read as a quantity (allowed: ",
+    ),
     "negative modulus": ("block.young_modulus=-4", "block.young_modulus = -4: must be greater"),
     "impossible unit": ("block.young_modulus='4 kg'", "'4 kg': has the wrong unit (allowed: a"),
     "unknown unit": ("load.approach='8 foo'", "'8 foo': cannot be read as a quantity"),
@@ -287,6 +313,23 @@ def test_a_key_replaces_the_one_that_it_excludes():
     scene = scene.with_({"load.approach": "4 um", "surface.file": "scan.npy"})
     assert (scene.loading.approach, scene.loading.force) == ((4e-3,), None)
     assert (scene.surface.spectrum, scene.surface_path) == (None, PAPER.parent / "scan.npy")
+
+
+@pytest.mark.parametrize("name", ["map.npy", "map.txt", "map.csv", "large.csv", "map"])
+def test_a_map_is_told_from_a_scene(tmp_path, name):
+    heights = np.random.default_rng(0).normal(size=(200, 100) if name == "large.csv" else (5, 4))
+    with (tmp_path / name).open("wb") as file:
+        np.save(file, heights) if name == "map.npy" else np.savetxt(file, heights)
+    path = tmp_path / name
+    with pytest.raises(InputError, match=f"{path}: is no scene, .* 'patchlaw init {path}' writes"):
+        Scene.load(path)
+
+
+@pytest.mark.parametrize(("content", "problem"), [("[load]\nx", "TOML"), ("# x\n", "surface")])
+def test_a_scene_of_any_name_is_no_map(tmp_path, content, problem):
+    (tmp_path / "scene.txt").write_text(content)
+    with pytest.raises(InputError, match=f"scene.txt: .*{problem}"):
+        Scene.load(tmp_path / "scene.txt")
 
 
 def test_with_leaves_the_scene_what_it_was():

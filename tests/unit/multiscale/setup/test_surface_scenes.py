@@ -74,3 +74,16 @@ def test_a_periodic_scene_is_pressed_periodically():
 def test_what_does_not_continue_is_refused_periodically(left):
     with pytest.raises(InputError, match=r"does not continue periodically .*coupling.kind = 'ana"):
         Scene.load(PAPER, [*PERIODIC, left])
+
+
+def test_a_periodic_surface_is_pressed_within_its_gap(tmp_path):
+    surface = make_setup(Scene.load(PAPER)).surface
+    gap = surface.highest - surface.mean_height
+    within = Scene.load(PAPER, [*PERIODIC, f"load.approach=[{0.999 * gap}, 0.001]"])
+    make_setup(within)
+    beyond = Scene.load(PAPER, [*PERIODIC, f"load.approach=[{gap}, 0.001]"])
+    with pytest.raises(
+        InputError, match=r"paper.toml: load.approach = \[.*\]: leaves no gap .* load.force\)"
+    ):
+        make_setup(beyond)
+    make_setup(beyond.with_({"micro.hardness": "1 GPa"}))  # which lets cells yield instead

@@ -1,0 +1,161 @@
+"""Maps with masks, units, odd types and texts of any style are read to the last bit, or refused."""
+
+import re
+
+import numpy as np
+import pytest
+from map_round_trips import came_back, damage_was_told
+
+from geometry import InputError, Spectrum, Surface, read_surface, synthesise
+from geometry.checks import real_array
+from geometry.files.reading import surface_of
+from geometry.filters import spikes
+
+
+@pytest.mark.parametrize("seed", range(120))
+def test_maps_come_back_to_the_last_bit(tmp_path, seed):
+    came_back(tmp_path, seed)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_damaged_cells_are_told_by_their_place(tmp_path, seed):
+    assert damage_was_told(tmp_path, seed) == "told"
+
+
+JUNK = np.ma.array(np.full((6, 5), 1e3), mask=np.zeros((6, 5), dtype=bool))
+JUNK.data[:] = 1e-3 * np.random.default_rng(1).normal(size=(6, 5))
+JUNK[2, 3] = np.ma.masked
+JUNK.data[2, 3] = 0.9
+
+
+def test_what_a_mask_hides_is_no_height():
+    with pytest.raises(InputError, match=r"1 of 30 heights are masked, .* index \(2, 3\)"):
+        Surface(heights=JUNK, lengths=(1.0, 1.0))
+    with pytest.raises(InputError, match=r"1 of 30 heights are missing, .* index \(2, 3\)"):
+        surface_of(JUNK, lengths=(1.0, 1.0))
+    for heights in (JUNK, list(JUNK)):  # numpy would take rows of a list without their masks
+        whole = surface_of(heights, lengths=(1.0, 1.0), missing="fill").heights
+        around = JUNK.data[[1, 3, 2, 2], [3, 3, 2, 4]]
+        # square cells would make it their mean; these are 1/6 by 1/5
+        assert around.min() < whole[2, 3] < around.max()
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (np.ones((4, 4)) > 0, "'bool': not an array of real numbers"),
+        (np.ones((4, 4)) * 1j, "'complex128': not an array of real"),
+        ([[1.0, None]], "'object': not an array of real"),
+        ([[1.0], [1.0, 2.0]], "its rows differ"),
+        (np.zeros((2, 2), "M8[s]"), r"'datetime64\[s\]': not"),
+    ],
+)
+def test_what_is_no_array_of_numbers(value, message):
+    with pytest.raises(InputError, match=message):
+        real_array(value)
+
+
+def test_units_of_others_are_not_dropped():
+    pint = pytest.importorskip("pint")
+    heights = pint.UnitRegistry().Quantity(np.ones((4, 4)), "um")
+    with pytest.raises(InputError, match="an array with the unit 'micrometer'"):
+        Surface(heights=heights, lengths=(1.0, 1.0))
+
+
+HEIGHTS = 1e-3 * np.random.default_rng(5).normal(size=(30, 20))
+ROWS = "\n".join(" ".join(repr(float(one)) for one in row) for row in HEIGHTS)
+
+
+@pytest.mark.parametrize(
+    "heading", ["", "# Sample A, polished", "Sample A, polished", "Sample 5, polished 2024-05-01"]
+)
+@pytest.mark.parametrize("name", ["a.txt", "a.csv", "a.asc", "a"])
+def test_words_above_a_map_do_not_turn_it(tmp_path, heading, name):
+    if any(sign.isdigit() for sign in heading):
+        pytest.importorskip("SurfaceTopography")  # which may find sides in it
+    (tmp_path / name).write_text(f"{heading}\n{ROWS}\n")
+    surface = read_surface(tmp_path / name, lengths=(0.3, 0.2))
+    np.testing.assert_array_equal(surface.heights, HEIGHTS)
+    assert (heading[:1] == "S") == (f"its heading '{heading}' left out" in surface.source)
+
+
+def test_comments_that_state_other_lengths_are_no_sides(tmp_path):
+    (tmp_path / "a.txt").write_text(f"# Sample: 3 mm\n# polished\n# Depth: 5 um\n{ROWS}\n")
+    assert read_surface(tmp_path / "a.txt", lengths=(0.3, 0.2)).grid == (30, 20)
+
+
+def test_sides_that_fit_the_other_way_are_noted(tmp_path):
+    np.savetxt(tmp_path / "a.txt", HEIGHTS)
+    (note,) = read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6)).notes
+    assert "30 × 20 heights make cells of 13.3 × 30 µm" in note and "swap_xy = true" in note
+    assert "20 × 30 heights make square ones of 20 × 20 µm" in note
+    surface = read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6), swap_xy=True)
+    assert surface.notes == () and surface.source.split(", ")[1] == "x and y swapped"
+    np.testing.assert_array_equal(surface.heights, HEIGHTS.T)
+    assert read_surface(tmp_path / "a.txt", lengths=(0.6, 0.4)).notes == ()
+    with pytest.raises(InputError, match=r"differs from the grid .*; swap_xy = true exchanges"):
+        read_surface(tmp_path / "a.txt", lengths=(0.4, 0.6), grid=(20, 30))
+
+
+ROUGH = synthesise(
+    Spectrum(hurst=0.8, waves=(2, 16), rms_slope=0.1, seed=4), grid=(96, 80), lengths=(1.2, 1.0)
+)
+
+
+def broken(kind, rng):
+    """Return the rough map as an instrument without luck has it, and where it is right."""
+    heights = ROUGH.heights + 0.079
+    spoilt = np.zeros(heights.shape, dtype=bool)
+    if kind == "block":
+        spoilt[30:50, 20:45] = True
+    elif kind == "border":
+        spoilt[:, 0] = True
+    else:
+        spoilt = rng.random(heights.shape) < 500 / heights.size
+    heights[spoilt] = 0.0
+    gaps = np.zeros_like(spoilt)
+    if kind == "lonely":  # islands of 0 in a wide gap, as in maps of chromatic sensors
+        gaps[20:60, 15:60] = True
+        gaps &= ~spoilt
+    gaps |= rng.random(heights.shape) < 0.02
+    gaps &= ~spoilt
+    heights[gaps] = np.nan
+    return heights, spoilt, gaps
+
+
+@pytest.mark.parametrize("kind", ["block", "border", "scattered", "lonely"])
+def test_zeros_that_mean_no_data_do_not_reach_into_gaps(kind):
+    heights, spoilt, gaps = broken(kind, np.random.default_rng(3))
+    both = {"missing": "fill", "outliers": "remove"}
+    surface = surface_of(heights, lengths=(1.2, 1.0), **both)
+    right = ~(spoilt | gaps)
+    np.testing.assert_array_equal(surface.heights[right], heights[right])
+    # a membrane stays within the range of the heights that it hangs between
+    assert np.ptp(surface.heights) == np.ptp(heights[right])
+    assert f"{spoilt.sum()} spikes removed and filled" in surface.source
+    kept = surface_of(heights, lengths=(1.2, 1.0), missing="fill")
+    assert np.all(kept.heights[spoilt] == 0.0)
+    np.testing.assert_array_equal(kept.heights[~spoilt], surface.heights[~spoilt])
+    assert any("the lowest lies" in note and "remove" in note for note in kept.notes)
+
+
+def test_what_fills_gaps_between_errors_is_noted():
+    heights = ROUGH.on_grid((384, 320)).heights.copy()
+    x, y = np.indices(heights.shape)
+    heights += 0.05 * np.exp(-((x - 100) ** 2 + (y - 90) ** 2) / 32)  # dust, without its middle
+    heights[99:102, 89:92] = np.nan
+    notes = surface_of(heights, lengths=(1.2, 1.0), missing="fill").notes
+    size = re.search(r"what fills gaps reaches (\S+) µm beyond 99.8 % of the heights", notes[1])
+    rim = heights[98:103, 88:93] - np.nanquantile(heights, 0.999)  # the membrane hangs from it
+    assert 1e3 * np.nanmin(rim) < float(size[1]) < 1e3 * np.nanmax(rim)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.4])
+@pytest.mark.parametrize("seed", range(4))
+def test_gaps_and_borders_make_no_spikes(share, seed):
+    rng = np.random.default_rng(seed)
+    spectrum = Spectrum(hurst=rng.uniform(0.3, 1.0), waves=(2, 5 + 9 * seed), rms_slope=0.2)
+    heights = synthesise(spectrum, grid=(128, 96), lengths=(1.0, 1.0)).heights.copy()
+    heights += rng.uniform(-0.5, 0.5) * np.arange(128)[:, None] / 128
+    heights[rng.random(heights.shape) < share] = np.nan
+    assert not spikes(heights, (1 / 128, 1 / 96)).any()
