@@ -25,6 +25,7 @@ from macro.linear_solvers.options import (
     PREFIX,
     default_options,
     reason_name,
+    weakly,
 )
 
 Array = NDArray[np.float64]
@@ -103,7 +104,7 @@ class ContactProblem:
             interface.constrain(self._equations.bcs)
         matrix = self._equations.matrix
         self._assembling, self._in_matrix = in_matrix, list[Interface]()
-        self._tangent = ContactTangent(matrix, self.interfaces)
+        self._tangent = ContactTangent(self.interfaces)
         self._norms: list[float] = []
         self._contact = matrix.createVecRight()
         self._inner = self._contact.duplicate()
@@ -126,6 +127,7 @@ class ContactProblem:
                 before. Also when a closure is beyond the table of a law (``LAW_RANGE``); then the
                 displacement is the solution on the tangents of the laws.
         """
+        compat.collect_garbage(self._equations.comm)
         start = self.displacement.x.array.copy()
         planes = [interface.forces.plane for interface in self.interfaces]
         self._norms = []
@@ -141,7 +143,6 @@ class ContactProblem:
                 interface.forces.plane = plane
             raise
         self._equations.take(solution)
-        compat.collect_garbage(solution.comm)
         self._finish()
         return int(self._snes.its)
 
@@ -156,14 +157,15 @@ class ContactProblem:
     def _share_tangents(self) -> None:
         """Decide which tangents are assembled: those that can be, under their indenters now."""
         self._in_matrix = [each for each in self.interfaces if self._assembling and each.assembles]
-        self._tangent.interfaces = [each for each in self.interfaces if each not in self._in_matrix]
+        self._tangent.follow([each for each in self.interfaces if each not in self._in_matrix])
 
     def _solver(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._equations.comm)
         snes.setOptionsPrefix(PREFIX)
-        snes.setFunction(self._write_residual, self._contact.duplicate())
-        snes.setJacobian(self._update_tangent, self._tangent.shell, self._equations.matrix)
-        snes.setConvergenceTest(self._converged)
+        matrix = self._equations.matrix
+        snes.setFunction(weakly(self._write_residual), self._contact.duplicate())
+        snes.setJacobian(weakly(self._update_tangent), self._tangent.shell(matrix), matrix)
+        snes.setConvergenceTest(weakly(self._converged))
         with default_options(PREFIX, self._options):
             snes.setFromOptions()
         user = PETSc.Options(PREFIX)

@@ -26,6 +26,7 @@ from macro.contact.contact_tangent import ContactTangent, free_unknowns
 from macro.contact.interface_laws import InterfaceLaws, laws_on_face
 from macro.contact.interface_state import InterfaceResults, InterfaceState
 from macro.contact.loaded_face import LoadedFace, Mode
+from macro.linear_solvers.stiffened import springs_at
 
 Array = NDArray[np.float64]
 
@@ -104,12 +105,11 @@ class Interface(InterfaceResults):
     ) -> None:
         self.space = space
         face = chosen_face(space, facet_tags, tag, names, frame)
+        compat.collect_garbage(self.comm)  # of interfaces before this one
         chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
         if frame is None and chosen.shift.any():
             face = face.moved(*chosen.shift)
         self._make(face, chosen, crown)
-        self._free: PETSc.Vec | None = None
-        self._tangents: list[ContactTangent] = []
         self.constrain(bcs)
         self.indenter = indenter
 
@@ -122,6 +122,8 @@ class Interface(InterfaceResults):
         gap = together(self.comm, lambda: sampling.depth + self.crown_at(sampling.x, sampling.y))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
         self._load = sampling.operator.createVecLeft()
+        self._masked = self._load.duplicate()
+        self._free: PETSc.Vec | None = None
 
     @property
     def comm(self) -> Any:
@@ -170,8 +172,11 @@ class Interface(InterfaceResults):
         Args:
             bcs: The conditions; none: nothing is left out.
         """
+        rows = self.__dict__.pop("_points_by_free", None)
+        for part in (self._free, rows) if self._free is not None else ():
+            if part is not None:
+                part.destroy()
         self._free = free_unknowns(self.space, bcs, self._load) if bcs else None
-        self.__dict__.pop("_points_by_free", None)
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
         """Add −B p(c(u)) to a residual of internal less external forces [N].
@@ -214,25 +219,20 @@ class Interface(InterfaceResults):
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        rows = self._points_by_free
-        scaled = rows.copy()
-        stiffness = rows.createVecLeft()
-        stiffness.array[:] = self.forces.slope
-        scaled.diagonalScale(L=stiffness)
-        added = rows.transposeMatMult(scaled)
+        added = springs_at(self._points_by_free, self.forces.slope)
         matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
 
         It stands for the state last given to `move_tangent`, and for what the matrix holds when it
-        is applied. The interface keeps it alive.
+        is applied. It serves as long as the interface is kept.
 
         Args:
             matrix: The user's own tangent, such as the matrix of elasticity.
         """
-        self._tangents.append(ContactTangent(matrix, [self]))
-        return self._tangents[-1].shell
+        return ContactTangent([self]).shell(matrix)
 
     def move_tangent(self, x: Any) -> None:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
@@ -243,10 +243,10 @@ class Interface(InterfaceResults):
         if self._free is None:
             self.forces.add_stiffness(x, y)
             return
-        masked, product = x.duplicate(), self._load
-        masked.pointwiseMult(x, self._free)
+        product = self._load
+        self._masked.pointwiseMult(x, self._free)
         product.set(0.0)
-        self.forces.add_stiffness(masked, product)
+        self.forces.add_stiffness(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 

@@ -29,6 +29,7 @@ from macro.linear_solvers.options import (
     WeakContext,
     default_options,
     reason_name,
+    weakly,
 )
 
 Array = NDArray[np.float64]
@@ -102,9 +103,9 @@ class NewtonSolver:
         self.forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
         self.snes.setOptionsPrefix(PREFIX)
-        self.snes.setFunction(lambda _, *vectors: problem.residual(*vectors), base.createVecLeft())
-        self.snes.setJacobian(self._tangent, problem.tangent, base)
-        self.snes.setConvergenceTest(self._converged)
+        self.snes.setFunction(weakly(self._residual), base.createVecLeft())
+        self.snes.setJacobian(weakly(self._tangent), problem.tangent, base)
+        self.snes.setConvergenceTest(weakly(self._converged))
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
         self.snes.ksp.pc.setType("python")
@@ -140,6 +141,11 @@ class NewtonSolver:
             residuals=np.array(self._residuals),
             reason=reason,
         )
+
+    def _residual(
+        self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec
+    ) -> None:
+        self._problem.residual(displacement, residual)
 
     def _tangent(
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat

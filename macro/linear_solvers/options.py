@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
+
+T = TypeVar("T")
 
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
@@ -248,6 +250,26 @@ def _by_mumps(preconditioner: PETSc.PC) -> bool:
         return False
     preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
     return str(preconditioner.getFactorSolverType()) == "mumps"
+
+
+def weakly(method: Callable[..., T]) -> Callable[..., T]:
+    """Return a call of an object's method for PETSc, which does not keep the object alive.
+
+    A solver that held its owner would be freed by Python's search for cycles alone, at any moment,
+    such as that in which PETSc forgets what was dropped; see `set_up`.
+
+    Args:
+        method: The bound method.
+    """
+    kept = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> T:
+        bound = kept()
+        if bound is None:
+            raise ReferenceError("the owner of a PETSc solver is gone")
+        return bound(*arguments)
+
+    return call
 
 
 class WeakContext:
