@@ -258,6 +258,7 @@ def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConv
     """Return the error of a plane that finds no equilibrium."""
     remedies = {
         "NO_CONTACT": "no patch can be touched",
+        "NO_RELEASE": "the laws press however far the plane is",
         "NO_SUPPORT": "no further patch can be touched that would hold the plane: prescribe its "
         "tilt (load.tilt) or take more patches (patches.grid)",
     }

@@ -31,7 +31,8 @@ from macro.linear_solvers.options import (
 Array = NDArray[np.float64]
 
 _INNER = 1e-3
-"""Share of the inner forces J u that residuals are compared with where contact forces are less."""
+"""Share of the inner forces J u that residuals are compared with where contact forces are less: of
+the largest so far, because a body without any load has none at its solution."""
 
 _SMALL = 3000
 """Largest number of unknowns that is factorised by default. The coarse grids of smaller problems
@@ -105,7 +106,7 @@ class ContactProblem:
         matrix = self._equations.matrix
         self._assembling, self._in_matrix = in_matrix, list[Interface]()
         self._tangent = ContactTangent(self.interfaces)
-        self._norms: list[float] = []
+        self._norms, self._largest = list[float](), 0.0
         self._contact = matrix.createVecRight()
         self._inner = self._contact.duplicate()
         usual = _FACTORISED if matrix.getSize()[0] <= _SMALL else _multigrid(space)
@@ -130,7 +131,7 @@ class ContactProblem:
         compat.collect_garbage(self._equations.comm)
         start = self.displacement.x.array.copy()
         planes = [interface.forces.plane for interface in self.interfaces]
-        self._norms = []
+        self._norms, self._largest = [], 0.0
         self._share_tangents()
         solution = self._equations.vector.copy()
         try:
@@ -195,7 +196,8 @@ class ContactProblem:
 
     def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
         self._equations.matrix.mult(self._equations.vector, self._inner)
-        scale = max(self._contact.norm(), _INNER * self._inner.norm())
+        self._largest = max(self._largest, _INNER * self._inner.norm())
+        scale = max(self._contact.norm(), self._largest)
         self._norms.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0

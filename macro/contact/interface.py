@@ -132,7 +132,7 @@ class Interface(InterfaceResults):
 
     @property
     def indenter(self) -> RigidPlane | Control:
-        """The plane, or what is prescribed of it; setting a force of zero is collective."""
+        """The plane, or what is prescribed of it; without force it follows the displacements."""
         return self._indenter
 
     @indenter.setter
