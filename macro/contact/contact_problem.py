@@ -24,6 +24,8 @@ from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
     default_options,
+    iterating,
+    options_read,
     reason_name,
     weakly,
 )
@@ -66,7 +68,8 @@ class ContactProblem:
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
             default conjugate gradients with algebraic multigrid, hypre's for linear elements and
             PETSc's for quadratic ones, or with a factorisation of small problems. What stands
-            behind ``-patchlaw_`` on the command line wins.
+            behind ``-patchlaw_`` on the command line wins. A factorisation alone (``"ksp_type":
+            "preonly"``) preconditions GMRES, as contact is no part of what is factorised.
         in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
             preconditioner knows them: needed where only contact holds the body. The preconditioner
             is made anew in every Newton step then.
@@ -77,7 +80,8 @@ class ContactProblem:
         report: Iterations and residuals of the latest solve; None before.
 
     Raises:
-        InputError: On all ranks, when an interface is that of another space, or F is not in u.
+        InputError: On all ranks, when an interface is that of another space, or F is not in u; from
+            the first solve, when PETSc has no use for one of the options.
 
     Note:
         Construction and all methods are collective. A change of the mesh is not seen.
@@ -114,6 +118,7 @@ class ContactProblem:
         apart = {"pc_use_amat": False}
         given = dict(petsc_options or {})
         self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **apart, **given}
+        self._unread = set(given)
         self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
         self._snes = self._solver()
 
@@ -137,6 +142,8 @@ class ContactProblem:
         try:
             with default_options(PREFIX, self._options):
                 self._snes.solve(None, solution)
+                self._unread -= options_read(PREFIX, self._unread)
+            self._require_useful_options()
             self._require_convergence()
         except Exception:
             self.displacement.x.array[:] = start
@@ -169,6 +176,8 @@ class ContactProblem:
         snes.setConvergenceTest(weakly(self._converged))
         with default_options(PREFIX, self._options):
             snes.setFromOptions()
+            self._unread -= options_read(PREFIX, self._unread)
+        iterating(snes.ksp, "gmres")
         user = PETSc.Options(PREFIX)
         self._forcing &= not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         return snes
@@ -201,6 +210,20 @@ class ContactProblem:
         self._norms.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
+
+    def _require_useful_options(self) -> None:
+        """Refuse options that PETSc did not read; some are read where the first system is solved.
+
+        Raises:
+            InputError: With their names.
+        """
+        if self._unread and self._snes.its:
+            raise InputError(
+                "PETSc's solvers have no such option, or no use for it here",
+                key="petsc_options",
+                value=sorted(self._unread),
+                allowed="names without prefix and dash, such as 'pc_type'",
+            )
 
     def _require_convergence(self) -> None:
         snes = self._snes

@@ -26,9 +26,10 @@ from macro.contact.stiff_contact import ContactPreconditioner
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
-    WeakContext,
     default_options,
+    iterating,
     reason_name,
+    set_own_preconditioner,
     weakly,
 )
 
@@ -106,14 +107,14 @@ class NewtonSolver:
         self.snes.setFunction(weakly(self._residual), base.createVecLeft())
         self.snes.setJacobian(weakly(self._tangent), problem.tangent, base)
         self.snes.setConvergenceTest(weakly(self._converged))
+        self._preconditioner = ContactPreconditioner(problem, face, solver)
+        set_own_preconditioner(self.snes.ksp, self._preconditioner)
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
-        self.snes.ksp.pc.setType("python")
-        self._preconditioner = ContactPreconditioner(problem, face, solver)
+        iterating(self.snes.ksp)
         self._remedy = "take more load steps (load.steps)"
         if face is None:
             self._remedy += " or, on a very soft body, coupling.newton = 'condensed'"
-        self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
         """Solve from an initial guess.

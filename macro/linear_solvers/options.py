@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import weakref
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -11,6 +12,7 @@ from typing import Any, TypeVar
 from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
+from macro.compat import call
 
 T = TypeVar("T")
 
@@ -97,6 +99,48 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     finally:
         for name in added:
             database.delValue(name)
+
+
+def options_read(prefix: str, names: Iterable[str]) -> set[str]:
+    """Return those of some options that PETSc's objects have asked for since they were set.
+
+    Args:
+        prefix: Prefix of the options.
+        names: Their names without it.
+    """
+    found, read = set(), ctypes.c_int(0)
+    for name in names:
+        call("PetscOptionsUsed", None, f"{prefix}{name}".encode(), ctypes.byref(read))
+        found |= {name} if read.value else set()
+    return found
+
+
+def iterating(solver: PETSc.KSP, method: str = "cg") -> None:
+    """Let a solver iterate whose user asked for a factorisation alone (``-ksp_type preonly``).
+
+    What is factorised is the matrix of the body. The tangent also has contact in it, of which
+    entries would couple all nodes of a patch: for it the factors are a preconditioner.
+
+    Args:
+        solver: The solver, its options set.
+        method: The Krylov method.
+    """
+    if solver.getType() == "preonly":
+        solver.setType(method)
+
+
+def set_own_preconditioner(solver: PETSc.KSP, preconditioner: Any) -> None:
+    """Give a solver a preconditioner of ours; call it before options are set.
+
+    The user's options under `PREFIX` are those of the body's preconditioner, which ours applies.
+
+    Args:
+        solver: The solver.
+        preconditioner: Has ``apply``; keep it as long as the solver.
+    """
+    solver.pc.setOptionsPrefix(f"{PREFIX}contact_")
+    solver.pc.setType("python")
+    solver.pc.setPythonContext(WeakContext(preconditioner))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
