@@ -143,9 +143,7 @@ class NewtonSolver:
             reason=reason,
         )
 
-    def _residual(
-        self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec
-    ) -> None:
+    def _residual(self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
         self._problem.residual(displacement, residual)
 
     def _tangent(
