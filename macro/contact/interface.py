@@ -25,7 +25,7 @@ from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.contact_tangent import ContactTangent, free_unknowns
 from macro.contact.interface_laws import InterfaceLaws, laws_on_face
 from macro.contact.interface_state import InterfaceResults, InterfaceState
-from macro.contact.loaded_face import LoadedFace, Mode
+from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
 from macro.linear_solvers.stiffened import springs_at
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Interface(InterfaceResults):
         facet_tags: The facet tags of its mesh; or an object that has them as ``facet_tags`` beside
             names: a `TaggedMesh`, or what the newest dolfinx reads from gmsh. None where `tag` are
             the facets.
-        tag: The face by number, by name, or as an array of this rank's facets.
+        tag: The face by number, by name, or as an array of this rank's facets or a mask of them.
         laws: A table of laws per patch, such as a `LawTable`; one law for the whole face, such as
             a representative one; or one law per patch beside `patches`.
         indenter: Approach and tilt of the plane (`RigidPlane`, centre in coordinates of the
@@ -119,8 +119,10 @@ class Interface(InterfaceResults):
         self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
         sampling = self._face.sampling(chosen.mode)
         self.sampling, self.marked, self._crown = sampling, face.marked, crown
-        gap = together(self.comm, lambda: sampling.depth + self.crown_at(sampling.x, sampling.y))
+        gap = together(self.comm, lambda: sampling.below(crown))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
+        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
+            evaluate(-gap)
         self._load = sampling.operator.createVecLeft()
         self._masked = self._load.duplicate()
         self._free: PETSc.Vec | None = None
@@ -158,8 +160,7 @@ class Interface(InterfaceResults):
 
     def crown_at(self, x: Array, y: Array) -> Array:
         """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
-        depth = np.zeros(len(x)) if self._crown is None else self._crown(x, y)
-        return np.broadcast_to(np.asarray(depth, dtype=np.float64), x.shape)
+        return crown_depth(self._crown, x, y)
 
     def approach_at(self, x: Array, y: Array) -> Array:
         """Return the approach of the plane, where it is now, at points of it, shapes (n,) [mm]."""
