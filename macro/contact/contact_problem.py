@@ -102,6 +102,8 @@ class ContactProblem:
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
         self.report: NewtonReport | None = None
         space = displacement.function_space
+        if not all(isinstance(interface, Interface) for interface in self.interfaces):
+            raise InputError("these are no interfaces", value=self.interfaces)
         if any(interface.space is not space for interface in self.interfaces):
             raise InputError("an interface is that of another space than the displacement's")
         self._equations = UserEquations(residual, displacement, bcs, tangent)

@@ -122,7 +122,9 @@ class Interface(InterfaceResults):
         gap = together(self.comm, lambda: sampling.below(crown))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
         for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
-            evaluate(-gap)
+            values = evaluate(-gap)
+            if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
+                raise InputError("the laws give values that are not finite")
         self._load = sampling.operator.createVecLeft()
         self._masked = self._load.duplicate()
         self._free: PETSc.Vec | None = None
