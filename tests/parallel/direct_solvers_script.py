@@ -44,7 +44,9 @@ def faces():
     """Yield blocks and bodies, of linear and quadratic elements."""
     for cell, name in ((TETRAHEDRA, "P"), (HEXAHEDRA, "Q")):
         for order in (1, 2):
-            shape = BlockShape((1.0, 1.0), height=1.0, cells=(5, 5, 3), element=f"{name}{order}")
+            shape = BlockShape(
+                interface=(1.0, 1.0), height=1.0, cells=(5, 5, 3), element=f"{name}{order}"
+            )
             yield (
                 f"block {name}{order}",
                 LoadedFace.of_block(Block(block_mesh(shape, COMM), MATERIAL), PATCHES),

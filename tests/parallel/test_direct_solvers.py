@@ -21,6 +21,7 @@ def forces(mpirun, root):
     def of(choice, ranks):
         script = root / "tests" / "parallel" / "direct_solvers_script.py"
         done = mpirun(ranks, script, *CHOICES.get(choice, "").split())
+        assert done.returncode == 0, done.stdout + done.stderr
         return json.loads(done.stdout.splitlines()[-1])
 
     return of
@@ -31,5 +32,6 @@ def forces(mpirun, root):
 def test_forces_are_those_of_multigrid(forces, choice, ranks):
     usual, found = forces("usual", 1), forces(choice, ranks)
     for name in usual:
-        # Newton's method and the equilibrium of the plane end at 1e-9
-        np.testing.assert_allclose(found[name], usual[name], rtol=1e-8, err_msg=name)
+        # Newton's method and the equilibrium of the plane end at 1e-9 of the force
+        least = 1e-8 * max(usual[name])
+        np.testing.assert_allclose(found[name], usual[name], rtol=0.0, atol=least, err_msg=name)
