@@ -51,7 +51,7 @@ class TextNumbers:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             try:
-                self._values = np.fromstring(content, sep=" ")  # type: ignore[call-overload]
+                self._values = np.fromstring(content, sep=" ")
             except (DeprecationWarning, ValueError):
                 raise InputError("a section has something else than numbers") from None
         self._at = 0
