@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import h5py
 import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
@@ -24,9 +23,6 @@ _CELLS = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 
 NAMES = "patchlaw tags"
 """Name of the entry with the names of the tags, as JSON: tags of ``facets`` and ``cells``."""
-
-_CHUNK = 1 << 16
-"""Cells that are checked at a time."""
 
 _ALLOWED = "one mesh of first-order tetrahedra or hexahedra, as dolfinx writes it"
 
@@ -57,6 +53,7 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
     layout = on_root(comm, lambda: _layout(path))
     try:
         with compat.quiet_compiler(), io.XDMFFile(comm, str(path), "r") as file:
+            _check_nodes(file, layout.mesh, comm)
             mesh = file.read_mesh(name=layout.mesh)
             mesh.topology.create_connectivity(2, 3)
             mesh.topology.create_connectivity(3, 2)
@@ -105,7 +102,6 @@ def _layout(path: Path) -> _Layout:
             f"the mesh has cells that do not fit{flat}", value=kinds[mesh], allowed=_ALLOWED
         )
     _check_data(uniform[mesh], path)
-    _check_nodes(uniform[mesh], path)
     tagged = {
         name: kinds[name] for name, grid in uniform.items() if grid.find("Attribute") is not None
     }
@@ -147,24 +143,9 @@ def _check_data(grid: ElementTree.Element, path: Path) -> None:
                 raise InputError(f"its numbers are in {data.name}, which is not there")
 
 
-def _check_nodes(grid: ElementTree.Element, path: Path) -> None:
+def _check_nodes(file: Any, name: str, comm: Any) -> None:
     """Refuse cells with nodes that are not in the file; dolfinx would wait for them for ever."""
-    places = []
-    for part in ("Geometry", "Topology"):
-        item = grid.find(f"{part}/DataItem")
-        if item is None or item.get("Format") != "HDF" or not item.text:
-            return
-        places.append(item.text.strip().rsplit(":", 1))
-    (points, points_at), (cells, cells_at) = places
-    try:
-        with h5py.File(path.parent / points) as file:
-            count = file[points_at].shape[0]
-        with h5py.File(path.parent / cells) as file:
-            table = file[cells_at]
-            for start in range(0, len(table), _CHUNK):
-                part_of = table[start : start + _CHUNK]
-                absent = part_of[(part_of < 0) | (part_of >= count)]
-                if absent.size:
-                    raise InputError(f"cells have the node {absent[0]} of {count} nodes")
-    except (OSError, KeyError) as error:
-        raise InputError(f"its numbers cannot be read: {error}", allowed=_ALLOWED) from error
+    count, cells = comm.allreduce(len(file.read_geometry_data(name))), file.read_topology_data(name)
+    absent = cells[(cells < 0) | (cells >= count)]
+    if found := [node for part in comm.allgather(absent[:1].tolist()) for node in part]:
+        raise InputError(f"cells have the node {found[0]} of {count} nodes")

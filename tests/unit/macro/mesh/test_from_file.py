@@ -143,7 +143,7 @@ def test_xdmf_that_does_not_fit_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"its numbers are in moved\.h5, which is not there"):
         read_mesh(path, COMM)
     (tmp_path / "moved.h5").write_text("no numbers")
-    with pytest.raises(InputError, match=r"moved\.xdmf: its numbers cannot be read"):
+    with pytest.raises(InputError, match="dolfinx cannot read it"):
         read_mesh(path, COMM)
     path.write_text(path.read_text().replace('"Tetrahedron"', '"Tetrahedron_10"'))
     with pytest.raises(InputError, match=r"'tetrahedron_10': .* first-order tetrahedra"):
