@@ -38,9 +38,6 @@ KINDS = {
 _MOST_TAGS = 100_000
 """Most numbers beside an element's nodes: its groups and the parts of the mesh it is in."""
 
-_NODES = np.full(max(KINDS) + 1, -1)
-_NODES[list(KINDS)] = [nodes for _, nodes, _ in KINDS.values()]
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Elements:
@@ -250,24 +247,19 @@ def _rows_of_bytes(numbers: Numbers, count: int) -> Iterator[tuple[int, int, Tab
 
 def _rows_of_text(values: Table, count: int) -> Iterator[tuple[int, int, Table]]:
     """Yield kind, number of tags, and tags with nodes of elements of text files."""
-    kinds, tags = (np.roll(values, -k) for k in (1, 2))
-    nodes = _NODES[np.where((kinds >= 0) & (kinds < len(_NODES)), kinds, 0)]
-    ends = np.arange(len(values)) + 3 + np.clip(tags, 0, len(values)) + nodes
-    following, starts, at = ends.tolist(), [], 0
+    flat, at = values.data, 0
+    starts: dict[tuple[int, int], list[int]] = {}
     for _ in range(count):
-        if at + 3 > len(values):
-            break
-        starts.append(at)
-        _kind(int(kinds[at]))
-        at = following[at]
-    if len(starts) < count or at > len(values):
+        kind, tags = (flat[at + 1], flat[at + 2]) if at + 3 <= len(flat) else (0, -1)
+        if tags < 0:
+            raise InputError("a section of the file ends before all that it announces")
+        starts.setdefault((kind, tags), []).append(at + 3)
+        at += 3 + tags + _kind(kind)[1]
+    if at > len(flat):
         raise InputError("a section of the file ends before all that it announces")
-    first = np.array(starts, dtype=np.int64)
-    pairs = np.column_stack([kinds[first], np.maximum(tags[first], 0)])
-    for kind, several in np.unique(pairs, axis=0):
-        rows = first[(pairs == (kind, several)).all(axis=1)]
-        width = int(several) + int(_NODES[kind])
-        yield int(kind), int(several), values[rows[:, None] + 3 + np.arange(width)]
+    for (kind, tags), first in starts.items():
+        width = tags + KINDS[kind][1]
+        yield kind, tags, values[np.array(first)[:, None] + np.arange(width)]
 
 
 def _kind(kind: int) -> tuple[int, int, str]:
