@@ -93,9 +93,13 @@ class NotConverged(PatchlawError, RuntimeError):
         reason: The name of the reason.
         iterations: Iterations spent.
         remedy: What to change, with the scene key where there is one.
+
+    Attributes:
+        history: The load steps before it, where a whole run was asked for.
     """
 
     exit_code = 3
+    history: Any = None
 
     def __init__(self, what: str, *, reason: str, iterations: int, remedy: str) -> None:
         self.what, self.reason, self.iterations, self.remedy = what, reason, iterations, remedy

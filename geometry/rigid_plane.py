@@ -59,7 +59,7 @@ class Control:
             )
         if self.approach is not None:
             _check_approach(self.approach)
-        if self.force is not None and not (np.isfinite(self.force) and self.force >= 0.0):
+        if self.force is not None and not (_is_finite(self.force) and self.force >= 0.0):
             raise InputError("the force must not be negative", value=self.force, allowed="≥ 0 N")
         if self.tilt is not None:
             _check_tilt(self.tilt)
@@ -258,6 +258,7 @@ def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConv
     """Return the error of a plane that finds no equilibrium."""
     remedies = {
         "NO_CONTACT": "no patch can be touched",
+        "NO_RELEASE": "the laws press however far the plane is",
         "NO_SUPPORT": "no further patch can be touched that would hold the plane: prescribe its "
         "tilt (load.tilt) or take more patches (patches.grid)",
     }
@@ -271,12 +272,17 @@ def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConv
 
 
 def _check_approach(approach: float) -> None:
-    if not np.isfinite(approach):
+    if not _is_finite(approach):
         raise InputError("the approach must be finite", value=approach, allowed="mm")
 
 
 def _check_tilt(tilt: tuple[float, float]) -> None:
-    if np.shape(tilt) != (2,) or not np.all(np.isfinite(tilt)):
+    if np.shape(tilt) != (2,) or not all(map(_is_finite, tilt)):
         raise InputError(
             "the tilt must be two finite slopes", value=tilt, allowed="(tx, ty) in mm/mm"
         )
+
+
+def _is_finite(value: Any) -> bool:
+    """Tell whether something is a finite number."""
+    return isinstance(value, float | int | np.number) and bool(np.isfinite(value))

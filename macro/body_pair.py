@@ -19,6 +19,7 @@ from macro.linear_solvers.options import (
     PREFIX,
     WeakContext,
     default_options,
+    set_own_preconditioner,
 )
 
 Array = NDArray[np.float64]
@@ -79,10 +80,9 @@ class BodyPair:
         solver = PETSc.KSP().create(self.comm)
         solver.setOptionsPrefix(PREFIX)
         solver.setOperators(self.stiffness)
+        set_own_preconditioner(solver, self._preconditioner)
         with default_options(PREFIX, KRYLOV_DEFAULTS):
             solver.setFromOptions()
-        solver.pc.setType("python")
-        solver.pc.setPythonContext(WeakContext(self._preconditioner))
         solver.setUp()
         return solver
 

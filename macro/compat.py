@@ -6,10 +6,12 @@ all releases share, and petsc4py.
 
 from __future__ import annotations
 
+import ctypes
 import inspect
 import logging
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -397,6 +399,27 @@ def write_tags(file: Any, tags: Any, mesh: Any) -> None:
     """Write tags of a mesh's facets or cells to an XDMF file that holds the mesh; collective."""
     in_python = inspect.isfunction(io.XDMFFile.write_meshtags)  # later than 0.5
     file.write_meshtags(tags, *([mesh.geometry] if in_python else []))
+
+
+@cache
+def _petsc() -> ctypes.CDLL:
+    """Return the PETSc library that petsc4py itself is linked with."""
+    return ctypes.CDLL(PETSc.__file__)
+
+
+def call(name: str, *arguments: Any) -> None:
+    """Call a function of PETSc's C interface that petsc4py does not offer.
+
+    Args:
+        name: The function.
+        arguments: As `ctypes` takes them.
+
+    Raises:
+        PETSc.Error: When it fails.
+    """
+    code = getattr(_petsc(), name)(*arguments)
+    if code:
+        raise PETSc.Error(code)
 
 
 def collect_garbage(comm: PETSc.Comm) -> None:

@@ -352,16 +352,20 @@ def run(
 
     Raises:
         InputError: When the scene cannot be made.
-        NotConverged: When a load step fails for good.
+        NotConverged: When a load step fails for good; its ``history`` has those before it.
         NotInstalled: When the scene needs a package that is missing.
 
     Note:
         Collective.
     """
     whole = Run(scene, comm)
-    for step in whole.load_steps():
-        if observe is not None:
-            observe(step)
-    history = whole.history()
-    whole.close()
-    return history
+    try:
+        for step in whole.load_steps():
+            if observe is not None:
+                observe(step)
+        return whole.history()
+    except NotConverged as error:
+        error.history = whole.history()
+        raise
+    finally:
+        whole.close()

@@ -46,7 +46,7 @@ def write_body(script: str, says: str, size: float, build: Callable[[float], Non
     parser.add_argument("--size", type=float, default=size)
     parser.add_argument("--out", type=Path, default=Path(script).with_suffix(".msh"))
     choice = parser.parse_args()
-    gmsh.initialize(["", "-v", "2"])
+    gmsh.initialize(["", "-v", "2"], readConfigFiles=False)
     build(choice.size)
     gmsh.model.mesh.generate(3)
     gmsh.write(str(choice.out))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
-from geometry.meshes.gmsh_elements import Elements, elements_of, properties
-from geometry.meshes.gmsh_session import gmsh_session
+from geometry.meshes.msh_sections import KINDS, MshContent, msh_content
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]
@@ -21,11 +20,24 @@ _STRAIGHT = 1e-6
 
 _ALLOWED = "tetrahedra alone, or hexahedra alone"
 
-_CORNERS = {"Tetrahedron": [0, 1, 2, 3], "Hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
+_CORNERS = {"tetrahedron": [0, 1, 2, 3], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
 """Corners of gmsh's cells in the order of dolfinx; those of hexahedra form a tensor product."""
 
-_FACETS = {"Tetrahedron": (3, "Triangle"), "Hexahedron": (4, "Quadrilateral")}
-"""Corners and name of the facets of a cell."""
+_FACETS = {"tetrahedron": ("triangle", 3), "hexahedron": ("quadrilateral", 4)}
+"""Name and corners of the facets of a cell."""
+
+_EDGES = (
+    (0, 1), (0, 3), (0, 4), (1, 2), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 7), (5, 6), (6, 7)
+)  # fmt: skip
+_FACES = (0, 1, 2, 3), (0, 1, 4, 5), (0, 3, 4, 7), (1, 2, 5, 6), (2, 3, 6, 7), (4, 5, 6, 7)
+_MIDDLES: Mapping[str, Sequence[Sequence[int]]] = {
+    "tetrahedron": ((0, 1), (1, 2), (0, 2), (0, 3), (2, 3), (1, 3)),
+    "hexahedron": (*_EDGES, *_FACES, range(8)),
+}
+"""Corners, as gmsh counts them, between which its nodes of second order lie."""
+
+NO_GROUP = 0
+"""Tag of cells without a physical group, where other cells have one; its name is the number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,7 +64,7 @@ class MeshArrays:
 
 
 def read_gmsh_file(path: Path) -> MeshArrays:
-    """Read a mesh from gmsh's file, of format 2 or 4, text or binary.
+    """Read a mesh from gmsh's file, of format 2 or 4, text or binary; gmsh takes no part.
 
     The physical groups of volumes and surfaces give tags and names. Where a file has no physical
     group of volumes, their own numbers are the tags; surfaces in the same way.
@@ -64,103 +76,120 @@ def read_gmsh_file(path: Path) -> MeshArrays:
         InputError: When it is no such file, or holds no mesh of tetrahedra alone or hexahedra alone
             with straight edges, or when a volume or a surface has two groups.
     """
-    _check_format(path)
-    with gmsh_session("mesh of a file") as gmsh:
-        try:
-            gmsh.merge(str(path))
-        except Exception as error:  # gmsh raises nothing more special
-            raise InputError(f"gmsh cannot read it: {error}", file=str(path)) from error
-        try:
-            return _arrays(gmsh)
-        except InputError as error:
-            raise error.located(file=str(path)) from error
-
-
-def _check_format(path: Path) -> None:
-    """Refuse what is no mesh by its first lines; gmsh would take it for a script and run it."""
     try:
-        with path.open("rb") as file:
-            start = file.read(4096)
+        return _arrays(msh_content(path.read_bytes()))
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=str(path)) from error
-    if not start.strip():
-        raise InputError("the file is empty", file=str(path))
-    allowed = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"
-    first = [line.strip() for line in start.split(b"\n")]
-    if b"$MeshFormat" not in first or not start.lstrip().startswith(b"$"):
-        raise InputError("this is no mesh of gmsh", file=str(path), allowed=allowed)
-    version = first[first.index(b"$MeshFormat") + 1 :][:1]
-    number = version[0].split(b" ")[0].decode("ascii", "replace") if version else ""
-    if number[:1] not in ("2", "4"):
-        raise InputError("unknown format", value=number, file=str(path), allowed=allowed)
+    except InputError as error:
+        raise error.located(file=str(path)) from error
 
 
-def _arrays(gmsh: Any) -> MeshArrays:
-    """Return the mesh of the current model."""
-    kind, cells = _cells(gmsh)
-    name, order, count, inner, corners = properties(gmsh, kind)
-    numbers, places, _ = gmsh.model.mesh.getNodes()
-    sorting = np.argsort(numbers)
-    numbers, points = numbers[sorting], np.reshape(places, (-1, 3))[sorting]
-    table = np.searchsorted(numbers, cells.nodes[kind])
-    if order > 1:
-        _check_straight(points[table], corners, np.reshape(inner, (count, 3)))
+def _arrays(content: MshContent) -> MeshArrays:
+    """Return the mesh of a file."""
+    sorting = np.argsort(content.numbers, kind="stable")
+    numbers, points = content.numbers[sorting], content.points[sorting]
+    if (again := numbers[1:][numbers[1:] == numbers[:-1]]).size:
+        raise InputError(f"several nodes of the mesh have the number {again[0]}")
+    kind = _kind_of_cells(content)
+    name = KINDS[kind][2]
+    cells, cell_tags, cell_names = _tagged(content, 3, name, KINDS[kind][1])
+    table = _rows(numbers, cells)
+    corners = len(_CORNERS[name])
+    if cells.shape[1] > corners:
+        _check_straight(points[table], _MIDDLES[name][: cells.shape[1] - corners])
     table = table[:, _CORNERS[name]]
     _check_repeated(table)
-
-    sides, facet = _FACETS[name]
-    faces = elements_of(gmsh, 2)
-    fitting = [kind for kind in faces.nodes if properties(gmsh, kind)[0] == facet]
-    facets = np.concatenate(
-        [np.empty((0, sides), numbers.dtype), *(faces.nodes[kind][:, :sides] for kind in fitting)]
-    )
-    tags = np.concatenate([np.empty(0, np.int32), *(faces.tags[kind] for kind in fitting)])
-    rows = np.searchsorted(numbers, facets)
+    facets, facet_tags, facet_names = _tagged(content, 2, *_FACETS[name])
+    rows = _rows(numbers, facets)
     used = np.zeros(len(points), dtype=bool)  # nodes of arcs' centres and of other things do not
     used[table] = True
     renumbered = np.where(used, np.cumsum(used) - 1, -1)
     return MeshArrays(
         points=points[used],
         cells=renumbered[table],
-        cell_tags=cells.tags[kind],
+        cell_tags=cell_tags,
         facets=renumbered[rows],
-        facet_tags=tags,
-        cell_names=cells.names,
-        facet_names=faces.names,
+        facet_tags=facet_tags,
+        cell_names=cell_names,
+        facet_names=facet_names,
     )
 
 
-def _cells(gmsh: Any) -> tuple[int, Elements]:
-    """Return the cells and their one kind."""
-    cells = elements_of(gmsh, 3)
-    kinds = {kind: properties(gmsh, kind)[0] for kind in cells.nodes}
-    found = ", ".join(f"{len(cells.tags[kind])} × {kinds[kind].lower()}" for kind in kinds)
-    if not kinds:
-        flat = any(len(tags) for tags in elements_of(gmsh, 2).tags.values())
+def _kind_of_cells(content: MshContent) -> int:
+    """Return the one kind of all cells."""
+    counts: dict[int, int] = {}
+    for part in content.elements:
+        if KINDS[part.kind][0] == 3 and len(part.nodes):
+            counts[part.kind] = counts.get(part.kind, 0) + len(part.nodes)
+    found = ", ".join(f"{count} × {KINDS[kind][2]}" for kind, count in counts.items())
+    if not counts:
+        flat = any(KINDS[part.kind][0] == 2 for part in content.elements)
         problem = "is two-dimensional, it has surfaces only" if flat else "has no cells"
         raise InputError(f"the mesh {problem}", allowed=_ALLOWED)
-    if len(kinds) > 1:
+    if len(counts) > 1:
         raise InputError(f"the mesh has cells of several kinds: {found}", allowed=_ALLOWED)
-    ((kind, name),) = kinds.items()
-    if name not in _CORNERS:
+    (kind,) = counts
+    if KINDS[kind][2] not in _CORNERS:
         raise InputError(f"the mesh has cells of another kind: {found}", allowed=_ALLOWED)
-    return kind, cells
+    return kind
 
 
-def _check_straight(nodes: Array, corners: int, places: Array) -> None:
-    """Refuse cells of higher order, nodes (m, count, 3), unless their edges and faces are flat."""
-    ends = places[:corners]
-    if corners == 4:
-        values = np.column_stack([1.0 - places.sum(axis=1), places])
-    else:
-        values = np.prod(0.5 * (1.0 + places[:, None] * ends), axis=2)
-    straight = np.einsum("qk,mkj->mqj", values, nodes[:, :corners])
+def _tagged(
+    content: MshContent, dimension: int, name: str, nodes: int
+) -> tuple[Table, NDArray[np.int32], dict[str, int]]:
+    """Return nodes and tags of cells, or of the facets that have a tag, and the names of the tags.
+
+    Args:
+        content: The file.
+        dimension: 3 for cells, 2 for facets.
+        name: Of the elements that are meant.
+        nodes: How many of their nodes are meant.
+    """
+    parts = [part for part in content.elements if KINDS[part.kind][0] == dimension]
+    grouped = any(part.group.any() for part in parts)
+    table, tags = np.empty((0, nodes), np.int64), np.empty(0, np.int64)
+    known: set[int] = set()
+    for part in parts:
+        of_part = part.group if grouped else part.entity
+        chosen = of_part != NO_GROUP if grouped and dimension == 2 else of_part >= 0
+        known.update(map(int, np.unique(of_part[chosen])))
+        if KINDS[part.kind][2] == name:
+            table = np.concatenate([table, part.nodes[chosen, :nodes]])
+            tags = np.concatenate([tags, of_part[chosen]])
+    if known and max(known) > np.iinfo(np.int32).max:
+        raise InputError("the number of a group is too large", value=max(known))
+    names = {content.names.get((dimension, tag), str(tag)): tag for tag in sorted(known)}
+    return table, tags.astype(np.int32), names
+
+
+def _rows(numbers: Table, nodes: Table) -> Table:
+    """Return where nodes stand among the numbers of all nodes, which ascend."""
+    rows = np.minimum(np.searchsorted(numbers, nodes), max(len(numbers) - 1, 0))
+    absent = nodes[numbers[rows] != nodes] if len(numbers) else nodes.ravel()
+    if absent.size:
+        raise InputError(
+            f"elements of the mesh have the node {absent[0]}, which the file does not give"
+        )
+    return rows
+
+
+def _check_straight(nodes: Array, middles: Sequence[Sequence[int]]) -> None:
+    """Refuse cells of second order, nodes (m, count, 3), unless their edges and faces are flat.
+
+    Args:
+        nodes: Places of the nodes, corners first.
+        middles: Between which corners each of the others lies.
+    """
+    corners = nodes.shape[1] - len(middles)
+    off = np.zeros(len(nodes), dtype=bool)
     size = np.ptp(nodes[:, :corners], axis=1).max(axis=1)
-    off = np.abs(nodes - straight).max(axis=(1, 2)) > _STRAIGHT * size
+    for k, ends in enumerate(middles, start=corners):
+        straight = nodes[:, list(ends)].mean(axis=1)
+        off |= np.abs(nodes[:, k] - straight).max(axis=1) > _STRAIGHT * size
     if off.any():
         raise InputError(
-            f"{off.sum()} of {len(off)} cells are of second or higher order with curved edges; "
-            'make a mesh of first order: element = "quadratic" gives quadratic displacements on it',
+            f"{off.sum()} of {len(off)} cells are of second order with curved edges; make a mesh "
+            'of first order: element = "quadratic" gives quadratic displacements on it',
             allowed="cells with straight edges",
         )
 

@@ -23,6 +23,7 @@ from macro.contact.node_contact import PlaneOverNodes, not_found
 from macro.linear_solvers.constrained import ConstrainedPreconditioner
 from macro.linear_solvers.node_matrices import node_submatrix
 from macro.linear_solvers.options import WeakContext, reason_name
+from macro.linear_solvers.stiffened import springs_at
 
 Array = NDArray[np.float64]
 
@@ -202,11 +203,7 @@ class StiffPreconditioner:
             dofs: Vertical dofs of this rank that have springs, ascending, shape (n,).
             motions: Their displacements by free motions of the plane, shape (n, k); orthonormal.
         """
-        scale = self._points.createVecLeft()
-        scale.array[:] = stiffness
-        scaled = self._points.copy()
-        scaled.diagonalScale(scale)
-        springs = self._points.transposeMatMult(scaled)
+        springs = springs_at(self._points, stiffness)
         nodes = np.unique(dofs // 3)
         among = 3 * np.searchsorted(nodes, dofs // 3) + dofs % 3
         # a copy of all rows and columns would take 1 kB per dof
@@ -215,7 +212,6 @@ class StiffPreconditioner:
             for matrix in (self._matrix, springs)
         )
         springs.destroy()
-        scaled.destroy()
         self._dofs = dofs
         self._constrained.constrain(dofs, motions)
         self._factors = splu(csc_array(part)) if len(dofs) else None

@@ -15,6 +15,7 @@ from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from macro import compat
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from macro.mesh.facet_nodes import facet_indices
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
 
@@ -85,7 +86,7 @@ def chosen_face(
         tags: The mesh's facet tags; or what dolfinx read from a file, or a `TaggedMesh`, that has
             ``facet_tags`` and names. None where the facets themselves are given.
         tag: Number or name of the face, or this rank's facets, shape (n,), of which a rank may
-            have none.
+            have none, or a mask of all facets that it has.
         names: Numbers of the named faces, where the tags know none.
         frame: Coordinates on the face; None: those of `FaceFrame.through`.
 
@@ -98,12 +99,12 @@ def chosen_face(
     check_space(space)
     mesh = space.mesh
     mesh.topology.create_connectivity(2, 3)
-    if isinstance(tag, str | int | np.integer):
+    if isinstance(tag, str | int | np.integer) and not isinstance(tag, bool):
         tagged, name = _tagged(mesh, tags, names), str(tag)
         number = tagged.facet_tag(tag if isinstance(tag, str) else int(tag))
         given = np.asarray(tagged.facet_tags.find(number))
     else:
-        given, name = together(mesh.comm, lambda: _given(mesh, tag)), "given by its facets"
+        given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
     facets = _on_all_ranks(mesh, given)
     marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
     found = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
@@ -137,20 +138,6 @@ def _groups(tags: Any) -> dict[str, int]:
     """Return the names of surfaces in what the newest dolfinx reads from gmsh."""
     groups = getattr(tags, "physical_groups", None) or {}
     return {name: int(group.tag) for name, group in groups.items() if int(group.dim) == 2}
-
-
-def _given(mesh: Any, facets: Any) -> NDArray[np.int32]:
-    """Return the given facets, ascending, each once."""
-    given = np.unique(np.asarray(facets, dtype=np.int64).ravel())
-    numbers = mesh.topology.index_map(2)
-    count = numbers.size_local + numbers.num_ghosts
-    if len(given) and (given[0] < 0 or given[-1] >= count):
-        raise InputError(
-            "the facets of the contact face are not in the mesh",
-            value=int(given[-1]),
-            allowed=f"this rank's facets, 0 … {count - 1}",
-        )
-    return given.astype(np.int32)
 
 
 def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:

@@ -90,22 +90,20 @@ class ContactForces:
         self._gap = sampling.depth if gap is None else gap
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
+        self._unloaded = False
         self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
         self._border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
-        """Set what a load step prescribes; without any force the plane just touches the surface.
+        """Set what a load step prescribes.
 
         Args:
-            control: What a load step prescribes.
+            control: What a load step prescribes. Without any force the plane just touches the
+                surface, wherever displacements bring that: it follows them, and nothing resists.
             plane: Where the plane is now, shape (3,).
-
-        Raises:
-            NotConverged: When the plane should touch what cannot be touched.
         """
         self.control, self.plane = control, control.prescribed(plane)
-        if control.force == 0.0:
-            self.plane[0] = first_touch(self._touched, control, self.levers.half)
+        self._unloaded = control.force == 0.0
 
     def closure(self, displacement: PETSc.Vec) -> Array:
         """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
@@ -133,6 +131,14 @@ class ContactForces:
                 state=closure,
             )
 
+        if self._unloaded:
+            rest = self.levers.matrix[:, 1:] @ self.plane[1:] - self._gap - displacement
+            approach = first_touch(
+                lambda at: float(self.loads(self.pressure(rest + at))[0]) > 0.0,
+                self.control,
+                self.levers.half,
+            )
+            self.plane = np.array([approach, *self.plane[1:]])
         if not self.control.free.any():
             return self.levers.matrix @ self.plane - self._gap - displacement
         self.plane, closure = find_equilibrium(respond, self.control, self.plane, self.levers.half)
@@ -174,7 +180,9 @@ class ContactForces:
         return together(self.comm, lambda: self._sampling.by_patch(self._pressures, closure))
 
     def stiffness(self, closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc likewise, shape (n,) [MPa/mm]."""
+        """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
+        if self._unloaded:
+            return np.zeros_like(closure)
         return together(self.comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
 
     def loads(self, pressure: Array) -> Array:
@@ -200,11 +208,6 @@ class ContactForces:
         supported = values > UNSUPPORTED * max(values[-1], 0.0)
         return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
 
-    def _touched(self, approach: float) -> bool:
-        """Return whether the plane touches the undeformed block at an approach."""
-        closure = self.levers.matrix @ np.array([approach, *self.plane[1:]]) - self._gap
-        return float(self.loads(self.pressure(closure))[0]) > 0.0
-
 
 def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:
     """Find the largest approach at which a plane is not in contact yet [mm].
@@ -215,11 +218,13 @@ def first_touch(touched: Callable[[float], bool], control: Control, half: float)
         half: Half the diagonal of the interface [mm].
 
     Raises:
-        NotConverged: When it never is.
+        NotConverged: When it never is, or always.
     """
     below, above, width = -_FIRST * half, _FIRST * half, np.inf
     while touched(below):
         below, above = 3.0 * below, below
+        if below < -_FARTHEST * half:
+            raise plane_failure(control, "NO_RELEASE")
     while not touched(above):
         below, above = above, 3.0 * above
         if above > _FARTHEST * half:

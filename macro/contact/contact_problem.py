@@ -24,13 +24,17 @@ from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
     default_options,
+    iterating,
+    options_read,
     reason_name,
+    weakly,
 )
 
 Array = NDArray[np.float64]
 
 _INNER = 1e-3
-"""Share of the inner forces J u that residuals are compared with where contact forces are less."""
+"""Share of the inner forces J u that residuals are compared with where contact forces are less: of
+the largest so far, because a body without any load has none at its solution."""
 
 _SMALL = 3000
 """Largest number of unknowns that is factorised by default. The coarse grids of smaller problems
@@ -64,7 +68,8 @@ class ContactProblem:
         petsc_options: Options of the solvers without a prefix, such as ``{"pc_type": "lu"}``. By
             default conjugate gradients with algebraic multigrid, hypre's for linear elements and
             PETSc's for quadratic ones, or with a factorisation of small problems. What stands
-            behind ``-patchlaw_`` on the command line wins.
+            behind ``-patchlaw_`` on the command line wins. A factorisation alone (``"ksp_type":
+            "preonly"``) preconditions GMRES, as contact is no part of what is factorised.
         in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
             preconditioner knows them: needed where only contact holds the body. The preconditioner
             is made anew in every Newton step then.
@@ -75,7 +80,8 @@ class ContactProblem:
         report: Iterations and residuals of the latest solve; None before.
 
     Raises:
-        InputError: On all ranks, when an interface is that of another space, or F is not in u.
+        InputError: On all ranks, when an interface is that of another space, or F is not in u; from
+            the first solve, when PETSc has no use for one of the options.
 
     Note:
         Construction and all methods are collective. A change of the mesh is not seen.
@@ -96,6 +102,8 @@ class ContactProblem:
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)
         self.report: NewtonReport | None = None
         space = displacement.function_space
+        if not all(isinstance(interface, Interface) for interface in self.interfaces):
+            raise InputError("these are no interfaces", value=self.interfaces)
         if any(interface.space is not space for interface in self.interfaces):
             raise InputError("an interface is that of another space than the displacement's")
         self._equations = UserEquations(residual, displacement, bcs, tangent)
@@ -103,8 +111,8 @@ class ContactProblem:
             interface.constrain(self._equations.bcs)
         matrix = self._equations.matrix
         self._assembling, self._in_matrix = in_matrix, list[Interface]()
-        self._tangent = ContactTangent(matrix, self.interfaces)
-        self._norms: list[float] = []
+        self._tangent = ContactTangent(self.interfaces)
+        self._norms, self._largest = list[float](), 0.0
         self._contact = matrix.createVecRight()
         self._inner = self._contact.duplicate()
         usual = _FACTORISED if matrix.getSize()[0] <= _SMALL else _multigrid(space)
@@ -112,6 +120,7 @@ class ContactProblem:
         apart = {"pc_use_amat": False}
         given = dict(petsc_options or {})
         self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **usual, **apart, **given}
+        self._unread = set(given)
         self._forcing = not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
         self._snes = self._solver()
 
@@ -126,14 +135,17 @@ class ContactProblem:
                 before. Also when a closure is beyond the table of a law (``LAW_RANGE``); then the
                 displacement is the solution on the tangents of the laws.
         """
+        compat.collect_garbage(self._equations.comm)
         start = self.displacement.x.array.copy()
         planes = [interface.forces.plane for interface in self.interfaces]
-        self._norms = []
+        self._norms, self._largest = [], 0.0
         self._share_tangents()
         solution = self._equations.vector.copy()
         try:
             with default_options(PREFIX, self._options):
                 self._snes.solve(None, solution)
+                self._unread -= options_read(PREFIX, self._unread)
+            self._require_useful_options()
             self._require_convergence()
         except Exception:
             self.displacement.x.array[:] = start
@@ -141,7 +153,6 @@ class ContactProblem:
                 interface.forces.plane = plane
             raise
         self._equations.take(solution)
-        compat.collect_garbage(solution.comm)
         self._finish()
         return int(self._snes.its)
 
@@ -156,16 +167,19 @@ class ContactProblem:
     def _share_tangents(self) -> None:
         """Decide which tangents are assembled: those that can be, under their indenters now."""
         self._in_matrix = [each for each in self.interfaces if self._assembling and each.assembles]
-        self._tangent.interfaces = [each for each in self.interfaces if each not in self._in_matrix]
+        self._tangent.follow([each for each in self.interfaces if each not in self._in_matrix])
 
     def _solver(self) -> PETSc.SNES:
         snes = PETSc.SNES().create(self._equations.comm)
         snes.setOptionsPrefix(PREFIX)
-        snes.setFunction(self._write_residual, self._contact.duplicate())
-        snes.setJacobian(self._update_tangent, self._tangent.shell, self._equations.matrix)
-        snes.setConvergenceTest(self._converged)
+        matrix = self._equations.matrix
+        snes.setFunction(weakly(self._write_residual), self._contact.duplicate())
+        snes.setJacobian(weakly(self._update_tangent), self._tangent.shell(matrix), matrix)
+        snes.setConvergenceTest(weakly(self._converged))
         with default_options(PREFIX, self._options):
             snes.setFromOptions()
+            self._unread -= options_read(PREFIX, self._unread)
+        iterating(snes.ksp, "gmres")
         user = PETSc.Options(PREFIX)
         self._forcing &= not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         return snes
@@ -193,10 +207,25 @@ class ContactProblem:
 
     def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
         self._equations.matrix.mult(self._equations.vector, self._inner)
-        scale = max(self._contact.norm(), _INNER * self._inner.norm())
+        self._largest = max(self._largest, _INNER * self._inner.norm())
+        scale = max(self._contact.norm(), self._largest)
         self._norms.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
+
+    def _require_useful_options(self) -> None:
+        """Refuse options that PETSc did not read; some are read where the first system is solved.
+
+        Raises:
+            InputError: With their names.
+        """
+        if self._unread and self._snes.its:
+            raise InputError(
+                "PETSc's solvers have no such option, or no use for it here",
+                key="petsc_options",
+                value=sorted(self._unread),
+                allowed="names without prefix and dash, such as 'pc_type'",
+            )
 
     def _require_convergence(self) -> None:
         snes = self._snes

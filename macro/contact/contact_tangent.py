@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any, Protocol
 
 from petsc4py import PETSc
 
-from macro.linear_solvers.options import WeakContext
+_MATRIX = "patchlaw matrix"
 
 
 class AddsProduct(Protocol):
@@ -19,28 +20,33 @@ class AddsProduct(Protocol):
 
 
 class ContactTangent:
-    """A matrix plus the derivatives of interfaces.
+    """What PETSc holds of a matrix plus the derivatives of interfaces, which the user keeps.
+
+    The references to them are weak, and PETSc itself counts the matrix: an object that Python lets
+    go of while PETSc frees the shell would never be freed.
 
     Args:
-        matrix: The user's matrix.
         interfaces: The interfaces.
-
-    Attributes:
-        interfaces: The interfaces; others may be set.
-        shell: The sum, a PETSc matrix without entries; this object must be kept as long as it.
     """
 
-    def __init__(self, matrix: PETSc.Mat, interfaces: Sequence[AddsProduct]) -> None:
-        self._matrix, self.interfaces = matrix, interfaces
-        self.shell = PETSc.Mat().createPython(
-            matrix.getSizes(), WeakContext(self), comm=matrix.comm
-        )
-        self.shell.setUp()
+    def __init__(self, interfaces: Sequence[AddsProduct]) -> None:
+        self.follow(interfaces)
 
-    def mult(self, _shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def follow(self, interfaces: Sequence[AddsProduct]) -> None:
+        """Take the derivatives of other interfaces from now on."""
+        self._interfaces = [weakref.proxy(interface) for interface in interfaces]
+
+    def shell(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Return the sum with a matrix, as a PETSc matrix without entries."""
+        shell = PETSc.Mat().createPython(matrix.getSizes(), self, comm=matrix.comm)
+        shell.compose(_MATRIX, matrix)
+        shell.setUp()
+        return shell
+
+    def mult(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the product with x; PETSc calls this."""
-        self._matrix.mult(x, y)
-        for interface in self.interfaces:
+        shell.query(_MATRIX).mult(x, y)
+        for interface in self._interfaces:
             interface.add_product(x, y)
 
 

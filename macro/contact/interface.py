@@ -25,7 +25,8 @@ from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.contact_tangent import ContactTangent, free_unknowns
 from macro.contact.interface_laws import InterfaceLaws, laws_on_face
 from macro.contact.interface_state import InterfaceResults, InterfaceState
-from macro.contact.loaded_face import LoadedFace, Mode
+from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
+from macro.linear_solvers.stiffened import springs_at
 
 Array = NDArray[np.float64]
 
@@ -52,7 +53,7 @@ class Interface(InterfaceResults):
         facet_tags: The facet tags of its mesh; or an object that has them as ``facet_tags`` beside
             names: a `TaggedMesh`, or what the newest dolfinx reads from gmsh. None where `tag` are
             the facets.
-        tag: The face by number, by name, or as an array of this rank's facets.
+        tag: The face by number, by name, or as an array of this rank's facets or a mask of them.
         laws: A table of laws per patch, such as a `LawTable`; one law for the whole face, such as
             a representative one; or one law per patch beside `patches`.
         indenter: Approach and tilt of the plane (`RigidPlane`, centre in coordinates of the
@@ -104,12 +105,11 @@ class Interface(InterfaceResults):
     ) -> None:
         self.space = space
         face = chosen_face(space, facet_tags, tag, names, frame)
+        compat.collect_garbage(self.comm)  # of interfaces before this one
         chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
         if frame is None and chosen.shift.any():
             face = face.moved(*chosen.shift)
         self._make(face, chosen, crown)
-        self._free: PETSc.Vec | None = None
-        self._tangents: list[ContactTangent] = []
         self.constrain(bcs)
         self.indenter = indenter
 
@@ -119,9 +119,15 @@ class Interface(InterfaceResults):
         self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
         sampling = self._face.sampling(chosen.mode)
         self.sampling, self.marked, self._crown = sampling, face.marked, crown
-        gap = together(self.comm, lambda: sampling.depth + self.crown_at(sampling.x, sampling.y))
+        gap = together(self.comm, lambda: sampling.below(crown))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
+        for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
+            values = evaluate(-gap)
+            if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
+                raise InputError("the laws give values that are not finite")
         self._load = sampling.operator.createVecLeft()
+        self._masked = self._load.duplicate()
+        self._free: PETSc.Vec | None = None
 
     @property
     def comm(self) -> Any:
@@ -130,7 +136,7 @@ class Interface(InterfaceResults):
 
     @property
     def indenter(self) -> RigidPlane | Control:
-        """The plane, or what is prescribed of it; setting a force of zero is collective."""
+        """The plane, or what is prescribed of it; without force it follows the displacements."""
         return self._indenter
 
     @indenter.setter
@@ -156,8 +162,7 @@ class Interface(InterfaceResults):
 
     def crown_at(self, x: Array, y: Array) -> Array:
         """Return the depth of the crown at points of the plane, shapes (n,) [mm]."""
-        depth = np.zeros(len(x)) if self._crown is None else self._crown(x, y)
-        return np.broadcast_to(np.asarray(depth, dtype=np.float64), x.shape)
+        return crown_depth(self._crown, x, y)
 
     def approach_at(self, x: Array, y: Array) -> Array:
         """Return the approach of the plane, where it is now, at points of it, shapes (n,) [mm]."""
@@ -170,8 +175,11 @@ class Interface(InterfaceResults):
         Args:
             bcs: The conditions; none: nothing is left out.
         """
+        rows = self.__dict__.pop("_points_by_free", None)
+        for part in (self._free, rows) if self._free is not None else ():
+            if part is not None:
+                part.destroy()
         self._free = free_unknowns(self.space, bcs, self._load) if bcs else None
-        self.__dict__.pop("_points_by_free", None)
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
         """Add −B p(c(u)) to a residual of internal less external forces [N].
@@ -214,25 +222,20 @@ class Interface(InterfaceResults):
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        rows = self._points_by_free
-        scaled = rows.copy()
-        stiffness = rows.createVecLeft()
-        stiffness.array[:] = self.forces.slope
-        scaled.diagonalScale(L=stiffness)
-        added = rows.transposeMatMult(scaled)
+        added = springs_at(self._points_by_free, self.forces.slope)
         matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
 
         It stands for the state last given to `move_tangent`, and for what the matrix holds when it
-        is applied. The interface keeps it alive.
+        is applied. It serves as long as the interface is kept.
 
         Args:
             matrix: The user's own tangent, such as the matrix of elasticity.
         """
-        self._tangents.append(ContactTangent(matrix, [self]))
-        return self._tangents[-1].shell
+        return ContactTangent([self]).shell(matrix)
 
     def move_tangent(self, x: Any) -> None:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
@@ -243,10 +246,10 @@ class Interface(InterfaceResults):
         if self._free is None:
             self.forces.add_stiffness(x, y)
             return
-        masked, product = x.duplicate(), self._load
-        masked.pointwiseMult(x, self._free)
+        product = self._load
+        self._masked.pointwiseMult(x, self._free)
         product.set(0.0)
-        self.forces.add_stiffness(masked, product)
+        self.forces.add_stiffness(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 

@@ -59,6 +59,8 @@ def laws_on_face(
     """
     if mode is not None and mode not in get_args(Mode):
         raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
+    if not isinstance(patches, PatchGrid | None):
+        raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
     shift = np.zeros(2)
     if _is_law(laws):
         corner = (float(lower[0]), float(lower[1]))

@@ -100,7 +100,7 @@ class LawContactProblem:
             )
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
-        gap = sampling.depth if crown is None else sampling.depth + crown(sampling.x, sampling.y)
+        gap = together(face.comm, lambda: sampling.below(crown))
         if body.preload is not None:
             preload = body.stiffness.createVecRight()
             preload.array[:] = body.preload

@@ -74,6 +74,17 @@ class Sampling:
         self.operator.multTranspose(displacement, self.values)
         return np.asarray(self.values.array_r / self.weight)
 
+    def below(self, crown: Callable[[Array, Array], Array] | None) -> Array:
+        """Return the depths of this rank's samples on a crowned face, shape (n,) [mm].
+
+        Args:
+            crown: Further depth at points (x, y) of the plane [mm]; None: none.
+
+        Raises:
+            InputError: When it gives no numbers, or not one for every point.
+        """
+        return self.depth + crown_depth(crown, self.x, self.y)
+
     @cached_property
     def values(self) -> PETSc.Vec:
         """Work space for a value of every sample; PETSc would keep one of every product."""
@@ -90,13 +101,52 @@ class Sampling:
         Args:
             functions: One function per patch.
             closure: Closures of the samples, shape (n,) [mm].
+
+        Raises:
+            InputError: When a function's values are no numbers, or not one for every closure.
         """
         values = np.empty_like(closure)
         ends = np.searchsorted(self.patch, np.arange(self.count + 1))
         for i in np.unique(self.patch):
             part = slice(ends[i], ends[i + 1])
-            values[part] = functions[i](closure[part])
+            values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
         return values
+
+
+def crown_depth(crown: Any, x: Array, y: Array) -> Array:
+    """Return the depth of a crown at points of the plane, shapes (n,) [mm].
+
+    Args:
+        crown: A function of x and y; None: no crown.
+        x: Abscissae of the points [mm].
+        y: Their ordinates [mm].
+
+    Raises:
+        InputError: When it is no function, gives no finite numbers, or not one for every point.
+    """
+    if crown is None:
+        return np.zeros_like(x)
+    if not callable(crown):
+        raise InputError("the crown is no function", value=crown, allowed="depth(x, y) in mm")
+    depth = _one_each(crown(x, y), x, "the crown")
+    if not np.isfinite(depth).all():
+        raise InputError("the crown has depths that are not finite")
+    return depth
+
+
+def _one_each(values: Any, points: Array, what: str) -> Array:
+    """Return what a user's function gives at points as numbers, one for each."""
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{what} gives no numbers", value=values) from None
+    if found.shape not in ((), points.shape):
+        raise InputError(
+            f"{what} does not give one value for each of {len(points)} points",
+            value=found.shape,
+            allowed=str(points.shape),
+        )
+    return np.broadcast_to(found, points.shape)
 
 
 class Loadable(Protocol):

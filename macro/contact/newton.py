@@ -26,9 +26,11 @@ from macro.contact.stiff_contact import ContactPreconditioner
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
-    WeakContext,
     default_options,
+    iterating,
     reason_name,
+    set_own_preconditioner,
+    weakly,
 )
 
 Array = NDArray[np.float64]
@@ -102,17 +104,17 @@ class NewtonSolver:
         self.forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
         self.snes = PETSc.SNES().create(base.comm)
         self.snes.setOptionsPrefix(PREFIX)
-        self.snes.setFunction(lambda _, *vectors: problem.residual(*vectors), base.createVecLeft())
-        self.snes.setJacobian(self._tangent, problem.tangent, base)
-        self.snes.setConvergenceTest(self._converged)
+        self.snes.setFunction(weakly(self._residual), base.createVecLeft())
+        self.snes.setJacobian(weakly(self._tangent), problem.tangent, base)
+        self.snes.setConvergenceTest(weakly(self._converged))
+        self._preconditioner = ContactPreconditioner(problem, face, solver)
+        set_own_preconditioner(self.snes.ksp, self._preconditioner)
         with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
             self.snes.setFromOptions()
-        self.snes.ksp.pc.setType("python")
-        self._preconditioner = ContactPreconditioner(problem, face, solver)
+        iterating(self.snes.ksp)
         self._remedy = "take more load steps (load.steps)"
         if face is None:
             self._remedy += " or, on a very soft body, coupling.newton = 'condensed'"
-        self.snes.ksp.pc.setPythonContext(WeakContext(self._preconditioner))
 
     def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
         """Solve from an initial guess.
@@ -140,6 +142,9 @@ class NewtonSolver:
             residuals=np.array(self._residuals),
             reason=reason,
         )
+
+    def _residual(self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
+        self._problem.residual(displacement, residual)
 
     def _tangent(
         self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat

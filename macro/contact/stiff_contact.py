@@ -21,7 +21,7 @@ from petsc4py import PETSc
 from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.loaded_face import LoadedFace
-from macro.linear_solvers.stiffened import Stiffened
+from macro.linear_solvers.stiffened import Stiffened, springs_at
 from macro.meshed_body import MeshedBody
 
 Array = NDArray[np.float64]
@@ -73,7 +73,8 @@ class ContactPreconditioner:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
         if self._largest(slope) > _STIFF:
-            self._stiffened = Stiffened(body.stiffness, self._springs(slope))
+            springs = springs_at(self._face.points_by_dofs, slope)
+            self._stiffened = Stiffened(body.stiffness, springs)
             self._with_laws = body.solver_of(self._stiffened)
         compat.collect_garbage(body.stiffness.comm)
 
@@ -91,14 +92,3 @@ class ContactPreconditioner:
         springs.assemble()
         springs.pointwiseDivide(springs, own)
         return float(springs.max()[1])
-
-    def _springs(self, slope: Array) -> PETSc.Mat:
-        """Return the stiffness B diag(p'/w) Bᵀ of the laws."""
-        points = self._face.points_by_dofs
-        scale = points.createVecLeft()
-        scale.array[:] = slope
-        scaled = points.copy()
-        scaled.diagonalScale(scale)
-        springs = points.transposeMatMult(scaled)
-        scaled.destroy()
-        return springs

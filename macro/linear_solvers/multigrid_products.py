@@ -12,13 +12,14 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy import sparse
+
+from macro.compat import call
 
 Indices = NDArray[np.integer]
 
@@ -188,7 +189,7 @@ def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
         with _sequential(own, count) as blocks:
             yield BlockRows(blocks, sparse.bsr_matrix((9 * count, 0), blocksize=(9, 1)), none)
         return
-    _call("MatMPIBAIJGetSeqBAIJ", own, *map(ctypes.byref, (own, ghost, ghosts)))
+    call("MatMPIBAIJGetSeqBAIJ", own, *map(ctypes.byref, (own, ghost, ghosts)))
     with _sequential(own, count) as first, _sequential(ghost, None) as second:
         numbers = np.ctypeslib.as_array(ghosts, second.shape[1:]) if second.shape[1] else none
         yield BlockRows(first, second, numbers)
@@ -201,9 +202,9 @@ def _sequential(matrix: ctypes.c_void_p, columns: int | None) -> Iterator[sparse
     count, width, done = integer(), integer(), ctypes.c_int(0)
     rows, places, entries = map(_pointer, (PETSc.IntType, PETSc.IntType, np.float64))
     pattern = (*map(ctypes.byref, (count, rows, places, done)),)
-    _call("MatGetLocalSize", matrix, None, ctypes.byref(width))
-    _call("MatGetRowIJ", matrix, integer(0), 0, 1, *pattern)
-    _call("MatSeqBAIJGetArray", matrix, ctypes.byref(entries))
+    call("MatGetLocalSize", matrix, None, ctypes.byref(width))
+    call("MatGetRowIJ", matrix, integer(0), 0, 1, *pattern)
+    call("MatSeqBAIJGetArray", matrix, ctypes.byref(entries))
     try:
         starts = np.ctypeslib.as_array(rows, (count.value + 1,))
         size = int(starts[-1])
@@ -212,21 +213,9 @@ def _sequential(matrix: ctypes.c_void_p, columns: int | None) -> Iterator[sparse
         shape = (9 * count.value, width.value // 3 if columns is None else columns)
         yield sparse.bsr_matrix((values, indices, starts), shape=shape)
     finally:
-        _call("MatSeqBAIJRestoreArray", matrix, ctypes.byref(entries))
-        _call("MatRestoreRowIJ", matrix, integer(0), 0, 1, *pattern)
+        call("MatSeqBAIJRestoreArray", matrix, ctypes.byref(entries))
+        call("MatRestoreRowIJ", matrix, integer(0), 0, 1, *pattern)
 
 
 def _pointer(number: Any) -> Any:
     return ctypes.POINTER(np.ctypeslib.as_ctypes_type(number))()
-
-
-@cache
-def _petsc() -> ctypes.CDLL:
-    """Return the PETSc library that petsc4py itself is linked with."""
-    return ctypes.CDLL(PETSc.__file__)
-
-
-def _call(name: str, *arguments: Any) -> None:
-    code = getattr(_petsc(), name)(*arguments)
-    if code:
-        raise PETSc.Error(code)

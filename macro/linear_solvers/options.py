@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import ctypes
 import weakref
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from petsc4py import PETSc
 
 from geometry.errors import InputError, NotConverged
+from macro.compat import call
+
+T = TypeVar("T")
 
 PREFIX = "patchlaw_"
 """Prefix of every PETSc option: ``-patchlaw_ksp_rtol 1e-6`` on the command line wins."""
@@ -95,6 +99,48 @@ def default_options(prefix: str, defaults: Mapping[str, object]) -> Iterator[Non
     finally:
         for name in added:
             database.delValue(name)
+
+
+def options_read(prefix: str, names: Iterable[str]) -> set[str]:
+    """Return those of some options that PETSc's objects have asked for since they were set.
+
+    Args:
+        prefix: Prefix of the options.
+        names: Their names without it.
+    """
+    found, read = set(), ctypes.c_int(0)
+    for name in names:
+        call("PetscOptionsUsed", None, f"{prefix}{name}".encode(), ctypes.byref(read))
+        found |= {name} if read.value else set()
+    return found
+
+
+def iterating(solver: PETSc.KSP, method: str = "cg") -> None:
+    """Let a solver iterate whose user asked for a factorisation alone (``-ksp_type preonly``).
+
+    What is factorised is the matrix of the body. The tangent also has contact in it, of which
+    entries would couple all nodes of a patch: for it the factors are a preconditioner.
+
+    Args:
+        solver: The solver, its options set.
+        method: The Krylov method.
+    """
+    if solver.getType() == "preonly":
+        solver.setType(method)
+
+
+def set_own_preconditioner(solver: PETSc.KSP, preconditioner: Any) -> None:
+    """Give a solver a preconditioner of ours; call it before options are set.
+
+    The user's options under `PREFIX` are those of the body's preconditioner, which ours applies.
+
+    Args:
+        solver: The solver.
+        preconditioner: Has ``apply``; keep it as long as the solver.
+    """
+    solver.pc.setOptionsPrefix(f"{PREFIX}contact_")
+    solver.pc.setType("python")
+    solver.pc.setPythonContext(WeakContext(preconditioner))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -248,6 +294,26 @@ def _by_mumps(preconditioner: PETSc.PC) -> bool:
         return False
     preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
     return str(preconditioner.getFactorSolverType()) == "mumps"
+
+
+def weakly(method: Callable[..., T]) -> Callable[..., T]:
+    """Return a call of an object's method for PETSc, which does not keep the object alive.
+
+    A solver that held its owner would be freed by Python's search for cycles alone, at any moment,
+    such as that in which PETSc forgets what was dropped; see `set_up`.
+
+    Args:
+        method: The bound method.
+    """
+    kept = weakref.WeakMethod(method)
+
+    def call(*arguments: Any) -> T:
+        bound = kept()
+        if bound is None:
+            raise ReferenceError("the owner of a PETSc solver is gone")
+        return bound(*arguments)
+
+    return call
 
 
 class WeakContext:

@@ -11,6 +11,25 @@ from macro.linear_solvers.options import WeakContext
 Array = NDArray[np.float64]
 
 
+def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:
+    """Return the stiffness Bᵀ diag(s) B of springs at points.
+
+    Args:
+        points: B, rows of weighted basis functions of the points [mm²].
+        slope: s of this rank's points, shape (n,) [N/mm⁵].
+
+    Note:
+        Collective.
+    """
+    scale, scaled = points.createVecLeft(), points.copy()
+    scale.array[:] = slope
+    scaled.diagonalScale(scale)
+    springs = points.transposeMatMult(scaled)
+    for part in (scale, scaled):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return springs
+
+
 class Stiffened:
     """The sum K + S of a body's stiffness and that of springs.
 

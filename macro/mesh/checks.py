@@ -23,6 +23,9 @@ _CHUNK = 1 << 14
 _SMALL, _LARGE = 1.0, 2.0e4
 """Diagonals of bodies beyond which the unit of their mesh is in doubt [mm]."""
 
+_SMALLEST, _LARGEST = 1e-4, 1e7
+"""Diagonals beyond which no body is meant [mm]."""
+
 _SHOWN = 5
 """Parts of a mesh whose sizes a message lists."""
 
@@ -133,6 +136,29 @@ def check_connected(tagged: TaggedMesh) -> None:
             f"the mesh is in {len(sizes)} parts that share no facets, of {shown} cells; where "
             "volumes touch they must share nodes (in gmsh: fragment them before meshing)",
             allowed="one connected body",
+        )
+
+
+def check_size(tagged: TaggedMesh, *, key: str | None = None) -> None:
+    """Refuse bodies of a size that only a wrong unit gives.
+
+    Args:
+        tagged: The mesh.
+        key: Key of the scene that says the unit, for the error.
+
+    Raises:
+        InputError: On all ranks.
+
+    Note:
+        Collective.
+    """
+    lower, upper = tagged.bounding_box()
+    size = float(np.linalg.norm(upper - lower))
+    if not _SMALLEST <= size <= _LARGEST:
+        raise InputError(
+            f"the body's mesh would be {size:.3g} mm large",
+            key=key,
+            allowed=f"a unit that makes it {_SMALLEST:g} … {_LARGEST:g} mm large",
         )
 
 

@@ -12,7 +12,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facet_nodes import facet_indices, facet_nodes
 
 Array = NDArray[np.float64]
 
@@ -162,13 +162,17 @@ def contact_facets(
 
     Args:
         mesh: dolfinx mesh of tetrahedra or hexahedra.
-        facets: Rank-local facets of the contact face, shape (n,).
+        facets: Rank-local facets of the contact face, shape (n,), or a mask of all.
         frame: Frame of the face.
         opposed: Whether the frame is that of the face of another body, which this one is pressed
             on: its normal points into this body.
+
+    Raises:
+        InputError: On this rank, when there are no such facets.
     """
+    mesh.topology.create_connectivity(2, 3)
     side_of_body = -1.0 if opposed else 1.0
-    found = facet_nodes(mesh, facets)
+    found = facet_nodes(mesh, facet_indices(mesh, facets))
     owned = found.cell < mesh.topology.index_map(3).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
     side = found.side[owned]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from geometry.errors import InputError
 from macro import compat
 
 
@@ -25,6 +26,32 @@ class FacetNodes:
     cell: NDArray[np.int32]
     side: NDArray[np.intp]
     corners: NDArray[np.int32]
+
+
+def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
+    """Return facets that a user gives, as indices.
+
+    Args:
+        mesh: dolfinx mesh with facets.
+        facets: Numbers of this rank's facets, or a mask of all of them, shape (n,).
+
+    Raises:
+        InputError: When there are no such facets.
+    """
+    numbers = mesh.topology.index_map(2)
+    count = numbers.size_local + numbers.num_ghosts
+    allowed = f"this rank's facets, 0 … {count - 1}, or a mask of all {count}"
+    given = np.atleast_1d(np.asarray(facets))
+    if given.dtype == np.bool_:
+        if given.shape != (count,):
+            raise InputError("the mask does not fit the facets", value=given.shape, allowed=allowed)
+        return np.flatnonzero(given).astype(np.int32)
+    if given.size and given.dtype.kind not in "iu":
+        raise InputError("facets are no numbers", value=facets, allowed=allowed)
+    absent = given[(given < 0) | (given >= count)]
+    if absent.size:
+        raise InputError("the facets are not in the mesh", value=int(absent[0]), allowed=allowed)
+    return given.astype(np.int32)
 
 
 def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import combinations
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +35,18 @@ class Held(Protocol):
         """Displacement along x, y and z [mm]; None where it is free."""
 
 
+class Loaded(Protocol):
+    """A surface under a traction, such as a `Traction`."""
+
+    @property
+    def tag(self) -> int:
+        """Tag of its facets."""
+
+    @property
+    def stress(self) -> tuple[float, float, float]:
+        """Force per area along x, y and z [MPa]."""
+
+
 def check_supports(
     tagged: TaggedMesh,
     supports: Sequence[Held],
@@ -51,22 +64,15 @@ def check_supports(
 
     Raises:
         InputError: On all ranks, when a support has no facets, when one is the contact face, when
-            two prescribe different displacements of one surface, and when a rigid motion is left;
-            the error says which.
+            two prescribe different displacements of one surface or of nodes that two surfaces
+            share, and when a rigid motion is left; the error says which.
 
     Note:
         Collective.
     """
-    names = {tag: name for name, tag in tagged.facet_names.items()}
     held: dict[tuple[int, int], float] = {}
     for support in supports:
-        name = names.get(support.tag, str(support.tag))
-        if support.tag == contact:
-            raise InputError(
-                f"the surface {name!r} is the contact face and cannot be held too", key=key
-            )
-        if not any(tagged.comm.allgather(len(tagged.facet_tags.find(support.tag)))):
-            raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
+        name = _checked_name(tagged, support.tag, contact, "held", key)
         for axis, value in enumerate(support.displacement):
             if value is not None and held.setdefault((support.tag, axis), value) != value:
                 raise InputError(
@@ -74,6 +80,7 @@ def check_supports(
                     f"{held[support.tag, axis]:g} and {value:g} mm",
                     key=key,
                 )
+    _check_common_nodes(tagged, held, key)
     left = free_motions(tagged, supports)
     if left:
         raise InputError(
@@ -81,6 +88,82 @@ def check_supports(
             key=key,
             allowed="supports that hold all rigid motions, without help of the contact",
         )
+
+
+def check_tractions(
+    tagged: TaggedMesh,
+    tractions: Sequence[Loaded],
+    supports: Sequence[Held],
+    contact: int | None = None,
+    *,
+    key: str | None = None,
+) -> None:
+    """Refuse tractions that are no loads: on the contact face, or along what supports hold.
+
+    Args:
+        tagged: The mesh.
+        tractions: Surfaces under tractions.
+        supports: Surfaces with prescribed displacements.
+        contact: Tag of the contact face.
+        key: Key of the scene that the tractions come from, for errors.
+
+    Raises:
+        InputError: On all ranks.
+
+    Note:
+        Collective.
+    """
+    for traction in tractions:
+        name = _checked_name(tagged, traction.tag, contact, "loaded", key)
+        for support in supports:
+            for axis, stress in enumerate(traction.stress):
+                on_held = support.tag == traction.tag and support.displacement[axis] is not None
+                if on_held and stress:
+                    raise InputError(
+                        f"the surface {name!r} is held along {'xyz'[axis]}, where a traction of "
+                        f"{stress:g} MPa does nothing",
+                        key=key,
+                        allowed="tractions along directions that no support holds",
+                    )
+
+
+def _checked_name(
+    tagged: TaggedMesh, tag: int, contact: int | None, how: str, key: str | None
+) -> str:
+    """Return the name of a surface that is to be held or loaded, after refusing what cannot be."""
+    names = {tag: name for name, tag in tagged.facet_names.items()}
+    name = names.get(tag, str(tag))
+    if tag == contact:
+        raise InputError(
+            f"the surface {name!r} is the contact face and cannot be {how} too", key=key
+        )
+    if not any(tagged.comm.allgather(len(tagged.facet_tags.find(tag)))):
+        raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
+    return name
+
+
+def _check_common_nodes(
+    tagged: TaggedMesh, held: Mapping[tuple[int, int], float], key: str | None
+) -> None:
+    """Refuse different displacements of one node, on the edge between two surfaces."""
+    mesh, names = tagged.mesh, {tag: name for name, tag in tagged.facet_names.items()}
+    points = np.asarray(mesh.geometry.input_global_indices)
+    known: dict[int, set[int]] = {}
+
+    def nodes(tag: int) -> set[int]:
+        if tag not in known:
+            own = points[np.unique(facet_nodes(mesh, tagged.facet_tags.find(tag)).corners)]
+            known[tag] = {node for part in tagged.comm.allgather(own.tolist()) for node in part}
+        return known[tag]
+
+    for ((one, axis), first), ((other, across), second) in combinations(held.items(), 2):
+        if axis == across and first != second and nodes(one) & nodes(other):
+            both = " and ".join(repr(names.get(tag, str(tag))) for tag in (one, other))
+            raise InputError(
+                f"the surfaces {both} share nodes and are held at different displacements along "
+                f"{'xyz'[axis]}, {first:g} and {second:g} mm",
+                key=key,
+            )
 
 
 def free_motions(tagged: TaggedMesh, supports: Sequence[Held]) -> list[str]:

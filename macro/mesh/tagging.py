@@ -9,7 +9,7 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from geometry.errors import InputError
-from geometry.meshes.gmsh_elements import NO_GROUP
+from geometry.meshes.gmsh_file import NO_GROUP
 from macro import compat
 
 Table = NDArray[np.int64]

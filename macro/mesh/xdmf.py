@@ -53,6 +53,7 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
     layout = on_root(comm, lambda: _layout(path))
     try:
         with compat.quiet_compiler(), io.XDMFFile(comm, str(path), "r") as file:
+            _check_nodes(file, layout.mesh, comm)
             mesh = file.read_mesh(name=layout.mesh)
             mesh.topology.create_connectivity(2, 3)
             mesh.topology.create_connectivity(3, 2)
@@ -140,3 +141,11 @@ def _check_data(grid: ElementTree.Element, path: Path) -> None:
             data = path.parent / item.text.strip().rsplit(":", 1)[0]
             if not data.is_file():
                 raise InputError(f"its numbers are in {data.name}, which is not there")
+
+
+def _check_nodes(file: Any, name: str, comm: Any) -> None:
+    """Refuse cells with nodes that are not in the file; dolfinx would wait for them for ever."""
+    count, cells = comm.allreduce(len(file.read_geometry_data(name))), file.read_topology_data(name)
+    absent = cells[(cells < 0) | (cells >= count)]
+    if found := [node for part in comm.allgather(absent[:1].tolist()) for node in part]:
+        raise InputError(f"cells have the node {found[0]} of {count} nodes")

@@ -81,11 +81,18 @@ class _Reader:
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
         from macro import contact_facets
+        from macro.mesh.checks import check_size
         from macro.mesh.from_file import read_mesh
 
         mesh = read_mesh(self._path, self._comm, unit=MILLIMETRES[self._section.mesh_unit])
+        check_size(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
-        tags += [mesh.facet_tag(region, key="law.regions") for region in regions]
+        for region in regions:
+            tag = mesh.facet_tag(region, key="law.regions")
+            if tag in tags:
+                problem = "the surface is the contact face or another region already"
+                raise InputError(problem, key="law.regions", value=region)
+            tags.append(tag)
         face = self._face(mesh, tags)
         frame = face.frame if opposite is None else _opposed(opposite, face.frame, self._key)
         body = self._body(mesh, tags, face.frame)
@@ -102,7 +109,7 @@ class _Reader:
     def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
         """Return the elastic body with its supports and loads."""
         from macro import MeshedBody, Support, Traction
-        from macro.mesh.supports import check_supports
+        from macro.mesh.supports import check_supports, check_tractions
 
         section, key = self._section, self._key
         supports = [
@@ -118,6 +125,8 @@ class _Reader:
             Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
             for one in section.tractions
         ]
+        for tag in contact:
+            check_tractions(mesh, loads, supports, tag, key=f"{key}.tractions")
         x, y, z = map(float, frame.normal)
         order = 1 if section.element == "linear" else 2
         return MeshedBody(

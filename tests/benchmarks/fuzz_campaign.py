@@ -17,17 +17,20 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "multiscale")]
+sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "macro", "multiscale")]
 
 import command_words  # noqa: E402
 import compared_inputs  # noqa: E402
 import height_files  # noqa: E402
 import map_round_trips  # noqa: E402
+import mesh_files  # noqa: E402
 import misspellings  # noqa: E402
 import mutated_scenes  # noqa: E402
 import scene_inputs  # noqa: E402
 import shell_lines  # noqa: E402
 import stored_inputs  # noqa: E402
+
+from geometry.meshes.gmsh_file import read_gmsh_file  # noqa: E402
 
 LONGEST = 30  # seconds of the processor for one input
 LONGEST_WAIT = 120  # seconds on the clock, for one that waits; the machine may be busy
@@ -144,6 +147,25 @@ def doors(folder):
             ),
             0.05,
         )
+
+    for version, binary in ((2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)):
+        whole = mesh_files.write_boxes(folder / "whole.msh", version, binary).read_bytes()
+        yield (
+            f"meshes of gmsh {version}, {'bytes' if binary else 'text'}",
+            stored_inputs.flipped(whole),
+            lambda content: on_mesh(folder, content),
+            0.05,
+        )
+
+
+def on_mesh(folder, content):
+    """Read a mesh beside options that gmsh would run."""
+    ran, path = folder / "ran", folder / "part.msh"
+    (folder / "part.msh.opt").write_text(f'SystemCall "touch {ran}";', encoding="utf-8")
+    path.write_bytes(content)
+    outcome = stored_inputs.read(path, read_gmsh_file)
+    assert not ran.exists()
+    return outcome
 
 
 def on_heights(folder, heights, data):

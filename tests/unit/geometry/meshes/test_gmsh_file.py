@@ -1,14 +1,12 @@
 """Meshes in gmsh's own files."""
 
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from mesh_files import gmsh_boxes, write_boxes, write_msh2
 
 from geometry.errors import InputError
-from geometry.meshes.gmsh_elements import elements_of
 from geometry.meshes.gmsh_file import read_gmsh_file
 from geometry.meshes.gmsh_session import gmsh_session
 
@@ -129,16 +127,10 @@ def test_things_are_in_one_group(tmp_path):
         read_gmsh_file(write(tmp_path, cells))
 
 
-def test_groups_have_names_of_their_own():
-    # gmsh 4.8 drops the second name, later releases keep both
-    model = SimpleNamespace(
-        getEntities=lambda dimension: [(dimension, 1), (dimension, 2)],
-        getPhysicalGroups=lambda dimension: [(dimension, 4), (dimension, 5)],
-        getPhysicalGroupsForEntity=lambda _, tag: [tag + 3],
-        getPhysicalName=lambda *_: "body",
-    )
+def test_groups_have_names_of_their_own(tmp_path):
+    names = [(3, 4, "body"), (3, 5, "body"), (2, 4, "body")]
     with pytest.raises(InputError, match="'body': physical groups 4 and 5 have the same name"):
-        elements_of(SimpleNamespace(model=model), 3)
+        read_gmsh_file(write(tmp_path, [(4, 4, 1, TWO[0]), (4, 5, 2, TWO[1])], names=names))
 
 
 @pytest.mark.parametrize("kind", ["tetrahedra", "hexahedra"])
@@ -205,8 +197,8 @@ def test_other_meshes_are_refused(tmp_path, elements, match):
         (b"// $MeshFormat\nx\n", "this is no mesh of gmsh"),
         (b"$NOD\n1\n1 0 0 0\n$ENDNOD\n", "this is no mesh of gmsh"),
         (b"$MeshFormat\n3.0 0 8\n$EndMeshFormat\n", "'3.0': unknown format"),
-        (b"$MeshFormat", "unknown format"),
-        (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0", "gmsh cannot read it"),
+        (b"$MeshFormat", "this is no mesh of gmsh"),
+        (b"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0", r"section \$Nodes has no end"),
         (bytes(range(256)) * 20, "this is no mesh of gmsh"),
     ],
     ids=["empty", "script", "comment", "old", "version", "cut", "truncated", "binary"],
@@ -226,3 +218,101 @@ def test_missing_files_and_folders_are_refused(tmp_path):
         read_gmsh_file(tmp_path / "none.msh")
     with pytest.raises(InputError, match="cannot be read: Is a directory"):
         read_gmsh_file(tmp_path)
+
+
+FORMS = [(2.2, False), (2.2, True), (4.0, False), (4.1, False), (4.1, True)]
+
+
+def as_gmsh_reads(path):
+    """Return gmsh's own nodes, and cells and facets as rows of places, by physical group."""
+    with gmsh_session("oracle") as gmsh:
+        gmsh.merge(str(path))
+        numbers, places, _ = gmsh.model.mesh.getNodes()
+        place = dict(zip(numbers.tolist(), np.reshape(places, (-1, 3)).tolist(), strict=True))
+        found = {}
+        for dimension, group in gmsh.model.getPhysicalGroups():
+            name = gmsh.model.getPhysicalName(dimension, group) or str(group)
+            rows = []
+            for entity in gmsh.model.getEntitiesForPhysicalGroup(dimension, group):
+                for kind, _, nodes in zip(
+                    *gmsh.model.mesh.getElements(dimension, entity), strict=True
+                ):
+                    count = gmsh.model.mesh.getElementProperties(kind)[3]
+                    for row in np.reshape(nodes, (-1, count)).tolist():
+                        rows.append(sorted(tuple(place[node]) for node in row))
+            found[dimension, name] = sorted(rows)
+        return found
+
+
+@pytest.mark.parametrize(("version", "binary"), FORMS)
+@pytest.mark.parametrize("partitioned", [False, True])
+def test_files_hold_what_gmsh_reads_in_them(tmp_path, version, binary, partitioned):
+    """The very numbers, to the last digit: both read 16 digits, or the bytes."""
+    path = tmp_path / "box.msh"
+    with gmsh_boxes(0.4) as gmsh:
+        if partitioned:
+            gmsh.model.mesh.partition(3)
+        gmsh.option.setNumber("Mesh.MshFileVersion", version)
+        gmsh.option.setNumber("Mesh.Binary", binary)
+        gmsh.write(str(path))
+        gmsh.option.setNumber("Mesh.MshFileVersion", 4.1)
+        gmsh.option.setNumber("Mesh.Binary", 0)
+    mesh, expected = read_gmsh_file(path), as_gmsh_reads(path)
+    for dimension, nodes, tags, names in (
+        (3, mesh.cells, mesh.cell_tags, mesh.cell_names),
+        (2, mesh.facets, mesh.facet_tags, mesh.facet_names),
+    ):
+        for name, tag in names.items():
+            rows = mesh.points[nodes[tags == tag]].tolist()
+            found = sorted(sorted(map(tuple, row)) for row in rows)
+            assert found == expected[dimension, name]
+
+
+@pytest.mark.parametrize("beside", ["box.msh.opt", ".gmshrc", ".gmsh-options", "gmsh-options"])
+def test_files_beside_a_mesh_are_not_run(tmp_path, monkeypatch, beside):
+    """gmsh's merge runs ``box.msh.opt``; its sessions read options at home and where one is."""
+    path = write_boxes(tmp_path / "box.msh")
+    (tmp_path / beside).write_text(f'SystemCall "touch {tmp_path}/ran";\n', encoding="utf-8")
+    for variable in ("HOME", "GMSH_HOME"):
+        monkeypatch.setenv(variable, str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    read_gmsh_file(path)
+    with gmsh_session("another") as gmsh:
+        gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)
+    assert not (tmp_path / "ran").exists()
+
+
+@pytest.mark.parametrize(("version", "binary"), FORMS)
+def test_damaged_files_are_refused_or_read(tmp_path, version, binary):
+    """Flipped bits, cuts and swapped words: an `InputError` that names the file, or a mesh."""
+    whole = write_boxes(tmp_path / "box.msh", version, binary).read_bytes()
+    random, path, refused = np.random.default_rng(28), tmp_path / "damaged.msh", 0
+    for trial in range(150):
+        damaged = bytearray(whole)
+        at = random.integers(len(whole), size=2)
+        if trial % 5 == 0:
+            damaged = damaged[: at[0]]
+        elif trial % 5 == 1:
+            damaged[at[0] : at[0] + 8] = damaged[at[1] : at[1] + 8]
+        else:
+            for place in random.integers(len(whole), size=1 + trial % 7):
+                damaged[place] ^= 1 << int(random.integers(8))
+        path.write_bytes(damaged)
+        try:
+            mesh = read_gmsh_file(path)
+        except InputError as error:
+            refused += 1
+            assert error.file == str(path)
+        else:
+            assert 0 <= mesh.cells.min() <= mesh.cells.max() < len(mesh.points)
+    assert refused > 30  # every cut
+
+
+def test_nodes_that_are_not_there_are_named(tmp_path):
+    elements = [(4, 4, 1, TWO[0]), (4, 4, 1, (1, 3, 2, 40))]
+    with pytest.raises(InputError, match="elements of the mesh have the node 41, which the file"):
+        read_gmsh_file(write(tmp_path, elements))
+    twice = write(tmp_path, elements[:1]).read_text(encoding="utf-8")
+    (tmp_path / "part.msh").write_text(twice.replace("\n8 1.0 1.0 1.0", "\n7 1.0 1.0 1.0"))
+    with pytest.raises(InputError, match="several nodes of the mesh have the number 7"):
+        read_gmsh_file(tmp_path / "part.msh")

@@ -1,5 +1,6 @@
 """Meshes of a body from the user's files."""
 
+import h5py
 import numpy as np
 import pytest
 from dolfinx import io
@@ -210,3 +211,13 @@ def test_meshes_and_tags_are_three_dimensional():
     box = tagged_box(COMM)
     with pytest.raises(InputError, match="'dimension 3': the facet tags mark something else"):
         TaggedMesh(mesh=box.mesh, facet_tags=halves(box))
+
+
+@pytest.mark.parametrize("node", [-5, 10**6])
+def test_cells_with_nodes_that_are_not_there_are_refused(tmp_path, node):
+    """Dolfinx waits for such nodes for ever."""
+    write_mesh(tagged_box(COMM), tmp_path / "part.xdmf")
+    with h5py.File(tmp_path / "part.h5", "r+") as file:
+        file["Mesh/mesh/topology"][3, 1] = node
+    with pytest.raises(InputError, match=rf"part\.xdmf: cells have the node {node} of 36 nodes"):
+        read_mesh(tmp_path / "part.xdmf", COMM)

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 from geometry.errors import InputError
 from macro import compat
-from macro.mesh.supports import check_supports, free_motions
+from macro.mesh.supports import check_supports, check_tractions, free_motions
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)
@@ -105,3 +105,35 @@ def test_supports_are_checked():
         check_supports(box, twice)
     with pytest.raises(InputError, match="the surface '9' has no facets that belong to cells"):
         check_supports(box, [SimpleNamespace(tag=9, displacement=(0.0, 0.0, 0.0))])
+
+
+def test_supports_agree_where_they_meet():
+    """The edge between two surfaces has one displacement."""
+    box, below, left = tagged_box(COMM), SIDES["below"], SIDES["left"]
+    pulled = [
+        SimpleNamespace(tag=below, displacement=(0.0, 0.0, 0.0)),
+        SimpleNamespace(tag=left, displacement=(None, None, 0.01)),
+    ]
+    with pytest.raises(
+        InputError, match=r"'below' and 'left' share nodes .* along z, 0 and 0\.01 mm"
+    ):
+        check_supports(box, pulled)
+    pulled[1] = SimpleNamespace(tag=SIDES["above"], displacement=(None, None, 0.01))
+    check_supports(box, pulled)  # these two do not meet
+
+
+def test_tractions_are_loads():
+    box, supports = tagged_box(COMM), held(below="xyz", left="x")
+    contact = SIDES["above"]
+
+    def refused(side, stress, match):
+        load = [SimpleNamespace(tag=SIDES.get(side, 9), stress=stress)]
+        with pytest.raises(InputError, match=match):
+            check_tractions(box, load, supports, contact, key="body.tractions")
+
+    refused("above", (0, 0, 1), r"body\.tractions: .*'above' is the contact face and cannot be lo")
+    refused("below", (0, 0, 1), "'below' is held along z, where a traction of 1 MPa does nothing")
+    refused("left", (2, 1, 1), "'left' is held along x")
+    refused("nowhere", (1, 0, 0), "'9' has no facets")
+    fine = [SimpleNamespace(tag=SIDES[side], stress=(0, 1, 1)) for side in ("left", "right")]
+    check_tractions(box, fine, supports, contact)

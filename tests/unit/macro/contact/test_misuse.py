@@ -1,0 +1,252 @@
+"""Interfaces and problems given what they cannot use: an `InputError` before any work."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from petsc4py import PETSc
+from user_problems import BOTTOM, LAWS, PATCHES, TOP, PowerLaw, box, clamped, elastic, marked
+
+from geometry.errors import InputError, NotConverged
+from geometry.rigid_plane import Control, RigidPlane
+from macro import ContactProblem, Interface, compat, contact_facets
+
+LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
+
+
+def law(pressure, stiffness=None):
+    """Return what has the methods of a law."""
+    return SimpleNamespace(pressure=pressure, stiffness=stiffness or pressure)
+
+
+@pytest.fixture(scope="module")
+def body():
+    mesh = box(cells=(3, 3, 2))
+    return SimpleNamespace(mesh=mesh, tags=marked(mesh), space=compat.vector_space(mesh, 1))
+
+
+def interface(body, tag=TOP, **options):
+    given = {"laws": LAW, "indenter": PLANE} | options
+    return Interface(body.space, body.tags, tag, **given)
+
+
+def mask_of(body):
+    top = np.zeros(body.mesh.topology.index_map(2).size_local, dtype=bool)
+    top[body.tags.find(TOP)] = True
+    return top
+
+
+def test_a_mask_of_facets_is_a_mask(body):
+    u = fem.Function(body.space)
+    found = interface(body, mask_of(body)).evaluate(u).force
+    assert found == interface(body).evaluate(u).force > 0.0
+    frame = interface(body).frame
+    sides = [contact_facets(body.mesh, of, frame) for of in (mask_of(body), body.tags.find(TOP))]
+    np.testing.assert_array_equal(sides[0].cell, sides[1].cell)
+
+
+@pytest.mark.parametrize(
+    ("tag", "problem"),
+    [
+        (np.array([True, False]), r"\(2,\): the mask does not fit the facets"),
+        (True, "the mask does not fit the facets"),
+        (np.array([0.0, 1.0]), "facets are no numbers"),
+        (["top"], "facets are no numbers"),
+        (np.array([-1]), "-1: the facets are not in the mesh"),
+        ([], "has no facets"),
+        (None, "facets are no numbers"),
+    ],
+)
+def test_other_facets_are_refused(body, tag, problem):
+    with pytest.raises(InputError, match=problem):
+        interface(body, tag)
+
+
+def test_a_facet_inside_the_body_is_refused(body):
+    every = np.ones(len(mask_of(body)), dtype=bool)
+    every[dmesh.exterior_facet_indices(body.mesh.topology)] = False
+    with pytest.raises(InputError, match="facets inside the body"):
+        interface(body, np.flatnonzero(every)[:1])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        (law(lambda c: np.zeros(3)), r"\(3,\): law 0 does not give one value for each of \d+ poi"),
+        (law(lambda c: np.zeros((len(c), 1))), "law 0 does not give one value for each"),
+        (law(lambda c: 0.0 * c, lambda c: [1.0, 2.0]), "law 0 does not give one value for each"),
+        (law(lambda c: "stiff"), "'stiff': law 0 gives no numbers"),
+        (law(lambda c: None), "the laws give values that are not finite"),
+        (law(lambda c: np.full(c.shape, np.nan)), "the laws give values that are not finite"),
+    ],
+)
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+def test_laws_of_wrong_shape_are_named(body, wrong, problem, mode):
+    with pytest.raises(InputError, match=problem):
+        interface(body, laws=[wrong, *LAWS[1:]], patches=PATCHES, mode=mode)
+
+
+@pytest.mark.parametrize(
+    ("crown", "problem"),
+    [
+        (lambda x, y: np.zeros(3), r"the crown does not give one value for each of \d+ points"),
+        (lambda x, y: "deep", "the crown gives no numbers"),
+        (lambda x, y: np.inf * x, "the crown has depths that are not finite"),
+        (3.0, "the crown is no function"),
+    ],
+)
+def test_crowns_of_wrong_shape_are_refused(body, crown, problem):
+    with pytest.raises(InputError, match=problem):
+        interface(body, crown=crown)
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"force": "5 N"}, {"force": -1.0}, {"force": np.nan}, {"force": [1.0, 2.0]},
+        {"approach": None}, {"approach": np.inf}, {"approach": "1 um"}, {"force": 1 + 2j},
+        {"force": 1.0, "approach": 1.0}, {"force": 1.0, "tilt": ("a", 0.0)},
+        {"force": 1.0, "tilt": (np.nan, 0.0)}, {"force": 1.0, "tilt": 0.1},
+    ],
+    ids=str,
+)  # fmt: skip
+def test_controls_are_numbers(given):
+    with pytest.raises(InputError):
+        Control(**given)
+
+
+def test_what_else_does_not_fit_is_named(body):
+    with pytest.raises(InputError, match="these are no patches"):
+        interface(body, patches=(2, 2))
+    u = fem.Function(body.space)
+    with pytest.raises(InputError, match="these are no interfaces"):
+        ContactProblem(elastic(u), u, [clamped(body.space, body.tags)], [LAW])
+
+
+@pytest.mark.parametrize("name", ["pc_tpye", "-pc_type", "patchlaw_pc_type", "pc_hypre_type"])
+def test_options_that_petsc_does_not_read_are_named(body, name):
+    """The last belongs to another preconditioner. The displacement stays; PETSc's table too."""
+    u, support = fem.Function(body.space), clamped(body.space, body.tags)
+    options = {"snes_rtol": 1e-8, "pc_factor_shift_type": "none", name: "lu"}
+    problem = ContactProblem(elastic(u), u, [support], interface(body), petsc_options=options)
+    with pytest.raises(InputError, match=rf"petsc_options = \['{name}'\]: .*no such option"):
+        problem.solve()
+    assert not u.x.array.any()
+    assert not [key for key in PETSc.Options().getAll() if key.startswith("patchlaw_")]
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+@pytest.mark.parametrize("options", [
+    {"ksp_type": "preonly", "pc_type": "lu"},
+    {"ksp_type": "preonly", "pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
+    {"ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "superlu_dist"},
+    {"ksp_type": "gmres", "pc_type": "ilu", "pc_factor_mat_solver_type": "petsc"},
+], ids=str)  # fmt: skip
+def test_direct_solvers_do_not_change_forces(body, mode, options):
+    """On a law ten times as stiff as the body, where steps without contact in them diverge."""
+    forces, support = [], clamped(body.space, body.tags)
+    for given in (None, options):
+        u = fem.Function(body.space)
+        rough = interface(body, laws=[PowerLaw(3e6)] * 4, patches=PATCHES, mode=mode)
+        ContactProblem(elastic(u), u, [support], rough, petsc_options=given).solve()
+        rough.indenter = Control(force=5.0, tilt=None)
+        forces.append([rough.force, *rough.patch_pressure])
+    # Newton's method ends at 1e-9 of the contact forces
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-8)
+
+
+@pytest.mark.parametrize("degree", [1, 2])
+def test_no_force_is_the_last_touch_of_the_deformed_body(degree):
+    """A body that grows by a uniform strain: its face rises by the strain times its height."""
+    random = np.random.default_rng(28)
+    strain, touch = random.uniform(-1e-3, 1e-3), random.uniform(-1e-3, 1e-3)
+    mesh = box(cells=(3, 4, 2))
+    space, tags, conditions = compat.vector_space(mesh, degree), marked(mesh), []
+    for axis, at in enumerate((0.0, 0.0, -1.0)):
+        part = space.sub(axis)
+        collapsed = part.collapse()[0]
+        dofs = fem.locate_dofs_geometrical(
+            (part, collapsed), lambda x, axis=axis, at=at: np.isclose(x[axis], at)
+        )
+        conditions.append(fem.dirichletbc(fem.Function(collapsed), dofs, part))
+    u = fem.Function(space)
+    unloaded, law = Control(force=0.0), PowerLaw(3e3, touch=touch)
+    rough = Interface(space, tags, TOP, laws=law, indenter=unloaded)
+    problem = ContactProblem(elastic(u, thermal=strain), u, conditions, rough)
+    for loaded in (False, True):
+        if loaded:  # and unloaded again
+            rough.indenter = Control(force=7.0)
+            problem.solve()
+            assert rough.force == pytest.approx(7.0, rel=1e-9)
+            rough.indenter = unloaded
+        problem.solve()
+        assert rough.force == 0.0
+        # the linear solver's tolerance
+        assert rough.plane.approach == pytest.approx(touch - strain, abs=1e-9 * abs(strain))
+
+
+def test_laws_that_never_let_go_have_no_last_touch(body):
+    sticky = law(lambda c: 1.0 + 0.0 * c, lambda c: 0.0 * c)
+    rough = interface(body, laws=sticky, indenter=Control(force=0.0))
+    with pytest.raises(NotConverged, match=r"NO_RELEASE .* press however far"):
+        rough.evaluate(fem.Function(body.space))
+
+
+def resident():
+    """Return this process's memory [B]."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * 4096
+
+
+def test_two_hundred_of_everything_leave_no_memory_behind():
+    """A vector of the space has 24 kB, its matrix 1.4 MB, its factors 10 MB."""
+    mesh = box(cells=(9, 9, 9))
+    space, tags = compat.vector_space(mesh, 1), marked(mesh)
+    support, u = clamped(space, tags), fem.Function(space)
+    body = SimpleNamespace(mesh=mesh, tags=tags, space=space)
+    rough = interface(body, bcs=[support])
+    matrix = compat.assemble_matrix(compat.compile_form(_derivative(u)), [support])
+    x, y = matrix.createVecs()
+    kept = ContactProblem(elastic(u), u, [support], rough)
+    rough.move_tangent(u)
+
+    def solve():
+        rough.indenter = RigidPlane(approach=np.random.default_rng().uniform(4e-3, 6e-3))
+        kept.solve()
+
+    def made_anew():
+        fresh = fem.Function(space)
+        ContactProblem(elastic(fresh), fresh, [support], interface(body)).solve()
+
+    vector = 2.4e4  # bytes
+    works = {  # what is done, how often, and what each may leave: pages that move, shells, forms
+        "add_product": (lambda: rough.add_product(x, y), 3000, 0.05 * vector),
+        "tangent": (lambda: rough.tangent(matrix).mult(x, y), 200, 0.5 * vector),
+        "add_tangent": (lambda: rough.add_tangent(u, matrix), 200, 0.1 * vector),
+        "constrain": (lambda: rough.constrain([support]), 200, 0.1 * vector),
+        "evaluate": (lambda: rough.evaluate(u), 200, 0.1 * vector),
+        "solve": (solve, 200, 0.1 * vector),
+        "Interface": (lambda: interface(body), 100, 0.1 * vector),
+        "ContactProblem": (made_anew, 40, 6.0 * vector),  # of its factors' 10 MB
+    }
+    for name, (work, count, most) in works.items():
+        for _ in range(max(count // 5, 5)):
+            work()
+        before = resident()
+        for _ in range(count):
+            work()
+        assert (resident() - before) / count < most, name
+
+
+def _derivative(u):
+    import ufl
+
+    return ufl.derivative(elastic(u), u)
+
+
+def test_tags_of_both_faces_at_once_are_no_face(body):
+    both = np.concatenate([body.tags.find(TOP), body.tags.find(BOTTOM)])
+    with pytest.raises(InputError, match="face different ways"):
+        interface(body, both)

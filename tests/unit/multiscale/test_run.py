@@ -1,0 +1,54 @@
+"""Runs in Python that fail on the way: what they leave."""
+
+import pytest
+
+from geometry.errors import NotConverged
+from multiscale import Scene, run
+from multiscale.loading.stepper import LoadStepper
+from multiscale.run import Run
+
+SPECTRUM = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.2, "seed": 3}
+BLOCK = {"height": 1.0, "young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [6, 6, 4]}
+
+
+def scene(kind):
+    return Scene.from_dict(
+        {
+            "surface": {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]},
+            "block": BLOCK,
+            "coupling": {"kind": kind},
+            "load": {"approach": 0.006, "steps": 3},
+        }
+    )
+
+
+@pytest.mark.parametrize("accepted", [0, 2])
+@pytest.mark.parametrize("kind", ["analytic", "concurrent", "consistent"])
+def test_a_failed_run_gives_the_steps_before_and_closes(monkeypatch, kind, accepted):
+    """The load steps are those of a run that does not fail."""
+    whole, closed = run(scene(kind)), []
+    steps, close = LoadStepper.__iter__, Run.close
+
+    def failing(stepper):
+        for k, step in enumerate(steps(stepper)):
+            if k == accepted:
+                raise NotConverged("a load step", reason="TEST", iterations=7, remedy="none")
+            yield step
+
+    monkeypatch.setattr(LoadStepper, "__iter__", failing)
+    monkeypatch.setattr(Run, "close", lambda self: [closed.append(1), close(self)])
+    with pytest.raises(NotConverged, match="TEST after 7 iterations") as failure:
+        run(scene(kind))
+    found = failure.value.history
+    assert [step.force_N for step in found.steps] == [
+        step.force_N for step in whole.steps[:accepted]
+    ]
+    assert closed == [1]
+
+
+def test_a_run_closes_when_its_observer_fails(monkeypatch):
+    closed = []
+    monkeypatch.setattr(Run, "close", lambda self: closed.append(1))
+    with pytest.raises(ZeroDivisionError):
+        run(scene("analytic"), observe=lambda _: 1 / 0)
+    assert closed == [1]
