@@ -14,6 +14,7 @@ STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 are taken into account on. Heights in µm that are taken for mm make a surface a thousand times as
 steep. At 0.8 the two orders of finite slopes change the force by as much as they err."""
 
+_ROUNDED = 1.0 + 1e-9
 _MUCH_TILT, _FLATTEST = 0.5, 3e-4
 _LONGEST, _SHORTEST = 200.0, 1e-4
 """Share of the mean plane in the variance, rms gradient and sides [mm] that deserve a note.
@@ -43,7 +44,7 @@ def check_slopes(surface: Surface) -> None:
         InputError: Asks for the unit of the heights.
     """
     gradient = rms_gradient(surface)
-    if gradient > STEEPEST:
+    if gradient > STEEPEST * _ROUNDED:
         raise InputError(
             f"the rms gradient of the heights is {gradient:.3g}, no rough surface is so steep: are "
             "they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'",
@@ -61,7 +62,7 @@ def check_finite_slopes(surface: Surface) -> None:
         InputError: Says what else can be done, and what error that has.
     """
     gradient = rms_gradient(surface)
-    if gradient > STEEPEST_FINITE:
+    if gradient > STEEPEST_FINITE * _ROUNDED:
         raise InputError(
             "finite slopes are known to second order, which fails at the rms gradient of the "
             f"surface, {gradient:.3g}; without them (micro.finite_slopes = false) forces of such "
