@@ -277,7 +277,10 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
     share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
-    causes = ", ".join(f"{cause} {said_error(error)}" for cause, error in step.errors)
+    causes = ", ".join(
+        f"{cause} {quantity(error, 'N', 2) if math.isfinite(error) else 'not measured'}"
+        for cause, error in step.errors
+    )
     largest = max(step.errors, key=lambda each: each[1])[0]
     if whole == math.inf:
         yield Caution(
@@ -297,8 +300,3 @@ def error_notes(steps: list[LoadStep], accuracy: float | None) -> Iterator[str]:
             f"an accuracy of {percent(accuracy, 3)} was asked for, and the last load step keeps "
             f"{kept}, most of it by {largest}"
         )
-
-
-def said_error(error: float) -> str:
-    """Return the error of a force by one cause in words [N]."""
-    return quantity(error, "N", 2) if math.isfinite(error) else "not measured"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
@@ -10,7 +9,6 @@ from importlib.metadata import version
 
 from geometry.patches import PatchGrid
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors import said_error
 from multiscale.output.citation import citations
 from multiscale.output.provenance import library_versions
 from multiscale.planning import plan
@@ -64,8 +62,6 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
         citations=citations(),
         percent=percent,
         quantity=quantity,
-        said_error=said_error,
-        inf=math.inf,
     )
 
 
