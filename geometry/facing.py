@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry.errors import InputError
+from geometry.plausibility import check_slopes
 from geometry.surface import Surface
 
 _ROUNDING = 1e-9
@@ -78,7 +79,7 @@ def facing(first: Surface, second: Surface) -> Surface:
         The surface of h(x, y) = h1(x, y) + h2(x, y), periodic where both are.
 
     Raises:
-        InputError: When they have not the same grid and sides.
+        InputError: When they have not the same grid and sides, or are too steep together.
     """
     if first.grid != second.grid:
         raise InputError(
@@ -92,10 +93,12 @@ def facing(first: Surface, second: Surface) -> Surface:
             value=list(second.lengths),
             allowed=f"{list(first.lengths)} mm, by lengths or crop",
         )
-    return Surface(
+    both = Surface(
         heights=first.heights + second.heights,
         lengths=first.lengths,
         periodic=first.periodic and second.periodic,
         source=f"{first.source}; facing {second.source}",
         notes=(*first.notes, *(f"counter-surface: {note}" for note in second.notes)),
     )
+    check_slopes(both)
+    return both

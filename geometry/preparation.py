@@ -13,6 +13,7 @@ from geometry.checks import cell_counts, cells_between
 from geometry.errors import InputError
 from geometry.filters import regridded, smoothed, spikes
 from geometry.missing import filled
+from geometry.plausibility import check_slopes
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
@@ -64,7 +65,7 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
         steps: What is done; `completed` does what comes before the form.
 
     Raises:
-        InputError: When a cut-off or the new grid does not fit the surface.
+        InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
     """
     done = []
     if steps.form != "none":
@@ -82,9 +83,10 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
         mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
         h = regridded(h, surface.lengths, (mx, my), periodic=periodic)
         done.append(f"resampled from {surface.grid[0]} × {surface.grid[1]} heights")
-    if not done:
-        return surface
-    return replace(surface, heights=h, source=", ".join((surface.source, *done)))
+    if done:
+        surface = replace(surface, heights=h, source=", ".join((surface.source, *done)))
+    check_slopes(surface)
+    return surface
 
 
 def completed(

@@ -101,7 +101,9 @@ class RigidPlane:
     Args:
         approach: δ at the centre of the rectangle [mm].
         tilt: Slopes (tx, ty) [mm/mm].
-        centre: Point (xc, yc) that the plane turns about, such as the centre of the rectangle [mm].
+        centre: Point (xc, yc) that the plane turns about [mm]; None: the middle of the face that
+            it presses, as with a `Control`. Only that face knows it, so that such a plane has an
+            approach at points only where it is level.
 
     Raises:
         InputError: When a number is not finite or the tilt is not a pair.
@@ -109,7 +111,7 @@ class RigidPlane:
 
     approach: float
     tilt: tuple[float, float] = (0.0, 0.0)
-    centre: tuple[float, float] = (0.0, 0.0)
+    centre: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         _check_approach(self.approach)
@@ -135,8 +137,12 @@ class RigidPlane:
         return np.array([self.approach, *self.tilt])
 
     def at(self, x: Array, y: Array) -> Array:
-        """Return the approach at points [mm]."""
-        (tx, ty), (xc, yc) = self.tilt, self.centre
+        """Return the approach at points [mm].
+
+        Raises:
+            InputError: When the plane is tilted, and its centre is not known.
+        """
+        (tx, ty), (xc, yc) = self.tilt, self._known_centre if any(self.tilt) else (0.0, 0.0)
         return self.approach + tx * (x - xc) + ty * (y - yc)
 
     def means(self, patches: Partition) -> Array:
@@ -144,9 +150,23 @@ class RigidPlane:
         return self.at(*patches.centres.T)
 
     def moment(self, x: Array, y: Array, force: Array) -> tuple[float, float]:
-        """Return the first moments of forces at points about the centre [N mm]."""
-        (xc, yc), force = self.centre, np.asarray(force)
+        """Return the first moments of forces at points about the centre [N mm].
+
+        Raises:
+            InputError: When the centre is not known.
+        """
+        (xc, yc), force = self._known_centre, np.asarray(force)
         return float(np.sum(force * (x - xc))), float(np.sum(force * (y - yc)))
+
+    @property
+    def _known_centre(self) -> tuple[float, float]:
+        if self.centre is None:
+            raise InputError(
+                "a plane that turns about the middle of its face is not placed without the face",
+                value=self,
+                allowed="centre = (xc, yc), or RigidPlane.above(surface, …)",
+            )
+        return self.centre
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,8 +2,9 @@
 
 Each cause is varied while all others stay, under the plane of the load step: the grid against other
 grids, the laws against the contact problem, the modes of the body against fewer, finite slopes
-against one order less and against those of a half-space. Causes hardly depend on each other. All
-but the grid are therefore measured on half as many cells a side, and the grid without slopes.
+against those of a half-space and by the size of the orders that they leave out. Causes hardly
+depend on each other. All but the grid are therefore measured on half as many cells a side, and the
+grid without slopes.
 
 The factors of the grid were set on 140 half-spaces (64 to 128 heights along a side, 2.7 to 21
 along the shortest wave, slopes of 0.05 to 0.25, tilted or level, 0.1 to 8 % contact area) against
@@ -11,9 +12,8 @@ three to six times as many cells along a side. The error of the grid was within 
 one on 97 %, which was 1.2 × the true one in the median. By coarser grids alone, on 60 of them, it
 was within the measured one on 95 %, which was 3.4 × the true one.
 
-The factors of finite slopes were set against three meshes of the rough block. The force was off by
-0.02 to 0.3 % on Sets 1 and 2 of Waddad et al. 2016 and on a cap in the middle and near a side,
-where error bars were so small, and by 1.4 % on a cap that a side cuts in half.
+What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
+the force was off by another 1.4 % against three meshes of the block.
 
 Theory: demos/theory.md, section 13.
 """
@@ -27,6 +27,7 @@ from typing import Any
 
 from geometry import Control
 from geometry.collective import on_root_alone
+from geometry.errors import InputError
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
@@ -48,9 +49,9 @@ _FEWER_MODES = 0.75
 _LINEAR = 0.15
 """Error by quadratic elements of a meshed body over what linear ones on the same mesh change. On
 cubes of 6³ hexahedra, and of as many cut into tetrahedra, it was 0.03 to 0.11 of that."""
-_SECOND_ORDER, _ON_BODY = 0.1, 0.1
-"""Error by finite slopes over what their second order adds to the force, and over what they add on
-the body instead of on a half-space, where free sides cut contacts."""
+_ON_BODY = 0.1
+"""Error by finite slopes over what they add on the body instead of on a half-space, where free
+sides cut contacts."""
 _RESIDUAL = 1e-6
 """Residual of the contact problems here, whose forces are then right to 1e-5 and better."""
 
@@ -60,7 +61,7 @@ class MeasuredErrors:
     """What the force under a given plane may be off by.
 
     Attributes:
-        parts: Error of the force by cause [N].
+        parts: Error of the force by cause [N]; infinite where it cannot be measured.
         stiffness: Change of the force with the approach [N/mm]; 0 without contact, and NaN where
             it was not requested.
     """
@@ -75,8 +76,10 @@ class MeasuredErrors:
 
     @property
     def approach(self) -> float:
-        """Error of the approach under the force [mm]; 0 without contact."""
-        return self.force / self.stiffness if self.stiffness else 0.0
+        """Error of the approach under the force [mm]; 0 without contact, infinite if not known."""
+        if self.stiffness:
+            return self.force / self.stiffness
+        return math.inf if self.force else 0.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,10 +142,12 @@ class _Problems:
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
         self._states: dict[tuple[tuple[int, int], int], HalfSpaceState] = {}
+        # under small loads coarse cells may not touch, and would show no error
+        self._others = self._half if self._force(self._half, 0) > 0.0 else self._grid
 
     def body_error(self) -> dict[str, float]:
         """Return the error by the modes of the body, by cause [N]; nothing on a half-space."""
-        model, known = self._model(self._half, 0), self._state(self._half, 0)
+        model, known = self._model(self._others, 0), self._state(self._others, 0)
         if not isinstance(model.body, BodyModes):
             return {}
         fewer = model.body.fewer(math.ceil(_FEWER_MODES * model.body.count))
@@ -155,13 +160,23 @@ class _Problems:
         return {"body": error}
 
     def slopes_error(self) -> float:
-        """Return the error by finite slopes, or what they change where they are left out [N]."""
-        known = self._state(self._half, 2)
+        """Return the error by finite slopes, and what they change where they are left out [N].
+
+        It is infinite where the surface is too steep for them.
+        """
+        try:
+            model = self._model(self._others, SLOPES)
+        except InputError:
+            return math.inf
+        known, flat = self._state(self._others, SLOPES), self._model(self._others, 0)
+        if not known.force:
+            return 0.0
+        assert model.slopes is not None
+        # to first order forces change as the elastic energy, ½ ∫ p u dA
+        error = known.force * model.slopes.error(known.pressure) / (2.0 * known.elastic_energy)
         if not self._probe.order:
-            return abs(known.force - self._force(self._half, 0))
-        error = _SECOND_ORDER * abs(known.force - self._force(self._half, 1))
-        model, flat = self._model(self._half, 2), self._model(self._half, 0)
-        if model.slopes is None or model.body is None:
+            return error + abs(known.force - self._force(self._others, 0))
+        if model.body is None:
             return error
         alone = replace(flat, slopes=model.slopes.on_half_space())
         found = alone.equilibrium(self._control, start=known)
@@ -187,7 +202,7 @@ class _Problems:
 
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
-        grid = self._half if min(self._half) >= _FEWEST_CELLS else self._grid
+        grid = self._others if min(self._others) >= _FEWEST_CELLS else self._grid
         return self._model(grid, 0).stiffness(self._state(grid, 0), turns=False)[0]
 
     def _force(self, grid: tuple[int, int], order: int) -> float:
@@ -238,10 +253,13 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
     by_force, turns = load_history.quantity == "force", load_history.tilt is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
+    force, approach = (
+        each if math.isfinite(each) else None for each in (found.force, found.approach)
+    )
     return replace(
         step,
-        force_error_N=0.0 if by_force else found.force,
-        approach_error_mm=found.approach if by_force else 0.0,
+        force_error_N=0.0 if by_force else force,
+        approach_error_mm=approach if by_force else 0.0,
         errors=tuple(found.parts.items()),
     )
 
@@ -274,11 +292,20 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
     share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
-    causes = ", ".join(f"{cause} {quantity(error, 'N', 2)}" for cause, error in step.errors)
-    size = quantity(whole, "N", 2)
-    text = f"measured at load step {step.step}: at its approach the force is within {size}"
-    if step.approach_error_mm:
-        text += (
-            f", and under its force the approach within {quantity(step.approach_error_mm, 'mm', 2)}"
+    causes = ", ".join(
+        f"{cause} {quantity(error, 'N', 2) if math.isfinite(error) else 'not measured'}"
+        for cause, error in step.errors
+    )
+    largest = max(step.errors, key=lambda each: each[1])[0]
+    if whole == math.inf:
+        yield Caution(
+            f"measured at load step {step.step}: {causes}; the force has no stated error, as that "
+            f"by {largest} may be larger than all others"
         )
-    yield f"{text}{share}: {causes}"
+    else:
+        text = f"measured at load step {step.step}: at its approach the force is within "
+        text += quantity(whole, "N", 2)
+        if step.approach_error_mm:
+            size = quantity(step.approach_error_mm, "mm", 2)
+            text += f", and under its force the approach within {size}"
+        yield f"{text}{share}: {causes}"

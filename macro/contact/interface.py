@@ -56,8 +56,9 @@ class Interface(InterfaceResults):
         tag: The face by number, by name, or as an array of this rank's facets or a mask of them.
         laws: A table of laws per patch, such as a `LawTable`; one law for the whole face, such as
             a representative one; or one law per patch beside `patches`.
-        indenter: Approach and tilt of the plane (`RigidPlane`, centre in coordinates of the
-            face), or what is prescribed of it (`Control`: a force, a free tilt). It may be set
+        indenter: Approach and tilt of the plane (`RigidPlane`), or what is prescribed of it
+            (`Control`: a force, a free tilt). Both turn about the middle of the patches, a
+            `RigidPlane` with a centre about that point, in coordinates of the face. It may be set
             anew for every load step.
         mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it, the
             default of laws per patch; ``"pointwise"``: a law holds at every quadrature point, the
@@ -315,5 +316,6 @@ def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:
     """Return what an indenter prescribes of the plane at the middle of the patches."""
     if isinstance(indenter, Control):
         return indenter
-    x, y = middle
-    return Control(approach=float(indenter.at(x, y)), tilt=indenter.tilt)
+    about_middle = indenter.centre is None
+    approach = indenter.approach if about_middle else float(indenter.at(*middle))
+    return Control(approach=approach, tilt=indenter.tilt)

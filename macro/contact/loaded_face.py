@@ -383,8 +383,9 @@ def normal_rows(
 def patch_compliance_matrix(face: Loadable) -> Array:
     """Return the mean displacement of patch i into the body by unit pressure on patch j.
 
-    By reciprocity the matrix is symmetric for patches of equal area. Errors of the linear solver
-    are averaged between the two triangles.
+    By reciprocity the work A_i C_ij of one load along another is symmetric (Betti), and so is the
+    matrix where the patches have equal areas A. Errors of the linear solver are averaged between
+    the two triangles of the work.
 
     Args:
         face: Patches on the contact face of a body.
@@ -398,8 +399,8 @@ def patch_compliance_matrix(face: Loadable) -> Array:
     Note:
         Collective.
     """
-    compliance = displacements_under(face, np.eye(face.patches.count))
-    return np.asarray(0.5 * (compliance + compliance.T))
+    work = displacements_under(face, np.eye(face.patches.count)) * face.areas  # [j, i], of i by j
+    return np.asarray(0.5 * (work + work.T) / face.areas[:, None])
 
 
 def displacements_under(face: Loadable, pressures: Array) -> Array:

@@ -42,6 +42,7 @@ from scipy import fft
 
 from geometry import Material, Surface
 from geometry.errors import InputError
+from geometry.plausibility import check_finite_slopes
 from micro.compliance.waves import Around, Spectrum, surface_waves
 
 Array = NDArray[np.float64]
@@ -50,6 +51,11 @@ _RATIOS, _FEWEST, _GRADIENT = (4, 2, 1), 64, 0.9
 """Cells per coarse cell along an axis: the first ratio that leaves 64 coarse cells a side and 0.9
 of the mean square gradient. Against ratio 1, forces of rough surfaces of 128² … 1024² cells change
 by up to 0.1 %, in a tenth of the time."""
+
+_THIRD, _THIRD_BY_POISSON = 0.3, 12.0
+"""Orders beyond the second over the sizes of the parts of the first times the mean square gradient,
+c₀ + c₁ ν². Against finite elements, on cosine bumps of local gradients up to 1.9 and on rough
+surfaces of rms gradients up to 0.8."""
 
 
 class SurfaceStress(Protocol):
@@ -100,7 +106,8 @@ class FiniteSlopes:
         spacing: Sides of these cells [mm].
 
     Raises:
-        InputError: When the order is unknown, or a surface is not periodic that should be.
+        InputError: When the order is unknown, the surface too steep for it, or a surface is not
+            periodic that should be.
     """
 
     def __init__(
@@ -118,6 +125,7 @@ class FiniteSlopes:
             raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
+        check_finite_slopes(surface)
         self.material, self.order, self.edge_stresses = material, order, tuple(edge_stresses)
         self._surface, self._periodic = surface, periodic
         self.grid = grid or coarse_grid(surface)
@@ -163,6 +171,32 @@ class FiniteSlopes:
             found -= found.mean()
         return waves.refined(found)
 
+    def error(self, pressure: Array) -> float:
+        """Return what ∫ p u dA may be off by, as orders beyond those taken are left out [N mm].
+
+        It is the last order that was taken, times its ratio to the order before where that is below
+        1; or, where parts of these orders cancel each other, the size that the next order has
+        without cancelling. Gradients count by their nearness to the loads, as 1/r².
+
+        Args:
+            pressure: Pressures on all cells, shape (nx, ny) [MPa].
+        """
+        waves, nu = self._waves, self.material.poisson_ratio
+        below, loaded = self._below, waves.alone(waves.coarsened(pressure))
+        stresses = self._stresses(loaded)
+        of_load = loaded**2 / self.material.young_modulus
+        of_stresses = _product(stresses, self._strains(stresses))
+        first = abs(float(np.sum(below * (of_load - of_stresses))))
+        second = abs(self._second(loaded, stresses)[0])
+        along, across = self._directed(loaded)
+        near = np.sqrt(along**2 + (loaded - along) ** 2 + 2.0 * across**2)
+        squares = sum(np.square(part) for part in np.gradient(below, *self.spacing))
+        steepness = float(np.sum(near * squares)) / (float(np.sum(near)) or 1.0)
+        third = (_THIRD + _THIRD_BY_POISSON * nu**2) * steepness
+        third *= float(np.sum(np.abs(below) * (of_load + of_stresses)))
+        last = second * min(1.0, second / first) if self.order == 2 and first else second
+        return max(last, third) * self.spacing[0] * self.spacing[1]
+
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
         return FiniteSlopes(self._surface, self.material, order=self.order, periodic=self._periodic)
@@ -185,17 +219,21 @@ class FiniteSlopes:
 
     def _stresses(self, pressure: Array) -> Array:
         """Return σ_xx, σ_yy, σ_xy by pressures."""
-        nu, directions = self.material.poisson_ratio, self._waves.directions
-        side = 1.0 - 2.0 * nu
-
-        def along_and_across(waves: Spectrum, here: slice) -> Spectrum:
-            return np.asarray(waves * directions[::2, :, here])
-
-        along, across = side * self._waves.changed(pressure[None], along_and_across, 2)
+        nu = self.material.poisson_ratio
+        along, across = (1.0 - 2.0 * nu) * self._directed(pressure)
         found = np.stack([-2.0 * nu * pressure - along, along - pressure, -across])
         for term in self.edge_stresses:
             found += term.stresses(pressure)
         return found
+
+    def _directed(self, pressure: Array) -> Array:
+        """Return pressures with their waves times k_x k_x/k² and k_x k_y/k²."""
+        directions = self._waves.directions
+
+        def along_and_across(waves: Spectrum, here: slice) -> Spectrum:
+            return np.asarray(waves * directions[::2, :, here])
+
+        return self._waves.changed(pressure[None], along_and_across, 2)
 
     def _curvatures_and_strains(self, waves: Spectrum, here: slice) -> Spectrum:
         """Return waves of ∂_α ∂_β u_z by those of pressures, and of strains by moments h σ_αβ.

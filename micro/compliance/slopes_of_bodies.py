@@ -30,6 +30,14 @@ class SlopeTerm(Protocol):
         """
         ...
 
+    def error(self, pressure: Array, /) -> float:
+        """Return what ∫ p u dA may be off by, as higher orders of the slopes are left out [N mm].
+
+        Args:
+            pressure: Pressures on all cells, shape (nx, ny) [MPa].
+        """
+        ...
+
     def on_half_space(self) -> SlopeTerm:
         """Return the same slopes on half-spaces."""
         ...
@@ -52,6 +60,10 @@ class SlopesOfBodies:
     def displacement(self, pressure: Array) -> Array:
         """Return the sum of the displacements; see `FiniteSlopes.displacement`."""
         return np.asarray(sum(part.displacement(pressure) for part in self.parts))
+
+    def error(self, pressure: Array) -> float:
+        """Return the sum of the errors; see `FiniteSlopes.error`."""
+        return sum(part.error(pressure) for part in self.parts)
 
     def on_half_space(self) -> SlopesOfBodies:
         """Return the same slopes on half-spaces."""

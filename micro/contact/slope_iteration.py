@@ -105,7 +105,10 @@ def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> Co
             continue
         change = compliance.slope_displacement(found.pressure) - displaced
         nearer = interference + problem.motions.displacement(found.motion)
-        left = float(np.abs(change[touching]).max()) / float(nearer[touching].max())
+        changed, largest = (float(field[touching].max()) for field in (np.abs(change), nearer))
+        # bodies that do not overlap do not touch, and their pressures have an energy
+        sound = largest > 0.0 and np.vdot(found.pressure, nearer) > 0.0
+        left = changed / largest if sound else np.inf
         if left <= last and accuracy <= tolerance:
             return found._replace(residual=max(found.residual, left), iterations=iterations)
         displaced = mixing.next(displaced, change)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.errors import InputError
+from geometry.plausibility import check_slopes
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance
@@ -53,8 +54,8 @@ class HalfSpaceModel:
 
     Raises:
         InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
-            has a surface that is not periodic or has free sides, or the free sides are not those of
-            the surface.
+            has a surface that is not periodic or has free sides, the free sides are not those of
+            the surface, or this is steeper than any.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -80,6 +81,8 @@ class HalfSpaceModel:
         if not self.upper > 0.0:
             problem = "the upper bound of the pressures must be positive"
             raise InputError(problem, value=self.upper, allowed="> 0")
+        if self.highest is None:  # otherwise it is part of a surface, or one resampled
+            check_slopes(self.surface)
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
             raise InputError("a periodic half-space needs a periodic surface", value=source)

@@ -209,7 +209,8 @@ class FreePlaneCoupling:
             raise beyond_law(control, problem, self._table)
         tx, ty, *moment = map(float, path.at(approach))
         point = self._along(approach)
-        local = RigidPlane.above(patches, approach, (tx, ty)).means(patches)
+        xc, yc = map(float, patches.middle)
+        local = RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)).means(patches)
         closure = local - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -91,4 +92,8 @@ def verdict(
         return AccuracyVerdict(requested=accuracy, unknown=why)
     error, step = max(known, key=lambda each: each[0])
     causes = {cause: part / step.force_N for cause, part in step.errors}
+    if error == math.inf:
+        largest = max(causes, key=lambda cause: causes[cause])
+        why = f"the error by {largest} could not be measured at load step {step.step}"
+        return AccuracyVerdict(requested=accuracy, step=step.step, unknown=why)
     return AccuracyVerdict(requested=accuracy, error=error, step=step.step, causes=causes)

@@ -299,7 +299,8 @@ class MicroSection(Section):
     """Solver of interacting summits."""
     finite_slopes: Flag | None = None
     """Whether the slopes of the roughness, where they are not small, count to second order. When
-    not given they do with half-space contacts, unless laws are isolated or those of samples."""
+    not given they do with half-space contacts, unless laws are isolated or those of samples. They
+    are refused beyond an rms gradient of 0.8, where that fails."""
     hardness: Annotated[Pressure, Field(gt=0)] | None = None
     """Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951): no contact
     pressure exceeds it, and what it leaves of the overlap stays as plastic depth. Contacts are

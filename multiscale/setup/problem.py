@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,12 +19,14 @@ from geometry import (
     Surface,
     find_asperities,
 )
+from geometry.plausibility import check_finite_slopes
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies
 from multiscale.setup.reference_meshes import ReferenceMeshes
 from multiscale.setup.samples import RegionSamples
+from multiscale.setup.surface_and_block import located
 
 Array = NDArray[np.float64]
 
@@ -132,6 +134,22 @@ class ProblemSetup:
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.finite_slopes:
+            with located(self.scene, "micro.finite_slopes"):
+                for surface in self._sloped:
+                    check_finite_slopes(surface)
+
+    @property
+    def _sloped(self) -> list[Surface]:
+        """The rough sides of the bodies, or the samples of laws, whose slopes count."""
+        if self.samples:
+            return [surface for region in self.samples for surface in region.surfaces]
+        if self.counter_surface is None:
+            return [self.surface]
+        own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
+        return [own] if self.materials.second is None else [own, self.counter_surface]
 
     @cached_property
     def asperities(self) -> Asperities:

@@ -108,7 +108,6 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
     if section.spectrum is not None:
         with located(scene, f"{key}.spectrum"):
             surface = synthesise(section.spectrum.spectrum(), **extent)
-        with located(scene, key):
             surface = prepared(surface, section.preparation)
     elif section.heights is not None:
         with located(scene, f"{key}.heights"):

@@ -73,8 +73,8 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
 
 def test_refusal_ends_all_ranks_with_one_message(mpirun, tmp_path):
     out = tmp_path / "out"
-    steep = "surface.spectrum.rms_slope=8"
-    words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, steep)
+    low = "surface.spectrum.rms_slope=1.9", "block.height=0.2 mm"
+    words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *low)
     done = mpirun(2, *words, timeout=60)
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("patchlaw: ") == 1

@@ -10,8 +10,8 @@ def surface(heights, lengths=(2.0, 1.0), **kwargs):
     return Surface(heights=heights, lengths=lengths, **kwargs)
 
 
-RANDOM = np.random.default_rng(1).normal(size=(8, 4))
-SQUARE = np.random.default_rng(2).normal(size=(8, 8))
+RANDOM = np.random.default_rng(1).normal(scale=0.05, size=(8, 4))
+SQUARE = np.random.default_rng(2).normal(scale=0.05, size=(8, 8))
 
 
 def test_a_surface_turned_over_has_its_heights_at_the_mirrored_place():

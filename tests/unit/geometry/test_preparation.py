@@ -105,7 +105,9 @@ def test_coordinates_in_the_wrong_unit_are_noted(tmp_path):
 
 def test_heights_in_the_wrong_unit_are_asked_about(tmp_path):
     heights = 1e3 * rough().heights  # µm
-    with pytest.raises(InputError, match=r"gradient of the map is 9\d.*in µm\? .*height_unit = 'u"):
+    with pytest.raises(
+        InputError, match=r"gradient of the heights is 9\d.*in µm\? .*height_unit = 'u"
+    ):
         read(tmp_path, heights)
     surface = read(tmp_path, heights, height_unit="µm")
     np.testing.assert_allclose(surface.heights, rough().heights, rtol=1e-15)

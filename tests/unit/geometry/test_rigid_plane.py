@@ -51,6 +51,16 @@ def test_tilt_turns_about_the_centre():
     assert RigidPlane.moved(SQUARE, plane.motion) == plane
 
 
+def test_a_plane_without_a_centre_waits_for_its_face():
+    """It turns about the middle of a face that it does not know; level, that does not matter."""
+    x, y, force = np.array([0.1, 0.7]), np.array([0.3, 0.2]), np.ones(2)
+    level, tilted = (RigidPlane(approach=2e-3, tilt=tilt) for tilt in ((0.0, 0.0), (0.0, 1e-3)))
+    assert level.at(x, y) == pytest.approx([2e-3, 2e-3], rel=1e-15)
+    for placed in (lambda: tilted.at(x, y), lambda: level.moment(x, y, force)):
+        with pytest.raises(InputError, match=r"the middle of its face.*centre = \(xc, yc\)"):
+            placed()
+
+
 @pytest.mark.parametrize(
     ("approach", "tilt", "problem"),
     [

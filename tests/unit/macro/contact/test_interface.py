@@ -160,6 +160,33 @@ def test_crown_and_centre_are_in_coordinates_of_the_face(body):
     np.testing.assert_allclose(rough.closure, plane.at(x, y) - crown(x, y), rtol=1e-12)
 
 
+@pytest.mark.parametrize(
+    "patches", [None, PatchGrid(grid=(2, 1), lengths=(0.5, 0.3), origin=(0.4, 0.6))]
+)
+def test_planes_turn_about_the_middle_unless_told(body, patches):
+    """A plane and a control of one approach and tilt are one load."""
+    spring, tilt = PowerLaw(1e3, power=1.0), (1.3e-3, -2.1e-3)
+    laws = {"laws": spring} if patches is None else {"laws": [spring] * 2, "patches": patches}
+    x, y = (0.5, 0.5) if patches is None else (0.65, 0.75)
+    given = (
+        RigidPlane(approach=5e-3, tilt=tilt),
+        Control(approach=5e-3, tilt=tilt),
+        RigidPlane(approach=5e-3, tilt=tilt, centre=(x, y)),
+    )
+    area = 1.0 if patches is None else 0.15
+    for indenter in given:
+        rough = Interface(body.space, body.tags, TOP, mode="pointwise", indenter=indenter, **laws)
+        state = rough.evaluate(fem.Function(body.space))
+        # springs under a plane through its approach in the middle; about a corner it is 20 % off
+        assert state.force == pytest.approx(1e3 * 5e-3 * area, rel=1e-11)
+        assert state.plane == RigidPlane(approach=5e-3, tilt=tilt, centre=state.plane.centre)
+        assert state.plane.centre == pytest.approx((x, y), rel=1e-12)
+        # ∫ k t·(x − xm)² dA by sides
+        lx, ly = (1.0, 1.0) if patches is None else (0.5, 0.3)
+        expected = 1e3 * area / 12.0 * np.array([tilt[0] * lx**2, tilt[1] * ly**2])
+        np.testing.assert_allclose(state.moment, expected, rtol=1e-9)
+
+
 @pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
 @pytest.mark.parametrize(
     "indenter", [TILTED, Control(force=5.0, tilt=None)], ids=["placed", "free"]

@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
-from macro import Block, LoadedFace, Material, block_mesh
+from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
 
@@ -65,6 +65,27 @@ def test_laws_see_the_samples_of_their_own_patch():
         np.testing.assert_array_equal(sampling.by_patch(laws, closure), sampling.patch)
         expected = np.arange(6) * interface.patches.area
         np.testing.assert_allclose(sampling.patch_sums(sampling.patch * 1.0), expected, rtol=NODES)
+
+
+@pytest.mark.parametrize("grid", [(2, 1), (3, 2)])
+def test_compliance_of_unequal_patches_is_that_of_direct_solutions(grid):
+    """Patches that reach beyond the top are cut; A_i C_ij is symmetric, C_ij is not."""
+    whole = make((1, 1))
+    patches = PatchGrid(grid=grid, lengths=(2.7, 1.0))
+    face = LoadedFace(whole.body, whole.facets, patches)
+    assert face.areas.max() > 1.4 * face.areas.min()
+    place, direct = whole.body.stiffness.createVecRight(), np.empty((patches.count,) * 2)
+    unknowns = np.arange(place.size, dtype=np.int32)
+    stiffness = whole.body.stiffness.getValues(unknowns, unknowns)
+    held = np.count_nonzero(stiffness, axis=1) == 1  # unit rows
+    for j, pressure in enumerate(np.eye(patches.count)):
+        load = np.where(held, 0.0, face.load(pressure).array_r)
+        place.array[:] = np.linalg.solve(stiffness, load)
+        direct[:, j] = face.patch_displacements(place)
+    found = patch_compliance_matrix(face)
+    np.testing.assert_allclose(found, direct, rtol=1e-7)  # the linear solver's own residual
+    work = face.areas[:, None] * found
+    np.testing.assert_allclose(work, work.T, rtol=1e-14)
 
 
 def test_patches_beyond_the_top_are_refused():

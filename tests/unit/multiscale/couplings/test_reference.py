@@ -341,7 +341,7 @@ def test_what_does_not_fit_is_refused(overrides, text):
 
 
 def test_roughness_that_no_mesh_carries_names_file_and_key():
-    high = scene("surface.spectrum.rms_slope=8", "load.steps=1")
+    high = scene("surface.spectrum.rms_slope=1.9", "block.height=0.2 mm", "load.steps=1")
     text = rf"{re.escape(str(PAPER))}: surface = .*valley of the roughness is too deep"
     with pytest.raises(InputError, match=text):
         run(high)

@@ -1,0 +1,67 @@
+"""Slopes of heights from every source: refused where no surface is so steep."""
+
+import numpy as np
+import pytest
+
+from geometry import InputError, Material, Spectrum, Surface, facing, read_surface, synthesise
+from geometry.files.reading import surface_of
+from geometry.plausibility import check_finite_slopes, check_slopes, rms_gradient
+from geometry.preparation import Preparation, prepared
+from micro import FiniteSlopes, HalfSpaceModel
+
+LENGTHS = (0.7, 1.1)
+
+
+def rough(rms_slope, seed=5):
+    spectrum = Spectrum(hurst=0.77, waves=(2, 5), rms_slope=rms_slope, seed=seed)
+    return synthesise(spectrum, grid=(40, 64), lengths=LENGTHS)
+
+
+def pressed(surface):
+    return HalfSpaceModel(surface, contact_modulus=4321.0)
+
+
+def in_memory(surface):
+    return surface_of(surface.heights, lengths=LENGTHS, periodic=True)
+
+
+SOURCES = {
+    "synthesised": lambda surface, _: prepared(surface, Preparation()),
+    "array": lambda surface, _: in_memory(surface),
+    "model": lambda surface, _: pressed(surface).surface,
+    "both sides": lambda surface, _: facing(surface.scaled(0.5), surface.scaled(0.5)),
+}
+
+
+def file(surface, folder):
+    np.save(folder / "map.npy", surface.heights)
+    return read_surface(folder / "map.npy", lengths=LENGTHS, periodic=True)
+
+
+@pytest.mark.parametrize("make", [*SOURCES.values(), file], ids=[*SOURCES, "file"])
+def test_every_source_has_one_guard(make, tmp_path):
+    assert rms_gradient(make(rough(1.97), tmp_path)) == pytest.approx(1.97, rel=1e-12)
+    with pytest.raises(InputError, match=r"heights is 2\.03,.*in µm.*gradients up to 2\)"):
+        make(rough(2.03), tmp_path)
+
+
+def test_parts_and_resamplings_of_a_surface_are_its_own():
+    """A part may be steeper than the whole, which was looked at."""
+    step = np.zeros((64, 64))
+    step[30:34] = np.array([0.1, 0.9, 0.9, 0.1])[:, None] * 0.12
+    model = pressed(Surface(heights=step, lengths=(1.0, 1.0)))
+    steep = model.surface.piece((0.45, 0.55), (0.0, 1.0))
+    assert rms_gradient(steep) > 2.0 > rms_gradient(model.surface)
+    assert model.resampled((96, 96)).surface.grid == (96, 96)
+    with pytest.raises(InputError, match="no rough surface is so steep"):
+        check_slopes(steep)
+
+
+def test_finite_slopes_end_where_two_orders_do():
+    material = Material(young_modulus=4000.0, poisson_ratio=0.21)
+    check_finite_slopes(rough(0.8))
+    assert FiniteSlopes(rough(0.8), material).grid == (40, 64)
+    with pytest.raises(
+        InputError, match=r"surface, 0\.81; .*finite_slopes = false.*'reference'.*0\.8"
+    ):
+        FiniteSlopes(rough(0.81), material)
