@@ -47,12 +47,12 @@ class HalfSpaceModel:
         body: What a finite body adds to the half-space and its sides; a half-space when not given.
         slopes: What the finite slopes of the surface add; the theory of small slopes when not
             given.
-        upper: Upper bound of the pressures, the hardness of the softer body [MPa]; none when not
-            given. Where cells bear it, what overlap is left is plastic depth: `press` starts from
-            the depth of its start, all else from the surface as it is.
+        hardness: Hardness of the softer body, the largest pressure [MPa]; contacts are elastic
+            when not given. Where cells bear it, what overlap is left is plastic depth: `press`
+            starts from the depth of its start, all else from the surface as it is.
 
     Raises:
-        InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
+        InputError: When the modulus, the tolerance or the hardness is not positive, a periodic model
             has a surface that is not periodic or has free sides, or the free sides are not those of
             the surface.
 
@@ -69,7 +69,7 @@ class HalfSpaceModel:
     sides: FreeSides | None = None
     body: BodyModes | None = None
     slopes: SlopeTerm | None = None
-    upper: float = np.inf
+    hardness: float | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -77,9 +77,8 @@ class HalfSpaceModel:
             if not (np.isfinite(value) and value > 0.0):
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
-        if not self.upper > 0.0:
-            problem = "the upper bound of the pressures must be positive"
-            raise InputError(problem, value=self.upper, allowed="> 0")
+        if self.hardness is not None and not self.hardness > 0.0:
+            raise InputError("the hardness must be positive", value=self.hardness, allowed="> 0")
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
         if self.periodic and not self.surface.periodic:
             raise InputError("a periodic half-space needs a periodic surface", value=source)
@@ -245,11 +244,11 @@ class HalfSpaceModel:
 
     def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
         """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
-        return self._contact.stiffness(state, turns=turns)
+        return state.stiffness(turns=turns)
 
     def interface_stiffness(self, state: HalfSpaceState) -> float:
         """Return dF/dδ of a solution's contacts on half-spaces alone, for conductances [N/mm]."""
-        return self._contact.interface_stiffness(state)
+        return state.interface_stiffness
 
     @cached_property
     def _contact(self) -> PlaneContact:
@@ -264,5 +263,5 @@ class HalfSpaceModel:
                 slopes=self.slopes,
             ),
             tolerance=self.tolerance,
-            upper=self.upper,
+            hardness=self.hardness,
         )

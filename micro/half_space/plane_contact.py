@@ -39,7 +39,7 @@ class PlaneContact:
         reference_height: Height z_M that the approach counts from [mm].
         compliance: The elastic body.
         tolerance: Largest residual.
-        upper: Upper bound of the pressures, the hardness [MPa].
+        hardness: Largest pressure [MPa]; None where contacts are elastic.
         depth: Plastic depth that earlier loads left in the cells, by which the heights are lower,
             shape (nx, ny) [mm]; None: none.
     """
@@ -48,7 +48,7 @@ class PlaneContact:
     reference_height: float
     compliance: Compliance
     tolerance: float
-    upper: float
+    hardness: float | None = None
     depth: Array | None = None
 
     def equilibrium(
@@ -71,16 +71,20 @@ class PlaneContact:
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(surface, motion))
         if self.compliance.periodic:
-            bounded = self.upper < np.inf  # then cells give way, and no approach closes all gaps
-            _check_periodic(control, -np.inf if bounded else float(interference.mean()))
+            yields = self.hardness is not None  # cells give way: no approach closes all gaps
+            _check_periodic(control, -np.inf if yields else float(interference.mean()))
         problem = self._problem(interference, control.free, control.loads)
         with blas_threads(1):  # all cores are taken by threads of ours
             found = solve_contact(problem, self._start(start, near))
         motion[control.free] = found.motion * self._units[control.free]
+        yielding, pressure = problem.yielding(found.pressure), found.pressure * modulus
+        if self.hardness is not None:
+            pressure[yielding] = self.hardness
         return HalfSpaceState(
             contact=self,
             plane=RigidPlane.moved(surface, motion),
-            pressure=found.pressure * modulus,
+            pressure=pressure,
+            yielding=yielding,
             residual=found.residual,
             iterations=found.iterations,
         )
@@ -100,8 +104,10 @@ class PlaneContact:
             below += self.depth
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
-    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
-        """Return the interfacial stiffness dF/dδ [N/mm], and the products of the compliance.
+    def elastic_stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
+        """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.
+
+        It is that of unloading: cells that yield bear less than the hardness then.
 
         Args:
             state: A solution.
@@ -112,18 +118,6 @@ class PlaneContact:
         with blas_threads(1):
             rate, products = approach_stiffness(problem, state.pressure / modulus)
         return rate * modulus * float(np.prod(self.surface.spacing)), products
-
-    def interface_stiffness(self, state: HalfSpaceState) -> float:
-        """Return dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
-
-        Cells that yield conduct as the others: it is the elastic stiffness, that of unloading.
-
-        Args:
-            state: A solution.
-        """
-        alone = replace(self.compliance, sides=None, body=None, slopes=None)
-        elastic = replace(self, compliance=alone, upper=np.inf)
-        return elastic.stiffness(state, turns=False)[0]
 
     @property
     def _units(self) -> Array:
@@ -148,7 +142,7 @@ class PlaneContact:
             interference=interference,
             motions=Motions.of_plane(x, y, free, loads / (modulus * cell)),
             tolerance=self.tolerance,
-            upper=self.upper / modulus,
+            hardness=np.inf if self.hardness is None else self.hardness / modulus,
         )
 
     def _first_touch(self, control: Control, near: RigidPlane | None) -> Control:
@@ -175,6 +169,7 @@ class HalfSpaceState:
         contact: What the plane presses on.
         plane: The rigid plane: approach at the centre from first touch, and slopes.
         pressure: Contact pressure, shape (nx, ny) [MPa].
+        yielding: Which cells bear the hardness, shape (nx, ny).
         residual: Largest violation of gap ≥ 0 and of gap = 0 under pressure, relative to the
             largest interference. It bounds the error of the force: this is exact for a surface
             whose heights differ by ``residual`` δ at most.
@@ -184,6 +179,7 @@ class HalfSpaceState:
     contact: PlaneContact
     plane: RigidPlane
     pressure: Array
+    yielding: Flags
     residual: float
     iterations: int
 
@@ -223,11 +219,6 @@ class HalfSpaceState:
             plastic_depth=self.plastic_depth,
         )
 
-    @property
-    def yielding(self) -> NDArray[np.bool_]:
-        """Which cells bear the hardness, shape (nx, ny)."""
-        return self.pressure >= self.contact.upper
-
     @cached_property
     def plastic_depth(self) -> Array | None:
         """Plastic depth of the cells, that of earlier loads included, shape (nx, ny) [mm].
@@ -235,9 +226,9 @@ class HalfSpaceState:
         It is what overlap is left where the pressure is the hardness; None without a hardness.
         """
         contact = self.contact
-        if contact.upper == np.inf:
+        if contact.hardness is None:
             return None
-        overlap = self.contact.interference(self.plane) - self.displacement
+        overlap = contact.interference(self.plane) - self.displacement
         more = np.where(self.yielding, np.maximum(overlap, 0.0), 0.0)
         return more if contact.depth is None else contact.depth + more
 
@@ -250,13 +241,13 @@ class HalfSpaceState:
     @property
     def plastic_work(self) -> float:
         """Work of the hardness on the plastic depth, that of earlier loads included [N mm]."""
-        depth = self.plastic_depth
-        if depth is None:
+        depth, hardness = self.plastic_depth, self.contact.hardness
+        if depth is None or hardness is None:
             return 0.0
-        return self.contact.upper * float(depth.sum()) * self.spacing[0] * self.spacing[1]
+        return hardness * float(depth.sum()) * self.spacing[0] * self.spacing[1]
 
     @property
-    def in_contact(self) -> NDArray[np.bool_]:
+    def in_contact(self) -> Flags:
         """Which cells carry a pressure, shape (nx, ny)."""
         return self.pressure > 0.0
 
@@ -273,8 +264,13 @@ class HalfSpaceState:
     @cached_property
     def contacts(self) -> Contacts:
         """The connected contacts."""
-        periodic = self.contact.compliance.periodic
-        return find_contacts(self.pressure, self.spacing, periodic=periodic)
+        contact = self.contact
+        return find_contacts(
+            self.pressure,
+            self.spacing,
+            periodic=contact.compliance.periodic,
+            hardness=contact.hardness,
+        )
 
     @cached_property
     def displacement(self) -> Array:

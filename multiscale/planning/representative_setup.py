@@ -53,7 +53,7 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         surface,
         contact_modulus=materials.contact_modulus,
         periodic=True,
-        upper=scene.micro.upper,
+        hardness=scene.micro.hardness,
     )
     made = time.perf_counter()
     plane = _sample_plane(scene, model, face.area)

@@ -20,7 +20,7 @@ MODULUS, APPROACHES = 4000.0, np.linspace(1e-3, 8e-3, 8)
 
 def steps(surface, hardness, also):
     """Return CPU time [s], products of the compliance, those of `also`, and the yielding share."""
-    model = HalfSpaceModel(surface, contact_modulus=MODULUS, upper=hardness, tolerance=1e-10)
+    model = HalfSpaceModel(surface, contact_modulus=MODULUS, hardness=hardness, tolerance=1e-10)
     model.press(Control(approach=1e-3))  # makes transforms
     began, start, products, more = time.process_time(), None, 0, 0
     for approach in APPROACHES:

@@ -80,7 +80,7 @@ def other_codes():
         row = table[np.isclose(table[:, 0], 8e-3)][0]
         yield f"ContactMechanics, {name}: force [N]", row[column], model.solve(row[0]).force
     seed, approach, hardness, force, _ = plastic.TABLE[2]
-    rough, options = plastic.surface(int(seed)), {"upper": hardness, "tolerance": 1e-10}
+    rough, options = plastic.surface(int(seed)), {"hardness": hardness, "tolerance": 1e-10}
     model = plastic.HalfSpaceModel(rough, contact_modulus=plastic.E_STAR, **options)
     yield "ContactMechanics, hardness 100 MPa: force [N]", force, model.solve(approach).force
     counted, corrected, energy = gfmd.found(gfmd.surface(3.45, 1176, seed=1), gfmd.PRESSURES)

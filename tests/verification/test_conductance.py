@@ -80,7 +80,7 @@ def test_contacts_that_yield_conduct_as_others():
     """Unloading begins on the same cells, which then bear less than the hardness."""
     spectrum = Spectrum(hurst=0.8, waves=(2, 10), rms_slope=0.2, seed=5)
     rough = synthesise(spectrum, grid=(48, 48), lengths=(1.0, 1.0))
-    model = HalfSpaceModel(rough, contact_modulus=MODULUS, upper=150.0, tolerance=1e-10)
+    model = HalfSpaceModel(rough, contact_modulus=MODULUS, hardness=150.0, tolerance=1e-10)
     pressed = model.press(Control(approach=8e-3))
     state = pressed.state
     assert np.count_nonzero(state.yielding) > 0.3 * np.count_nonzero(state.in_contact)

@@ -26,7 +26,7 @@ def cap(cells):
 
 
 def model(surface=None, hardness=400.0, **given):
-    given = {"contact_modulus": 4000.0, "tolerance": 1e-10, "upper": hardness, **given}
+    given = {"contact_modulus": 4000.0, "tolerance": 1e-10, "hardness": hardness, **given}
     return HalfSpaceModel(surface or rough(), **given)
 
 

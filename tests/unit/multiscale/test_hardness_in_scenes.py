@@ -63,7 +63,7 @@ def test_the_scene_is_the_model_under_a_bound():
         "hardness": "300 MPa", "finite_slopes": False,
     }))  # fmt: skip
     model = HalfSpaceModel(
-        setup.surface, contact_modulus=setup.materials.contact_modulus, upper=HARDNESS
+        setup.surface, contact_modulus=setup.materials.contact_modulus, hardness=HARDNESS
     )
     (step,) = run(setup.scene)
     assert step.force_N == pytest.approx(model.solve(0.008).force, rel=1e-7)
@@ -80,7 +80,7 @@ def test_representative_laws_end_below_the_hardness():
     from multiscale.laws.representative import representative_law
 
     surface = make_setup(scene(periodic=True)).surface
-    given = {"contact_modulus": 4000.0, "periodic": True, "upper": HARDNESS}
+    given = {"contact_modulus": 4000.0, "periodic": True, "hardness": HARDNESS}
     law = representative_law(
         [surface], 4000.0, largest_pressure=0.9 * HARDNESS, tolerance=1e-2,
         make_model=lambda sample: HalfSpaceModel(sample, **given),

@@ -25,7 +25,7 @@ def model(**terms):
         ({}, Control(approach=0.006, tilt=TURNING)),
         ({}, Control(force=1.0, tilt=TURNING)),
         ({"periodic": True}, Control(force=1.0, tilt=LEVEL)),
-        ({"upper": 200.0}, Control(approach=0.006, tilt=LEVEL)),
+        ({"hardness": 200.0}, Control(approach=0.006, tilt=LEVEL)),
         ({"slopes": SLOPES}, Control(approach=0.006, tilt=LEVEL)),
         ({"slopes": SLOPES}, Control(approach=0.006, tilt=TURNING)),
     ],
