@@ -188,7 +188,8 @@ class _Problems:
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
         grid = self._half if min(self._half) >= _FEWEST_CELLS else self._grid
-        return self._model(grid, 0).stiffness(self._state(grid, 0), turns=False)[0]
+        found = self._model(grid, 0).stiffness(self._state(grid, 0), turns=False).value
+        return math.nan if found is None else found
 
     def _force(self, grid: tuple[int, int], order: int) -> float:
         return self._state(grid, order).force

@@ -19,6 +19,7 @@ from geometry.rigid_plane import normal_stiffness
 from micro.asperities.contacts import SOLVERS, AsperityContacts, Equilibrium, ModelKind
 from micro.interaction.contact_model import ContactModel, ContactState
 from micro.interaction.patch_sums import EllipticContacts
+from micro.model import Stiffness
 
 LARGEST_AREA_FRACTION = 0.1
 """Contact area fraction up to which summits count as separate; errors may be large before."""
@@ -156,10 +157,10 @@ class AsperityModel(SummitModel):
         found = self.contacts.equilibrium(control, start)
         return self.state_of(self.contacts, found, self.asperities)
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
+    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
         indentation = state.start.solution.indentation
-        return normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1
+        return Stiffness(normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1)
 
     def extrapolated(
         self, last: Equilibrium | None, before: Equilibrium | None

@@ -91,7 +91,7 @@ class ContactProblem:
         return self.motions.turns and not self.motions.loads.any()
 
     def yielding(self, pressure: Array) -> Flags:
-        """Return which pressures / E* are the hardness; those within the bounds are told exactly."""
+        """Return which pressures / E*, within the bounds, are the hardness."""
         return np.asarray(pressure >= self.hardness)
 
     def on(self, box: Box) -> ContactProblem:

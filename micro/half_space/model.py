@@ -19,7 +19,14 @@ from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance
 from micro.compliance.slopes_of_bodies import SlopeTerm
 from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
-from micro.model import Pressed, Response, checked_approaches, checked_patches, whole_patch
+from micro.model import (
+    Pressed,
+    Response,
+    Stiffness,
+    checked_approaches,
+    checked_patches,
+    whole_patch,
+)
 
 Array = NDArray[np.float64]
 
@@ -52,9 +59,9 @@ class HalfSpaceModel:
             starts from the depth of its start, all else from the surface as it is.
 
     Raises:
-        InputError: When the modulus, the tolerance or the hardness is not positive, a periodic model
-            has a surface that is not periodic or has free sides, or the free sides are not those of
-            the surface.
+        InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
+            surface that is not periodic or has free sides, or the free sides are not those of the
+            surface.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -242,8 +249,8 @@ class HalfSpaceModel:
         """Return what `press` starts from, without the plastic depth that loads before left."""
         return start and start[:2]
 
-    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
-        """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
+    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> Stiffness:
+        """Return dF/dδ of a solution; see `MicroModel.stiffness` and `HalfSpaceState.stiffness`."""
         return state.stiffness(turns=turns)
 
     def interface_stiffness(self, state: HalfSpaceState) -> float:

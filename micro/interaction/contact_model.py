@@ -22,7 +22,7 @@ from micro.compliance.body_modes import BodyModes
 from micro.contact_detail import ContactDetail
 from micro.interaction.hertz_pairs import BodyPoints
 from micro.interaction.patch_sums import EllipticContacts, patch_displacements, patch_loads
-from micro.model import Pressed, Response, checked_approaches, checked_patches
+from micro.model import Pressed, Response, Stiffness, checked_approaches, checked_patches
 
 Array = NDArray[np.float64]
 
@@ -190,12 +190,12 @@ class ContactModel(ABC):
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, state.start, state)
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float | None, int]:
+    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ, which is not known here; see `MicroModel.stiffness`.
 
         The shapes of contacts that are fitted to the load change with it, too.
         """
-        return None, 0
+        return Stiffness(None, 0)
 
     def extrapolated(self, last: Any, before: Any) -> Any:
         """Return what to start from after the last solution and the one before it.

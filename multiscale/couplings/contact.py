@@ -23,7 +23,7 @@ from micro import (
     SlopesOfBodies,
 )
 from micro.contact_detail import ContactDetail
-from micro.model import SolvedContact
+from micro.model import SolvedContact, Stiffness
 from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -147,8 +147,8 @@ class ContactCoupling:
 
         return on_root(self._comm, pressures)
 
-    def stiffness(self) -> tuple[float | None, int]:
-        """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
+    def stiffness(self) -> Stiffness:
+        """Return dF/dδ at the latest load step; see `HasStiffness`."""
         return on_root_alone(
             self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
         )
