@@ -270,7 +270,9 @@ class Run:
         if self.scene.conductance is not None:
             from multiscale.conductances import conductance_notes  # other scenes do without
 
-            notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
+            notes += conductance_notes(
+                self.steps, self.scene.conductance, with_laws=self.setup.uses_laws
+            )
         return History(
             steps=steps,
             patches=self.setup.regions or self.setup.patches,

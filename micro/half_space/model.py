@@ -253,10 +253,6 @@ class HalfSpaceModel:
         """Return dF/dδ of a solution; see `MicroModel.stiffness` and `HalfSpaceState.stiffness`."""
         return state.stiffness(turns=turns)
 
-    def interface_stiffness(self, state: HalfSpaceState) -> float:
-        """Return dF/dδ of a solution's contacts on half-spaces alone, for conductances [N/mm]."""
-        return state.interface_stiffness
-
     @cached_property
     def _contact(self) -> PlaneContact:
         return PlaneContact(

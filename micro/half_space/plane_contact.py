@@ -272,12 +272,12 @@ class HalfSpaceState:
             used += state.iterations
         # one cell that enters, up to the hardness or as far as it gives way
         cell = float(np.prod(self.spacing))
-        one = min(contact.hardness * cell / back, contact.compliance.modulus * np.sqrt(cell))
+        bears = contact.hardness * cell / (_BACK * largest)
+        one = min(bears, contact.compliance.modulus * float(np.sqrt(cell)))
         return Stiffness(found[1], used, max(one, float(np.abs(np.diff(found)).max())))
 
-    @property
     def interface_stiffness(self) -> float:
-        """Elastic dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
+        """Return the elastic dF/dδ of the contacts on half-spaces, without finite body and slopes [N/mm].
 
         Cells that yield conduct as the others.
         """

@@ -44,7 +44,7 @@ def test_one_circular_spot_conducts_4_k_a(cells):
     model = HalfSpaceModel(sphere, contact_modulus=MODULUS)
     state = model.solve(2e-2)
     radius = np.sqrt(5.0 * 2e-2)  # Hertz
-    found = total_conductance(model.interface_stiffness(state), MODULUS, pair_conductivity([40.0]))
+    found = total_conductance(state.interface_stiffness(), MODULUS, pair_conductivity([40.0]))
     assert found == pytest.approx(4 * 40.0 * radius * 1e-3, rel=5e-3 * (256 / cells) ** 0.5)
 
 
@@ -55,7 +55,7 @@ def test_rough_contact_is_the_isothermal_one(seed):
     model = HalfSpaceModel(surface, contact_modulus=MODULUS, tolerance=1e-10)
     state = model.solve(2e-2)
     assert 40 < np.count_nonzero(state.in_contact) < 800
-    stiffness = model.interface_stiffness(state)
+    stiffness = state.interface_stiffness()
     expected = potential(state.in_contact, state.spacing)
     assert stiffness / MODULUS == pytest.approx(expected, rel=1e-8)
 
@@ -87,5 +87,5 @@ def test_contacts_that_yield_conduct_as_others():
     step = 1e-8
     back = model.press(Control(approach=8e-3 - step), start=pressed.start).state
     rate = (state.force - back.force) / step
-    assert model.interface_stiffness(state) == pytest.approx(rate, rel=1e-3)
+    assert state.interface_stiffness() == pytest.approx(rate, rel=1e-3)
     assert model.stiffness(state, turns=False).value < 0.9 * rate
