@@ -12,7 +12,7 @@ import pytest
 
 import micro.interaction.hertz_pairs
 from geometry import Asperities, PatchGrid
-from micro import AsperityModel, HalfSpaceModel
+from micro import AsperityModel, HalfSpaceModel, HalfSpaceState
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
