@@ -8,8 +8,9 @@ from geometry.errors import InputError
 from micro import HalfSpaceModel
 from micro.conductance import (
     conductance_per_area,
-    gap_conductance,
+    gas_conductance,
     pair_conductivity,
+    radiation_conductance,
     total_conductance,
 )
 
@@ -71,9 +72,15 @@ def test_conductances_of_two_bodies_are_in_series():
 
 
 def test_air_gap_and_radiation():
-    assert gap_conductance(1e-2, 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
+    assert gas_conductance([1e-2], 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
+    # half of the area in contact; the gas in a wedge: k ln(1 + G/M)/G
+    assert gas_conductance([0.0, 1e-2], 0.026) == pytest.approx(1300.0)
+    assert gas_conductance([0.0, 1e-2], 0.026, 3e-3) == pytest.approx(1000.0)
+    wedge = (np.arange(1000) + 0.5) * 1e-5
+    expected = 26.0 * np.log(1.0 + 10.0 / 0.4) / 1e-2
+    assert gas_conductance(wedge, 0.026, 4e-4) == pytest.approx(expected, rel=1e-4)  # midpoints
     # black faces at 300 K: 4 σ T³ = 6.12 W/m²/K (Incropera, table of radiation coefficients)
-    assert gap_conductance(1.0, 0.0, 300.0, 1.0) == pytest.approx(6.124, rel=1e-3)
+    assert radiation_conductance(300.0, 1.0) == pytest.approx(6.124, rel=1e-3)
 
 
 def test_contacts_that_yield_conduct_as_others():
