@@ -163,7 +163,7 @@ class Response:
     The separation of a patch is the average gap between the plane and the *displaced* surface,
     g_i = z_M − mean height − mean approach + mean displacement. The paper's eq. 9 leaves the
     displacement out. It is the displacement by the model's pressures, to the errors stated in
-    `micro.interaction.patch_sums`, also for the models without interaction.
+    `micro.asperities.patch_sums`, also for the models without interaction.
 
     Args:
         model: Name of the micro model.

@@ -23,7 +23,7 @@ SAME = (
 )
 
 
-@pytest.mark.parametrize("name", [name for name in MODEL_NAMES if name != "auto"])
+@pytest.mark.parametrize("name", MODEL_NAMES)
 @pytest.mark.parametrize("surface", SURFACES)
 def test_a_constant_changes_no_column(name, surface):
     dice, heights = np.random.default_rng(len(surface)), SURFACES[surface]
