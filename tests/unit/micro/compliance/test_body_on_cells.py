@@ -132,7 +132,7 @@ def test_a_box_of_cells_only_grows(seed, monkeypatch):
                 for old, new in zip(before, after, strict=True):
                     assert new.start <= old.start and new.stop >= old.stop
             assert state.gap.min() >= -1.1e-8 * state.interference.max()
-    assert grown > 5
+    assert grown > 2
 
 
 def test_a_stiff_body_lifts_nothing():
