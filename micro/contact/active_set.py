@@ -121,6 +121,8 @@ class ActiveSet:
             self.motion = motions.closing(self._weights(pressure), gap)
         largest = np.max(in_threads(extremes, parts), axis=0)
         self.scale = float(largest[0])
+        if self.scale <= 0.0 and pressure.any():  # clear of all cells, and yet loaded
+            self.scale = float(largest[1])
         self.residual = self.rounding = 0.0
         self._enters = not float(largest[2]) > _CLOSED * float(largest[3])
         if self.scale > 0.0:

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_motions import approach, contact_problem
 
 from geometry import Control, InputError, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
+from micro.contact.active_set import ActiveSet
 
 E_STAR = 4000.0
 SURFACE = synthesise(
@@ -82,3 +84,14 @@ def test_a_sphere_pressed_far_beyond_yield():
 def test_refuses_hardness(hardness):
     with pytest.raises(InputError, match=f"{hardness}: the hardness must be"):
         replace(ELASTIC, hardness=hardness)
+
+
+def test_a_plane_clear_of_all_cells_carries_no_force():
+    """A cell yields far below the plane, which rounding of a pressure on another one holds up."""
+    interference, start, hardness = np.full((8, 8), -1.0), np.zeros((8, 8)), 1e-3
+    interference[1, 1], start[1, 1], start[5, 5] = 0.0, 1e-18, hardness
+    motions = approach((8, 8), hardness)
+    problem = contact_problem(interference, (1.0, 1.0), motions, periodic=True, hardness=hardness)
+    search = ActiveSet(problem, start)
+    assert (interference + search.motion[0]).max() < 0.0
+    assert search.residual > 0.5
