@@ -22,7 +22,7 @@ from collections.abc import Sequence
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from geometry.errors import InputError
 
@@ -75,20 +75,32 @@ def conductance_per_area(stiffness: Number, contact_modulus: float, conductivity
     return 2.0 * conductivity / contact_modulus * stiffness * _MM_PER_M
 
 
-def gap_conductance(
-    separation: Number, conductivity: float = 0.0, temperature: float = 0.0, emissivity: float = 0.0
-) -> Number:
-    """Return the conductance per area of the gas in a gap, and of radiation across it [W/m²/K].
+def gas_conductance(gap: ArrayLike, conductivity: float, temperature_jump: float = 0.0) -> float:
+    """Return the conductance per area of the gas in gaps, the mean of k/(g + M) [W/m²/K].
 
-    The gas conducts as a layer as thick as the mean gap; a mean free path comparable to the gap,
-    and contacts, are left out. Radiation is linearised at a temperature, ε 4 σ T³.
+    Heat passes straight through the gas. Where there is no gap, contacts conduct by themselves.
+    Gaps close as the power 3/2 of the distance from a contact: without a temperature jump the
+    integral has no bound there, and the sum over cells grows with their number.
 
     Args:
-        separation: Mean gap > 0 [mm].
-        conductivity: Of the gas [W/m/K].
-        temperature: Absolute temperature [K].
+        gap: Gaps g of equal parts of the area, of any shape, 0 in contact [mm].
+        conductivity: k of the gas [W/m/K].
+        temperature_jump: Length M that the jumps of temperature at both faces add to the gap, a few
+            mean free paths [mm].
+
+    Source:
+        Yovanovich 2005, doi 10.1109/TCAPT.2005.848483.
+    """
+    gap = np.asarray(gap, float)
+    added = np.divide(1.0, gap + temperature_jump, out=np.zeros(gap.shape), where=gap > 0.0)
+    return _MM_PER_M * conductivity * float(added.mean())
+
+
+def radiation_conductance(temperature: float, emissivity: float) -> float:
+    """Return the conductance per area of radiation across a gap, 4 ε σ T³ [W/m²/K].
+
+    Args:
+        temperature: Absolute temperature of both faces T [K].
         emissivity: Effective emissivity ε of both faces, 1/(1/ε₁ + 1/ε₂ − 1).
     """
-    return (
-        _MM_PER_M * conductivity / separation + 4.0 * emissivity * STEFAN_BOLTZMANN * temperature**3
-    )
+    return 4.0 * emissivity * STEFAN_BOLTZMANN * temperature**3

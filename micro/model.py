@@ -105,16 +105,27 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def stiffness(self, state: Any, *, turns: bool) -> tuple[float, int]:
+    def stiffness(self, state: Any, *, turns: bool) -> Stiffness:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
         Args:
             state: `Pressed.state` of this model.
             turns: Whether the plane turns without moment; otherwise its slopes stay.
-
-        Returns:
-            The stiffness [N/mm], and the iterations.
         """
+
+
+class Stiffness(NamedTuple):
+    """How the force changes with the approach, on the side that the plane came from.
+
+    Attributes:
+        value: The derivative dF/dδ [N/mm]; None where nothing gives it.
+        iterations: Iterations that it took.
+        error: What the value may be off by [N/mm]; 0 from a linear solution.
+    """
+
+    value: float | None
+    iterations: int
+    error: float = 0.0
 
 
 class SolvedContact(Protocol):

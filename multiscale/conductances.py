@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from micro.conductance import (
     conductance_per_area,
-    gap_conductance,
+    gas_conductance,
     pair_conductivity,
+    radiation_conductance,
     total_conductance,
 )
 from multiscale.couplings.contact import ContactCoupling
@@ -23,7 +24,7 @@ from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
-from multiscale.readable import quantity
+from multiscale.readable import Caution, quantity
 from multiscale.scene.conductance_section import ConductanceSection
 from multiscale.setup.problem import ProblemSetup
 
@@ -108,7 +109,7 @@ class Conductances:
             return step
         found: dict[str, Any] = {}
         if self.thermal is not None:
-            gap = self._gap(step)
+            gap = self._gap(step, coupling)
             found["gap_conductance_W_per_K"] = gap
             contacts = total_conductance(stiffness, self.modulus, self.thermal)
             found["thermal_conductance_W_per_K"] = contacts + gap
@@ -117,18 +118,18 @@ class Conductances:
             found["electrical_conductance_S"] = conductance
         return replace(step, **found)
 
-    def _gap(self, step: LoadStep) -> float:
-        """Return the conductance of gas and radiation over the mean gap [W/K]."""
-        section = self.section
-        if section.gas is None and section.emissivity is None:
-            return 0.0
-        per_area = gap_conductance(
-            step.mean_separation_mm,
-            section.gas or 0.0,
-            section.temperature or 0.0,
-            section.emissivity or 0.0,
-        )
-        return per_area * float(self.areas.sum()) / _MM2_PER_M2
+    def _gap(self, step: LoadStep, coupling: Coupling) -> float:
+        """Return the conductance of gas and radiation outside of the contacts [W/K]."""
+        section, found = self.section, 0.0
+        gas, jump, share = section.gas, section.temperature_jump or 0.0, step.contact_area_fraction
+        if gas is not None and isinstance(coupling, ContactCoupling):
+            found = coupling.over_gaps(lambda gap: gas_conductance(gap, gas, jump))
+        elif gas is not None:  # laws know the mean gap: the mean of k/(g + M) is no less
+            open_gap = step.mean_separation_mm / (1.0 - share) if share < 1.0 else 0.0
+            found = (1.0 - share) * gas_conductance(open_gap, gas, jump)
+        if section.temperature is not None and section.emissivity is not None:
+            found += (1.0 - share) * radiation_conductance(section.temperature, section.emissivity)
+        return found * float(self.areas.sum()) / _MM2_PER_M2
 
 
 def conducting(step: LoadStep, coupling: Coupling, setup: ProblemSetup) -> LoadStep:
@@ -160,11 +161,14 @@ def conducts_of(setup: ProblemSetup) -> Conducts | None:
     return None if section is None else Conductances.of(setup, section).per_area
 
 
-def conductance_notes(steps: Sequence[LoadStep], *, with_laws: bool) -> Iterator[str]:
+def conductance_notes(
+    steps: Sequence[LoadStep], section: ConductanceSection, *, with_laws: bool
+) -> Iterator[str]:
     """Yield what a report says of conductances.
 
     Args:
         steps: The load steps.
+        section: What the scene asks for.
         with_laws: Whether patch laws stand for the contacts.
     """
     known = [
@@ -191,3 +195,16 @@ def conductance_notes(steps: Sequence[LoadStep], *, with_laws: bool) -> Iterator
         "follows exactly from the stiffness (Barber 2003); finite bodies and oxide films are left "
         "out"
     )
+    if section.gas is None or not step.contact_area_fraction:
+        return
+    if with_laws:
+        yield (
+            "gas in the gaps: laws know the mean gap, and a layer as thick as that is the least "
+            "that the gas conducts (coupling.kind = 'concurrent' integrates over the gaps)"
+        )
+    elif not section.temperature_jump:
+        yield Caution(
+            "warning: gaps close towards contacts, where the gas conducts without bound as no "
+            "conductance.temperature_jump is stated: its conductance depends on the grid (air at "
+            "1 bar: about 0.4 um)"
+        )

@@ -53,9 +53,13 @@ class ContactRecorder:
             self._latest = coupling, coupling.latest, step.step
         if not isinstance(coupling, HasStiffness):
             return step
-        found, spent = coupling.stiffness()
-        iterations = step.linear_iterations + spent
-        return replace(step, stiffness_N_per_mm=found, linear_iterations=iterations)
+        found = coupling.stiffness()
+        return replace(
+            step,
+            stiffness_N_per_mm=found.value,
+            stiffness_error_N_per_mm=None if found.value is None else found.error,
+            linear_iterations=step.linear_iterations + found.iterations,
+        )
 
     def record(
         self, step: LoadStep, make_model: Callable[[], MicroModel], *, last: bool

@@ -31,7 +31,7 @@ from geometry.errors import InputError
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import percent, quantity
+from multiscale.readable import Caution, percent, quantity
 from multiscale.setup.problem import ProblemSetup
 
 _FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
@@ -203,7 +203,8 @@ class _Problems:
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
         grid = self._others if min(self._others) >= _FEWEST_CELLS else self._grid
-        return self._model(grid, 0).stiffness(self._state(grid, 0), turns=False)[0]
+        found = self._model(grid, 0).stiffness(self._state(grid, 0), turns=False).value
+        return math.nan if found is None else found
 
     def _force(self, grid: tuple[int, int], order: int) -> float:
         return self._state(grid, order).force

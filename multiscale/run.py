@@ -39,8 +39,6 @@ _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
     "load steps before"
 )
-_BACK = 1.0 - 1e-6
-"""Share of the largest approach so far below which a load step counts as unloaded."""
 
 
 class Run:
@@ -77,7 +75,6 @@ class Run:
         self.table: LawTable | None = None
         self.coupling: Coupling | None = None
         self._start: Arrays = {}
-        self._deepest = 0.0  # approach so far
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
         assembly.load_finite_elements(scene, comm)
@@ -147,7 +144,6 @@ class Run:
 
                         step = conducting(step, coupling, self.setup)
                 self.steps.append(self._checked(step))
-                self._deepest = max(self._deepest, step.approach_mm)
                 self.make_contact(last=self.finished)
                 yield self.steps[-1]
 
@@ -179,7 +175,7 @@ class Run:
         """Return a load step with its errors, where they are to be measured."""
         check = self.scene.output.check
         wanted = check == "all" or (check == "last" and self.finished)
-        if wanted and self._has_unloaded(step):
+        if wanted and self._has_unloaded():
             if _AFTER_UNLOADING not in self._notes:
                 self._notes.append(_AFTER_UNLOADING)
             return step
@@ -192,9 +188,10 @@ class Run:
                 self._notes.append(f"errors of load step {step.step} not measured: {error}")
                 return step
 
-    def _has_unloaded(self, step: LoadStep) -> bool:
-        """Tell whether the plastic depth at a load step is not that of rising loads."""
-        return self.scene.micro.hardness is not None and step.approach_mm < _BACK * self._deepest
+    def _has_unloaded(self) -> bool:
+        """Tell whether the plastic depth at the last load step is not that of rising loads."""
+        history = self.scene.loading.load_history
+        return self.scene.micro.hardness is not None and self.position.is_below_past(history)
 
     @property
     def times(self) -> dict[str, float]:
@@ -238,7 +235,6 @@ class Run:
             contacts: What `contacts` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
-        self._deepest = max((step.approach_mm for step in steps), default=0.0)
         self._recorder.resume(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
         if laws:
@@ -275,7 +271,9 @@ class Run:
         if self.scene.conductance is not None:
             from multiscale.conductances import conductance_notes  # other scenes do without
 
-            notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
+            notes += conductance_notes(
+                self.steps, self.scene.conductance, with_laws=self.setup.uses_laws
+            )
         by_force = self.scene.loading.load_history.quantity == "force"
         accuracy = verdict(steps, self.given.accuracy, unmeasured(self.setup), by_force=by_force)
         kept = [] if accuracy is None else [accuracy.sentence]

@@ -23,7 +23,7 @@ from micro.asperities.patch_sums import EllipticContacts, patch_displacements, p
 from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
 from micro.contact_detail import ContactDetail
-from micro.model import Pressed, Response, checked_approaches, checked_patches
+from micro.model import Pressed, Response, Stiffness, checked_approaches, checked_patches
 
 Array = NDArray[np.float64]
 
@@ -207,10 +207,10 @@ class AsperityModel:
         response = Response.of(rows, self.name, self.contact_modulus, patches)
         return Pressed(response, state.plane, state.start, state)
 
-    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
+    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
         indentation = state.start.solution.indentation
-        return normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1
+        return Stiffness(normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1)
 
     def _row(self, state: ContactState, patches: Partition, mean_heights: Array) -> dict[str, Any]:
         """Return the fields of a response for one plane.

@@ -8,14 +8,15 @@ all patches counts for the nearest.
 
 By reciprocity the mean displacement of patch i by a contact is the contact's force times the mean
 of L_i over its pressure, divided by π E* A_i, with L_i the Love integral of the patch. That mean
-is taken with a cubature for the semi-ellipsoidal pressure: 2 radii by 7 angles, exact to degree 6.
-L_i is smooth except on the patch's border, where its slope is logarithmic.
+is taken with a cubature for the semi-ellipsoidal pressure: 4 radii by 16 angles, exact to degree 8.
+Its points have the symmetries of a square, and follow the ellipse without a jump where it becomes a
+circle, whose axes have no direction. L_i is smooth except on the patch's border, where its slope is
+logarithmic.
 
-So a contact of radius a that lies across a border of a patch of side s misplaces up to 0.015 a/s of
-that patch's displacement between the two sides (0.035 a/s where it is larger than the patch; a
-point force 0.17). The mean over all patches is good to 1e-9 for contacts away from the outer
-border. For one that touches that border from inside it is good to 4e-4 a/s, s now the side of the
-whole; for one that reaches across it to 0.02 a/s.
+So a contact of radius a that lies across a border of a patch of side s misplaces up to 0.005 a/s of
+that patch's displacement between the two sides (a point force 0.17). The mean over all patches is
+good to 1e-9 for contacts away from the outer border, and to 0.005 a/s, s now the side of the whole,
+for one that reaches across it.
 
 Theory: demos/theory.md, section 8.
 """
@@ -35,8 +36,8 @@ from micro.closed_forms.love import corner_integral
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-_RADII, _RADIUS_WEIGHTS = roots_jacobi(2, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
-_ANGLES = 7
+_RADII, _RADIUS_WEIGHTS = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
+_ANGLES = 16
 _CORNERS_AT_ONCE = 2**20
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _PAIRS_AT_ONCE = 4096
@@ -228,14 +229,16 @@ def patch_displacements(
 
 
 def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
-    """Return points, shape (14 m, 2), and the 14 weights of every contact's mean."""
-    semi_axes, angle = contacts.semi_axes, contacts.angle
+    """Return points, shape (64 m, 2), and the 64 weights of every contact's mean."""
     radius = np.sqrt(0.5 * (1.0 + _RADII))[:, None]
-    around = 2.0 * np.pi / _ANGLES * (np.arange(_ANGLES) + np.array([[0.0], [0.5]]))
-    u = (radius * np.cos(around)).ravel() * semi_axes[:, :1]
-    v = (radius * np.sin(around)).ravel() * semi_axes[:, 1:]
-    cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
-    x = contacts.x[:, None] + cos * u - sin * v
-    y = contacts.y[:, None] + sin * u + cos * v
+    around = 2.0 * np.pi / _ANGLES * (np.arange(_ANGLES) + 0.5)
+    u, v = (radius * np.cos(around)).ravel(), (radius * np.sin(around)).ravel()
+    # the symmetric matrix that turns the unit circle into the ellipse
+    cos, sin = np.cos(contacts.angle), np.sin(contacts.angle)
+    major, minor = contacts.semi_axes.T
+    xx, yy = cos**2 * major + sin**2 * minor, sin**2 * major + cos**2 * minor
+    xy = cos * sin * (major - minor)
+    x = contacts.x[:, None] + np.outer(xx, u) + np.outer(xy, v)
+    y = contacts.y[:, None] + np.outer(xy, u) + np.outer(yy, v)
     weight = np.repeat(_RADIUS_WEIGHTS / (_RADIUS_WEIGHTS.sum() * _ANGLES), _ANGLES)
     return np.stack([x.ravel(), y.ravel()], axis=1), weight

@@ -199,7 +199,13 @@ class FiniteSlopes:
 
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
-        return FiniteSlopes(self._surface, self.material, order=self.order, periodic=self._periodic)
+        return FiniteSlopes(
+            self._surface,
+            self.material,
+            order=self.order,
+            periodic=self._periodic,
+            grid=self.grid,
+        )
 
     def _second(self, loaded: Array, stresses: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses in it.

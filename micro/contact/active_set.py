@@ -111,8 +111,8 @@ class ActiveSet:
             carrying = p > 0.0
             closed = np.where(carrying, here, 0.0)
             apart, open_gaps = float(closed.max()), here - closed
-            if problem.upper < np.inf:
-                closed[p >= problem.upper] = 0.0  # yielding cells may overlap
+            if problem.hardness < np.inf:
+                closed[problem.yielding(p)] = 0.0  # yielding cells may overlap
             inside = max(apart, -float(closed.min()))
             return float(nearer.max()), float(np.abs(nearer).max()), inside, -float(open_gaps.min())
 
@@ -121,6 +121,8 @@ class ActiveSet:
             self.motion = motions.closing(self._weights(pressure), gap)
         largest = np.max(in_threads(extremes, parts), axis=0)
         self.scale = float(largest[0])
+        if self.scale <= 0.0 and pressure.any():  # clear of all cells, and yet loaded
+            self.scale = float(largest[1])
         self.residual = self.rounding = 0.0
         self._enters = not float(largest[2]) > _CLOSED * float(largest[3])
         if self.scale > 0.0:
@@ -130,9 +132,10 @@ class ActiveSet:
 
     def _weights(self, pressure: Array) -> Array:
         """Return weights of the cells whose gaps give the motions; yielding cells may overlap."""
-        weights, upper = pressure, self.problem.upper
-        if upper < np.inf and (pressure < upper).any(where=pressure > 0.0):
-            weights = np.where(pressure < upper, pressure, 0.0)
+        weights = pressure
+        if self.problem.hardness < np.inf:
+            elastic = np.where(self.problem.yielding(pressure), 0.0, pressure)
+            weights = elastic if elastic.any() else pressure
         if self._constrained.size:
             weights = weights.copy()
             weights.ravel()[self._constrained] += _CONSTRAINED_WEIGHT * float(pressure.max())
@@ -178,7 +181,7 @@ class ActiveSet:
         for halving in range(_MOST_HALVINGS):
             moved = old.copy()
             part = old.ravel()[cells] + 0.5**halving * change
-            moved.ravel()[cells] = np.clip(part, 0.0, self.problem.upper)
+            moved.ravel()[cells] = np.clip(part, 0.0, self.problem.hardness)
             admissible = self.problem.admissible(moved, self._yielding)
             if admissible is None:
                 continue
@@ -196,34 +199,34 @@ class ActiveSet:
         stay at a bound without a gap determine the tilt of a body that lies on two contacts in line
         with its middle.
         """
-        cells, old, upper = self._carrying(), self.pressure, self.problem.upper
+        cells, old, hardness = self._carrying(), self.pressure, self.problem.hardness
         new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            bound = (pressure <= 0.0) | (pressure >= upper)
+            bound = (pressure <= 0.0) | self.problem.yielding(pressure)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
             first, part = self.problem.first_at_bounds(pressure, change)
             if part > 0.0:
-                pressure = np.clip(pressure + part * change, 0.0, upper)
+                pressure = np.clip(pressure + part * change, 0.0, hardness)
                 displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
-            new.ravel()[cells[first]] = np.where(change[first] > 0.0, upper, 0.0)
+            new.ravel()[cells[first]] = np.where(change[first] > 0.0, hardness, 0.0)
             left = np.ones(len(cells), bool)
             left[first] = False
             cells, pressure, gap = cells[left], pressure[left], gap[left]
         new.ravel()[cells] = pressure
-        self._constrained = cells[(pressure <= 0.0) | (pressure >= upper)]
+        self._constrained = cells[(pressure <= 0.0) | self.problem.yielding(pressure)]
         found = self.problem.admissible(new, self._yielding)
         self._accept(old if found is None else found)
 
     def _carrying(self) -> Indices:
         """Return the cells that carry between the bounds, and as many with the worst gaps."""
         touching = self._touching()
-        carry = touching & (self.pressure > 0.0) & (self.pressure < self.problem.upper)
+        carry = touching & (self.pressure > 0.0) & ~self.problem.yielding(self.pressure)
         carry.ravel()[self._constrained] = True
         entering = np.flatnonzero(touching & ~carry)
         worst = np.argsort(-np.abs(self.gap.ravel()[entering]), kind="stable")
@@ -233,8 +236,8 @@ class ActiveSet:
     def _touching(self) -> Flags:
         """Return the cells to find pressures of; those that yield are not among them."""
         touching = (self.pressure > 0.0) | (self.gap < 0.0)
-        if self.problem.upper < np.inf:
-            self._yielding = (self.pressure >= self.problem.upper) & (self.gap <= 0.0)
+        if self.problem.hardness < np.inf:
+            self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
             touching &= ~self._yielding
         touching.ravel()[self._constrained] = True
         return touching

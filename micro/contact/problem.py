@@ -63,7 +63,8 @@ class ContactProblem:
             are apart, shape (nx, ny) [mm].
         motions: Free rigid motions of the body, if there are any, with their loads.
         tolerance: Largest residual of a solution.
-        upper: Upper bound H of the pressures / E*.
+        hardness: Largest pressure H / E*; infinite where contacts are elastic. Pressures of a
+            solution that are at the bound equal it exactly.
         corner: Corner of the first cell on the surface [mm].
         coarse: Whether these are no cells of the surface but coarser ones, where free sides are
             left out.
@@ -74,7 +75,7 @@ class ContactProblem:
     interference: Array
     motions: Motions
     tolerance: float
-    upper: float = np.inf
+    hardness: float = np.inf
     corner: tuple[float, float] = (0.0, 0.0)
     coarse: bool = False
 
@@ -88,6 +89,10 @@ class ContactProblem:
     def unloaded(self) -> bool:
         """Whether no free motion has a load: the approach is prescribed and the tilt is free."""
         return self.motions.turns and not self.motions.loads.any()
+
+    def yielding(self, pressure: Array) -> Flags:
+        """Return which pressures / E*, within the bounds, are the hardness."""
+        return np.asarray(pressure >= self.hardness)
 
     def on(self, box: Box) -> ContactProblem:
         """Return the problem of a box of these cells, those of a surface, which carries all loads.
@@ -127,11 +132,11 @@ class ContactProblem:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.motions.count:
-            return np.minimum(pressure, self.upper, out=pressure)
+            return np.minimum(pressure, self.hardness, out=pressure)
         found = None
         if fixed is not None:
-            found = self.motions.scaled_to_loads(pressure, self.upper, fixed)
-        return self.motions.scaled_to_loads(pressure, self.upper) if found is None else found
+            found = self.motions.scaled_to_loads(pressure, self.hardness, fixed)
+        return self.motions.scaled_to_loads(pressure, self.hardness) if found is None else found
 
     def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
         """Return the cells that meet their bounds first along a change, and its share up to there.
@@ -143,7 +148,7 @@ class ContactProblem:
             pressure: Pressures / E* of some cells, within the bounds, shape (n,).
             change: Their change, shape (n,).
         """
-        distance = np.where(change < 0.0, pressure, self.upper - pressure)
+        distance = np.where(change < 0.0, pressure, self.hardness - pressure)
         size = np.abs(change)
         stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
         if stuck.size:

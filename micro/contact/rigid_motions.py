@@ -32,7 +32,7 @@ _LONGEST = 1.5
 _FARTHEST = 60.0
 """Largest exponent; loads that need more cannot be met by pressures on these cells."""
 _AT_BOUND = 1e-13
-"""Pressures below the upper bound by no more than this share of it count as lying on it."""
+"""Pressures below the hardness by no more than this share of it count as lying on it."""
 _DECREASE = 0.9
 """Slope along a step, relative to that before it, that a step may have where it went beyond the
 lowest point of the convex function."""
@@ -123,21 +123,21 @@ class Motions:
         )
 
     def scaled_to_loads(
-        self, pressure: Array, upper: float = np.inf, fixed: Flags | None = None
+        self, pressure: Array, hardness: float = np.inf, fixed: Flags | None = None
     ) -> Array | None:
-        """Return pressures p exp(Σ μ_i ℓ_i), at most the upper bound, that meet the loads.
+        """Return pressures p exp(Σ μ_i ℓ_i), at most the hardness, that meet the loads.
 
         The multipliers μ minimise a convex function, which Newton's method does.
 
         Args:
             pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten by the result.
-            upper: Upper bound / E*.
+            hardness: Largest pressure / E*.
             fixed: Cells whose pressures stay as they are, shape (nx, ny).
 
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if not self.turns and upper == np.inf:
+        if not self.turns and hardness == np.inf:
             total = float(pressure.sum())
             if total > 0.0:
                 pressure *= self.loads[0] / total
@@ -151,8 +151,8 @@ class Motions:
         if not cells.size and loads.any():
             return None
         longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
-        start = np.minimum(pressure.ravel()[cells], upper)
-        values = _Scaled(start, self.levers_of(cells), loads, upper).solution(longest, acting)
+        start = np.minimum(pressure.ravel()[cells], hardness)
+        values = _Scaled(start, self.levers_of(cells), loads, hardness).solution(longest, acting)
         if values is None:
             return None
         found = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
@@ -161,7 +161,7 @@ class Motions:
 
 
 class _Scaled(NamedTuple):
-    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), upper) that meet loads f.
+    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), H) that meet loads f.
 
     They minimise Σ ψ_i − f · μ, where ψ_i is the integral of p_i in μ · ℓ_i.
     """
@@ -169,7 +169,7 @@ class _Scaled(NamedTuple):
     start: Array
     levers: Array
     loads: Array
-    upper: float
+    hardness: float
 
     def solution(self, longest: Array, acting: float) -> Array | None:
         """Return the pressures; None where there are none.
@@ -186,7 +186,7 @@ class _Scaled(NamedTuple):
             if error <= _ROUNDING:
                 return values
             # cells at the bound do not resist, unless they are to leave it
-            found = self._step(exponents, off, np.where(values < self.upper, values, 0.0))
+            found = self._step(exponents, off, np.where(values < self.hardness, values, 0.0))
             found = self._step(exponents, off, values) if found is None else found
             if found is None or np.abs(found).max() > _FARTHEST:
                 break
@@ -196,7 +196,7 @@ class _Scaled(NamedTuple):
     def at(self, exponents: Array) -> Array:
         """Return the pressures for multipliers μ."""
         found = self.start * np.exp(exponents @ self.levers)
-        return np.where(found < (1.0 - _AT_BOUND) * self.upper, found, self.upper)
+        return np.where(found < (1.0 - _AT_BOUND) * self.hardness, found, self.hardness)
 
     def _step(self, exponents: Array, off: Array, weights: Array) -> Array | None:
         """Return the multipliers after a Newton step, shortened where it goes too far."""

@@ -99,7 +99,7 @@ def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> Co
         touching = found.pressure > 0.0
         if not touching.any():
             if not displaced.any():
-                return found
+                return found._replace(iterations=iterations)
             # slopes of a far larger load part the bodies: begin without them
             mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
             continue

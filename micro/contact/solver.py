@@ -62,7 +62,7 @@ def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) 
     """Solve with a free approach; the box follows from an estimate of it."""
     interference = problem.interference
     top = float(interference.max())  # the approach that counts is that from first touch of a cell
-    first, most = None, np.inf
+    first, most, used = None, np.inf, 0
     if start is not None and start.pressure.any():
         first, most = start.pressure, _MARGIN * (float(start.motion[0]) + top)
     elif not problem.compliance.periodic:
@@ -74,16 +74,16 @@ def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) 
     while True:
         box = _box(problem, min(top - most, np.nextafter(top, -np.inf)))
         found = _solve_growing(problem, box, first)
-        approach = float(found.motion[0]) + top
+        approach, used = float(found.motion[0]) + top, used + found.iterations
         if approach <= most or box == _whole(interference):
-            return found
+            return found._replace(iterations=used)
         first, most = found.pressure, _MARGIN * approach
 
 
 def _box(problem: ContactProblem, least: float) -> Box:
     """Return the box that a body can touch on a half-space: the cells of more interference."""
     interference = problem.interference
-    if problem.compliance.periodic or least == -np.inf or not np.isfinite(interference).all():
+    if problem.compliance.periodic:
         return _whole(interference)
     return box_around(interference > least)
 
@@ -93,10 +93,11 @@ def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> Co
     found = _solve_on(problem, box, start)
     while problem.compliance.body is not None and box != _whole(problem.interference):
         nearer = problem.interference + problem.motions.displacement(found.motion)
-        lifted = _lifted(problem, box, nearer, found.pressure)
-        if not lifted.any():
+        larger = _lifted(problem, box, nearer, found.pressure)
+        if not larger.any():
             break
-        box = box_around((found.pressure > 0.0) | (nearer > 0.0) | lifted)
+        larger[box] = True  # what touched once may touch again
+        box = box_around(larger)
         again = _solve_on(problem, box, found.pressure)
         found = again._replace(iterations=found.iterations + again.iterations)
     return found

@@ -66,7 +66,7 @@ def _unloaded_start(problem: ContactProblem, pressure: Array) -> tuple[Array, Ar
         found = clear.support
     twice_elastic = float(np.vdot(found, problem.grid.displacement(found)))
     factor = float(np.vdot(found, problem.interference)) / twice_elastic  # of the least energy
-    found = found * min(factor, problem.upper / float(found.max()))
+    found = found * min(factor, problem.hardness / float(found.max()))
     balanced = problem.admissible(found)
     return found if balanced is None else balanced, np.zeros(problem.motions.count)
 

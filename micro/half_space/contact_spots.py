@@ -60,13 +60,21 @@ class Contacts:
         return np.bincount(owner, minlength=patches.count)
 
 
-def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bool) -> Contacts:
+def find_contacts(
+    pressure: Array,
+    spacing: tuple[float, float],
+    *,
+    periodic: bool,
+    hardness: float | None = None,
+) -> Contacts:
     """Find the connected contacts of a map of pressures.
 
     Args:
         pressure: Pressures ≥ 0, shape (nx, ny) [MPa].
         spacing: Sides of a cell [mm].
         periodic: Whether contacts continue over the borders.
+        hardness: Largest pressure that contacts can bear [MPa]; none when not given. The load of a
+            cell needs p/H of its area at least, so that cells that yield are in contact whole.
     """
     labels, count = ndimage.label(pressure > 0.0)
     if periodic and count:
@@ -76,6 +84,8 @@ def find_contacts(pressure: Array, spacing: tuple[float, float], *, periodic: bo
     which, load = owner[cells] - 1, pressure.ravel()[cells]
     cell = np.float64(spacing[0] * spacing[1])
     share = true_area(pressure > 0.0, periodic=periodic)
+    if hardness is not None:
+        np.maximum(share, pressure / hardness, out=share)
     top = cells[peaks_of(which, load, count)]
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     return Contacts(

@@ -20,7 +20,14 @@ from micro.compliance.free_sides import FreeSides
 from micro.compliance.grid_compliance import Compliance
 from micro.compliance.slopes_of_bodies import SlopeTerm
 from micro.half_space.plane_contact import LEVEL, HalfSpaceState, PlaneContact
-from micro.model import Pressed, Response, checked_approaches, checked_patches, whole_patch
+from micro.model import (
+    Pressed,
+    Response,
+    Stiffness,
+    checked_approaches,
+    checked_patches,
+    whole_patch,
+)
 
 Array = NDArray[np.float64]
 
@@ -48,14 +55,14 @@ class HalfSpaceModel:
         body: What a finite body adds to the half-space and its sides; a half-space when not given.
         slopes: What the finite slopes of the surface add; the theory of small slopes when not
             given.
-        upper: Upper bound of the pressures, the hardness of the softer body [MPa]; none when not
-            given. Where cells bear it, what overlap is left is plastic depth: `press` starts from
-            the depth of its start, all else from the surface as it is.
+        hardness: Hardness of the softer body, the largest pressure [MPa]; contacts are elastic
+            when not given. Where cells bear it, what overlap is left is plastic depth: `press`
+            starts from the depth of its start, all else from the surface as it is.
 
     Raises:
-        InputError: When the modulus, the tolerance or the bound is not positive, a periodic model
-            has a surface that is not periodic or has free sides, the free sides are not those of
-            the surface, or this is steeper than any.
+        InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
+            surface that is not periodic or has free sides, the free sides are not those of the
+            surface, or this is steeper than any.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -70,7 +77,7 @@ class HalfSpaceModel:
     sides: FreeSides | None = None
     body: BodyModes | None = None
     slopes: SlopeTerm | None = None
-    upper: float = np.inf
+    hardness: float | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -78,9 +85,8 @@ class HalfSpaceModel:
             if not (np.isfinite(value) and value > 0.0):
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
-        if not self.upper > 0.0:
-            problem = "the upper bound of the pressures must be positive"
-            raise InputError(problem, value=self.upper, allowed="> 0")
+        if self.hardness is not None and not self.hardness > 0.0:
+            raise InputError("the hardness must be positive", value=self.hardness, allowed="> 0")
         if self.highest is None:  # otherwise it is part of a surface, or one resampled
             check_slopes(self.surface)
         source, lengths, sides = self.surface.source, self.surface.lengths, self.sides
@@ -246,13 +252,9 @@ class HalfSpaceModel:
         """Return what `press` starts from, without the plastic depth that loads before left."""
         return start and start[:2]
 
-    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> tuple[float, int]:
-        """Return dF/dδ of a solution with one more linear one; see `MicroModel.stiffness`."""
-        return self._contact.stiffness(state, turns=turns)
-
-    def interface_stiffness(self, state: HalfSpaceState) -> float:
-        """Return dF/dδ of a solution's contacts on half-spaces alone, for conductances [N/mm]."""
-        return self._contact.interface_stiffness(state)
+    def stiffness(self, state: HalfSpaceState, *, turns: bool) -> Stiffness:
+        """Return dF/dδ of a solution; see `MicroModel.stiffness` and `HalfSpaceState.stiffness`."""
+        return state.stiffness(turns=turns)
 
     @cached_property
     def _contact(self) -> PlaneContact:
@@ -267,5 +269,5 @@ class HalfSpaceModel:
                 slopes=self.slopes,
             ),
             tolerance=self.tolerance,
-            upper=self.upper,
+            hardness=self.hardness,
         )

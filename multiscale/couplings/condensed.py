@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry import Control, NotConverged, PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED
 from geometry.rigid_plane import normal_stiffness, plane_failure
+from micro.model import Stiffness
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.interpolation import LawPoint
@@ -73,12 +74,13 @@ class CondensedCoupling:
             newton_iterations=state.iterations,
         )
 
-    def stiffness(self) -> tuple[float | None, int]:
-        """Return dF/dδ at the latest load step, and its linear solutions; see `HasStiffness`."""
+    def stiffness(self) -> Stiffness:
+        """Return dF/dδ at the latest load step; see `HasStiffness`."""
         if self._last is None:
-            return None, 0
+            return Stiffness(None, 0)
         problem = LoadedPatches(self._laws, self._compliance, self._table.grid, self._control)
-        return normal_stiffness(problem.stiffness(self._last), turns=self._control.tilt is None), 1
+        turns = self._control.tilt is None
+        return Stiffness(normal_stiffness(problem.stiffness(self._last), turns=turns), 1)
 
     def state(self) -> Arrays:
         """Return the latest equilibrium; see `Restorable`."""

@@ -23,7 +23,7 @@ from micro import (
     SlopesOfBodies,
 )
 from micro.contact_detail import ContactDetail
-from micro.model import SolvedContact
+from micro.model import SolvedContact, Stiffness
 from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -147,8 +147,8 @@ class ContactCoupling:
 
         return on_root(self._comm, pressures)
 
-    def stiffness(self) -> tuple[float, int]:
-        """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
+    def stiffness(self) -> Stiffness:
+        """Return dF/dδ at the latest load step; see `HasStiffness`."""
         return on_root_alone(
             self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
         )
@@ -162,15 +162,31 @@ class ContactCoupling:
         Note:
             Collective.
         """
+        return on_root_alone(self._comm, lambda: self._solved_cells().interface_stiffness())
+
+    def over_gaps(self, function: Callable[[Array], float]) -> float:
+        """Return a function of the gaps at the latest load step, on every rank.
+
+        Args:
+            function: Of the gaps of all cells, 0 in contact, shape (nx, ny) [mm].
+
+        Raises:
+            InputError: When the micro model has no cells.
+
+        Note:
+            Collective.
+        """
 
         def found() -> float:
-            if not (
-                isinstance(self._model, HalfSpaceModel) and isinstance(self.latest, HalfSpaceState)
-            ):
-                raise InputError("contacts without cells have no conductance")
-            return self._model.interface_stiffness(self.latest)
+            state = self._solved_cells()
+            return function(np.where(state.in_contact, 0.0, np.maximum(state.gap, 0.0)))
 
         return on_root_alone(self._comm, found)
+
+    def _solved_cells(self) -> HalfSpaceState:
+        if not isinstance(self.latest, HalfSpaceState):
+            raise InputError("contacts without cells have no conductance")
+        return self.latest
 
     def detail(self, latest: Any) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid, RigidPlane
+from micro.model import Stiffness
 from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
@@ -236,12 +237,12 @@ class FreePlaneCoupling:
             newton_iterations=evaluations,
         )
 
-    def stiffness(self) -> tuple[float | None, int]:
+    def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step, from the laws alone; see `HasStiffness`."""
         if self._approach is None:
-            return None, 0
+            return Stiffness(None, 0)
         rates = self._along(self._approach).dpressure
-        return self._table.grid.area * float(rates.sum()), 0
+        return Stiffness(self._table.grid.area * float(rates.sum()), 0)
 
     def _force(self, approach: float) -> float:
         return self._table.grid.area * float(self._along(approach).pressure.sum())

@@ -51,7 +51,8 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
         Collective.
     """
     pressure, closure = largest_loads(setup, comm)
-    pressure = min(pressure, _YIELDED * setup.scene.micro.upper)
+    if setup.scene.micro.hardness is not None:
+        pressure = min(pressure, _YIELDED * setup.scene.micro.hardness)
     models = {
         id(one): _model(setup, region, one) for region in setup.samples for one in region.surfaces
     }
@@ -71,12 +72,8 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
 def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
     """Return the periodic model of a sample, with the slopes of its body where they count."""
     pair = region.materials
-    model = HalfSpaceModel(
-        sample,
-        contact_modulus=pair.contact_modulus,
-        periodic=True,
-        upper=setup.scene.micro.upper,
-    )
+    assert isinstance(setup.model, HalfSpaceModel)
+    model = replace(setup.model, surface=sample, contact_modulus=pair.contact_modulus)
     if not setup.finite_slopes:
         return model
     return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))

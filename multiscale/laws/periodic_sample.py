@@ -64,7 +64,7 @@ class PeriodicSample:
     @property
     def yields(self) -> bool:
         """Whether its pressures are bounded by a hardness; then no load closes all gaps."""
-        return self.model.upper < np.inf
+        return self.model.hardness is not None
 
     def full_contact_pressure(self) -> float:
         """Return the mean pressure that just closes the sample [MPa].
@@ -89,7 +89,7 @@ class PeriodicSample:
         Args:
             pressure: The mean pressure [MPa].
         """
-        if pressure >= self.model.upper:
+        if self.model.hardness is not None and pressure >= self.model.hardness:
             return 0.0
         state = self.model.solve_force(pressure * self.area)
         if not self.yields and state.pressure.min() > 0.0:  # what is left is rounding

@@ -33,10 +33,11 @@ _NO_MOMENT = 1e-6
 def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     """Return a load step with the work of the plane since the start.
 
-    Up to the first load step it is 3/5 F²/k, as of a force that grows by Hertz' law to the force F
-    and stiffness k, wherever the plane first touched. Between load steps it is that of the
-    trapezoidal rule, with its end correction where the stiffness is known and the slopes stay or
-    have no moment.
+    Up to the first load step it is the energy that is stored by then, elastic and plastic. Between
+    load steps it is that of the trapezoidal rule, with its end correction where the stiffness is
+    known and the slopes stay or have no moment. Where nothing yields anew after cells have yielded,
+    the load may have turned back at the step before, whose stiffness is then that of the other
+    side: instead, the forces are a parabola with the stiffness of this step.
 
     Args:
         step: A load step.
@@ -44,22 +45,19 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     """
     if step.elastic_energy_mJ is None:
         return step
-    stiffness = step.stiffness_N_per_mm
     if before is None:
-        return replace(step, work_mJ=_first_work(step, stiffness))
+        stored = step.elastic_energy_mJ + (step.plastic_work_mJ or 0.0)
+        return replace(step, work_mJ=stored)
     motion, load, ahead = _motion(step) - _motion(before), _load(before), _load(step)
     work = 0.5 * float((load + ahead) @ motion)
     turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
-    earlier = before.stiffness_N_per_mm
+    stiffness, earlier = step.stiffness_N_per_mm, before.stiffness_N_per_mm
     if earlier is not None and stiffness is not None and turning <= _NO_MOMENT * abs(work):
-        work += motion[0] ** 2 * (earlier - stiffness) / 12.0
+        bent = 0.5 * motion[0] * (earlier - stiffness)
+        if before.plastic_work_mJ and not step.stiffness_error_N_per_mm:
+            bent = ahead[0] - load[0] - motion[0] * stiffness
+        work += motion[0] * bent / 6.0
     return replace(step, work_mJ=(before.work_mJ or 0.0) + work)
-
-
-def _first_work(step: LoadStep, stiffness: float | None) -> float:
-    if stiffness:
-        return 0.6 * step.force_N**2 / stiffness
-    return 0.5 * float(_load(step) @ _motion(step)) if step.force_N else 0.0
 
 
 def missing_energy(steps: Sequence[LoadStep]) -> float:

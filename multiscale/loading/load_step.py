@@ -65,8 +65,10 @@ class LoadStep:
             it was not measured.
         peak_pressure_MPa: Largest contact pressure [MPa]; None where it is not known.
         stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
-            approach, under fixed slopes or, where the plane turns, without moment [N/mm]; None
-            where it was not found.
+            approach, under fixed slopes or, where the plane turns, without moment, on the side
+            that the plane came from [N/mm]; None where it was not found.
+        stiffness_error_N_per_mm: What the stiffness may be off by where cells yield anew; 0 where a
+            linear solution gives it [N/mm].
         elastic_energy_mJ: Energy of the elastic deformation of all bodies; None where it is not
             known [mJ].
         plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
@@ -107,6 +109,7 @@ class LoadStep:
     approach_error_mm: float | None = None
     peak_pressure_MPa: float | None = None
     stiffness_N_per_mm: float | None = None
+    stiffness_error_N_per_mm: float | None = None
     elastic_energy_mJ: float | None = None
     plastic_work_mJ: float | None = None
     work_mJ: float | None = None
@@ -189,7 +192,8 @@ class LoadStep:
             stiffness_MPa_per_mm=None if rates is None else ratio * rates,
         )
         names = (
-            *("force_error_N", "peak_pressure_MPa", "stiffness_N_per_mm"),
+            *("force_error_N", "peak_pressure_MPa"),
+            *("stiffness_N_per_mm", "stiffness_error_N_per_mm"),
             *("elastic_energy_mJ", "plastic_work_mJ", "work_mJ"),
         )
         known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}

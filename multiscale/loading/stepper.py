@@ -12,6 +12,7 @@ import numpy as np
 
 from geometry import Control, NotConverged
 from micro.contact_detail import ContactDetail
+from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage import Arrays
 
@@ -63,13 +64,10 @@ class Restorable(Protocol):
 class HasStiffness(Protocol):
     """A coupling that knows the derivative of the force at its latest load step."""
 
-    def stiffness(self) -> tuple[float | None, int]:
-        """Return the interfacial stiffness dF/dδ, and the linear iterations that it took.
+    def stiffness(self) -> Stiffness:
+        """Return the interfacial stiffness dF/dδ.
 
         The slopes of the plane stay or, where it turns, its moments stay zero.
-
-        Returns:
-            The stiffness [N/mm]; None before the first load step.
 
         Note:
             Collective.
@@ -195,6 +193,12 @@ class LoadPosition:
     value: float = 0.0
     force: float = 0.0
     largest: float = 0.0
+
+    def is_below_past(self, history: LoadHistory) -> bool:
+        """Tell whether the load was larger at an earlier load step, given its history."""
+        begun = history.targets[: self.targets]
+        reached = begun[:-1] if self.ahead else begun
+        return self.value < max(reached, default=self.value)
 
     def is_at_end(self, load_history: LoadHistory) -> bool:
         """Whether all load steps of a load history are accepted."""

@@ -176,7 +176,7 @@ def stated_model(scene: Scene, surface: Surface, contact_modulus: float) -> Micr
         solver=scene.micro.solver,
     )
     if isinstance(model, HalfSpaceModel):
-        return replace(model, periodic=scene.surface.periodic, upper=scene.micro.upper)
+        return replace(model, periodic=scene.surface.periodic, hardness=scene.micro.hardness)
     return model
 
 
@@ -223,7 +223,7 @@ def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> R
     x, y = surface.grid
     periodic = scene.surface.periodic
     fine = HalfSpaceModel(
-        surface, contact_modulus=contact_modulus, periodic=periodic, upper=scene.micro.upper
+        surface, contact_modulus=contact_modulus, periodic=periodic, hardness=scene.micro.hardness
     )
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)

@@ -50,7 +50,7 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         surface,
         contact_modulus=materials.contact_modulus,
         periodic=True,
-        upper=scene.micro.upper,
+        hardness=scene.micro.hardness,
     )
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return ProblemSetup(

@@ -158,7 +158,7 @@ class History:
     )
     stiffness_N_per_mm = Column(
         "Interfacial stiffness dF/dδ, force over approach", "N/mm",
-        heading="stiffness", table="more",
+        heading="stiffness", table="more", error="stiffness_error_N_per_mm",
     )  # fmt: skip
     elastic_energy_mJ = Column(
         "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
@@ -187,6 +187,7 @@ class History:
         "Electrical conductance of the contacts", "S",
         heading="electrical conductance", table="more",
     )  # fmt: skip
+    stiffness_error_N_per_mm = Column("Error of the stiffness, where cells yield anew", "N/mm")
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
@@ -305,11 +304,6 @@ class MicroSection(Section):
     """Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951): no contact
     pressure exceeds it, and what it leaves of the overlap stays as plastic depth. Contacts are
     elastic when not given. It needs half-space contacts."""
-
-    @property
-    def upper(self) -> float:
-        """Largest contact pressure [MPa]; infinite without a hardness."""
-        return math.inf if self.hardness is None else self.hardness
 
 
 class OutputSection(Section):

@@ -36,7 +36,7 @@ def closed_forms():
     x = (np.arange(256) + 0.5) / 256 - 0.5
     sphere = waves.Surface(heights=-(x[:, None] ** 2 + x**2) / 10.0, lengths=(1.0, 1.0))
     model = waves.HalfSpaceModel(sphere, contact_modulus=spots.MODULUS)
-    stiffness = model.interface_stiffness(model.solve(2e-2))
+    stiffness = model.solve(2e-2).interface_stiffness()
     found = spots.total_conductance(stiffness, spots.MODULUS, spots.pair_conductivity([40.0]))
     yield "conductance of a spot, 4 k a [W/K]", 4e-3 * 40.0 * np.sqrt(0.1), found
 
@@ -80,7 +80,7 @@ def other_codes():
         row = table[np.isclose(table[:, 0], 8e-3)][0]
         yield f"ContactMechanics, {name}: force [N]", row[column], model.solve(row[0]).force
     seed, approach, hardness, force, _ = plastic.TABLE[2]
-    rough, options = plastic.surface(int(seed)), {"upper": hardness, "tolerance": 1e-10}
+    rough, options = plastic.surface(int(seed)), {"hardness": hardness, "tolerance": 1e-10}
     model = plastic.HalfSpaceModel(rough, contact_modulus=plastic.E_STAR, **options)
     yield "ContactMechanics, hardness 100 MPa: force [N]", force, model.solve(approach).force
     counted, corrected, energy = gfmd.found(gfmd.surface(3.45, 1176, seed=1), gfmd.PRESSURES)

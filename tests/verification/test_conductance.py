@@ -8,8 +8,9 @@ from geometry.errors import InputError
 from micro import HalfSpaceModel
 from micro.conductance import (
     conductance_per_area,
-    gap_conductance,
+    gas_conductance,
     pair_conductivity,
+    radiation_conductance,
     total_conductance,
 )
 
@@ -44,7 +45,7 @@ def test_one_circular_spot_conducts_4_k_a(cells):
     model = HalfSpaceModel(sphere, contact_modulus=MODULUS)
     state = model.solve(2e-2)
     radius = np.sqrt(5.0 * 2e-2)  # Hertz
-    found = total_conductance(model.interface_stiffness(state), MODULUS, pair_conductivity([40.0]))
+    found = total_conductance(state.interface_stiffness(), MODULUS, pair_conductivity([40.0]))
     assert found == pytest.approx(4 * 40.0 * radius * 1e-3, rel=5e-3 * (256 / cells) ** 0.5)
 
 
@@ -55,7 +56,7 @@ def test_rough_contact_is_the_isothermal_one(seed):
     model = HalfSpaceModel(surface, contact_modulus=MODULUS, tolerance=1e-10)
     state = model.solve(2e-2)
     assert 40 < np.count_nonzero(state.in_contact) < 800
-    stiffness = model.interface_stiffness(state)
+    stiffness = state.interface_stiffness()
     expected = potential(state.in_contact, state.spacing)
     assert stiffness / MODULUS == pytest.approx(expected, rel=1e-8)
 
@@ -71,21 +72,27 @@ def test_conductances_of_two_bodies_are_in_series():
 
 
 def test_air_gap_and_radiation():
-    assert gap_conductance(1e-2, 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
+    assert gas_conductance([1e-2], 0.026) == pytest.approx(2600.0)  # 26 mW/m/K over 10 µm
+    # half of the area in contact; the gas in a wedge: k ln(1 + G/M)/G
+    assert gas_conductance([0.0, 1e-2], 0.026) == pytest.approx(1300.0)
+    assert gas_conductance([0.0, 1e-2], 0.026, 3e-3) == pytest.approx(1000.0)
+    wedge = (np.arange(1000) + 0.5) * 1e-5
+    expected = 26.0 * np.log(1.0 + 10.0 / 0.4) / 1e-2
+    assert gas_conductance(wedge, 0.026, 4e-4) == pytest.approx(expected, rel=1e-4)  # midpoints
     # black faces at 300 K: 4 σ T³ = 6.12 W/m²/K (Incropera, table of radiation coefficients)
-    assert gap_conductance(1.0, 0.0, 300.0, 1.0) == pytest.approx(6.124, rel=1e-3)
+    assert radiation_conductance(300.0, 1.0) == pytest.approx(6.124, rel=1e-3)
 
 
 def test_contacts_that_yield_conduct_as_others():
     """Unloading begins on the same cells, which then bear less than the hardness."""
     spectrum = Spectrum(hurst=0.8, waves=(2, 10), rms_slope=0.2, seed=5)
     rough = synthesise(spectrum, grid=(48, 48), lengths=(1.0, 1.0))
-    model = HalfSpaceModel(rough, contact_modulus=MODULUS, upper=150.0, tolerance=1e-10)
+    model = HalfSpaceModel(rough, contact_modulus=MODULUS, hardness=150.0, tolerance=1e-10)
     pressed = model.press(Control(approach=8e-3))
     state = pressed.state
     assert np.count_nonzero(state.yielding) > 0.3 * np.count_nonzero(state.in_contact)
     step = 1e-8
     back = model.press(Control(approach=8e-3 - step), start=pressed.start).state
     rate = (state.force - back.force) / step
-    assert model.interface_stiffness(state) == pytest.approx(rate, rel=1e-3)
-    assert model.stiffness(state, turns=False)[0] < 0.9 * rate
+    assert state.interface_stiffness() == pytest.approx(rate, rel=1e-3)
+    assert model.stiffness(state, turns=False).value < 0.9 * rate

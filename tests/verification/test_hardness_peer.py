@@ -17,7 +17,7 @@ def test_recorded_forces(seed):
     rows = TABLE[TABLE[:, 0] == seed]
     assert [tuple(row) for row in rows[:, 1:3]] == CASES
     for _, approach, hardness, force, yielding in rows:
-        model = HalfSpaceModel(rough, contact_modulus=E_STAR, upper=hardness, tolerance=1e-10)
+        model = HalfSpaceModel(rough, contact_modulus=E_STAR, hardness=hardness, tolerance=1e-10)
         state = model.solve(approach)
         assert state.force == pytest.approx(force, rel=1e-6)
         assert np.count_nonzero(state.yielding) == yielding

@@ -27,7 +27,7 @@ def still(grid):
 
 
 def contact_problem(
-    interference, spacing, motions=None, *, tolerance=1e-11, periodic=False, upper=np.inf
+    interference, spacing, motions=None, *, tolerance=1e-11, periodic=False, hardness=np.inf
 ):
     """Return a contact problem on the half-space, by default of a body that does not move."""
     return ContactProblem(
@@ -36,7 +36,7 @@ def contact_problem(
         interference=interference,
         motions=still(interference.shape) if motions is None else motions,
         tolerance=tolerance,
-        upper=upper,
+        hardness=hardness,
     )
 
 

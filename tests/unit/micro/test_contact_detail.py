@@ -54,7 +54,7 @@ def test_spots_add_up_to_the_contact(name):
 def test_stiffness_of_asperities_is_the_derivative_of_the_force(name, tilt):
     model = micro_model(name, ROUGH, contact_modulus=MODULUS)
     pressed = model.press(Control(approach=0.01, tilt=tilt))
-    stiffness, _ = model.stiffness(pressed.state, turns=tilt is None)
+    stiffness = model.stiffness(pressed.state, turns=tilt is None).value
     step = 1e-6
     ahead, back = (
         model.press(Control(approach=0.01 + change, tilt=tilt), start=pressed.start).response.force

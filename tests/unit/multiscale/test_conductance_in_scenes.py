@@ -92,14 +92,48 @@ def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
     done.close()
 
 
-def test_gas_and_radiation_pass_through_the_mean_gap():
-    history = run(scene(conductance=HEAT | GAPS))
-    gas = 0.026 / (1e-3 * history.mean_separation_mm)
-    radiation = 4.0 * 0.4 * STEFAN_BOLTZMANN * 350.0**3
-    np.testing.assert_allclose(history.gap_conductance_W_per_K, (gas + radiation) * 1e-6)
+def shown(**changes):
+    """Return the load steps of a scene whose gaps conduct, with maps of the gaps."""
+    output = {"check": "none", "figures": False, "report": False, "contact": "all"}
+    return run(scene(conductance=HEAT | GAPS | changes, output=output))
+
+
+@pytest.mark.parametrize("jump", ["0 um", "0.37 um", "2 um"])
+def test_gas_and_radiation_pass_through_the_gaps(jump):
+    """By hand, from maps of gaps: k/(g + M) beside the contacts, which conduct by themselves."""
+    history = shown(temperature_jump=jump)
+    length = 1e-3 * float(jump.split()[0])
+    for step, record in zip(history, history.contact_records, strict=True):
+        open_gaps = record.gap_mm[record.pressure_MPa == 0.0]
+        gas = 0.026e3 * np.sum(1.0 / (open_gaps + length)) / record.gap_mm.size
+        radiation = 4.0 * 0.4 * STEFAN_BOLTZMANN * 350.0**3 * (1.0 - step.contact_area_fraction)
+        assert step.gap_conductance_W_per_K == pytest.approx((gas + radiation) * 1e-6, rel=1e-9)
+        # no less than a layer as thick as the mean gap (Jensen), without radiation
+        mean = 0.026e3 * len(open_gaps) / record.gap_mm.size / (open_gaps.mean() + length)
+        assert gas > 1.05 * mean
     contacts = history.thermal_conductance_W_per_K - history.gap_conductance_W_per_K
     np.testing.assert_allclose(contacts, ran("analytic").thermal_conductance_W_per_K, rtol=1e-9)
     assert any("of it through the gaps" in note for note in history.notes)
+    assert any("temperature_jump" in note for note in history.notes) == (jump == "0 um")
+
+
+def test_gas_converges_with_a_temperature_jump():
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    found = []
+    for cells in (48, 192):
+        surface = {"spectrum": spectrum, "grid": [cells, cells], "lengths": [1.0, 1.0]}
+        gas = {"gas": "0.026 W/m/K", "temperature_jump": "0.37 um"}
+        found.append(run(scene(conductance=HEAT | gas, surface=surface)).gap_conductance_W_per_K)
+    # cells of 1/8 of the shortest wave show the gap beside contacts to some per cent: 4 were found
+    np.testing.assert_allclose(found[0], found[1], rtol=0.06)
+
+
+def test_gas_of_laws_is_the_least_that_gaps_conduct():
+    exact = shown(temperature_jump="0.37 um").gap_conductance_W_per_K
+    laws = run(scene("consistent", HEAT | GAPS | {"temperature_jump": "0.37 um"}))
+    assert (laws.gap_conductance_W_per_K < exact).all()
+    assert (laws.gap_conductance_W_per_K > 0.3 * exact).all()
+    assert any("the least that the gas conducts" in note for note in laws.notes)
 
 
 def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
@@ -141,6 +175,8 @@ def test_scenes_that_do_not_ask_have_no_conductance():
         ({"resistivity": ["50 W/m/K"]}, "conductance.resistivity.* has the wrong unit"),
         ({"conductivity": [1.0, 2.0, 3.0]}, "for one body or for both"),
         ({"resistivity": "1 ohm m", "gas": 0.026}, "'gas' is about heat"),
+        ({"conductivity": 1.0, "temperature_jump": "1 um"}, "'temperature_jump' is about the gas"),
+        ({"conductivity": 1.0, "gas": 0.026, "temperature_jump": "-1 um"}, "greater than or equal"),
         ({"conductivity": 1.0, "temperature": 300.0}, "both 'temperature' and 'emissivity'"),
         ({"conductivity": 1.0, "temperature": 300.0, "emissivity": 1.2}, "less than or equal to 1"),
     ],

@@ -63,7 +63,7 @@ def test_the_scene_is_the_model_under_a_bound():
         "hardness": "300 MPa", "finite_slopes": False,
     }))  # fmt: skip
     model = HalfSpaceModel(
-        setup.surface, contact_modulus=setup.materials.contact_modulus, upper=HARDNESS
+        setup.surface, contact_modulus=setup.materials.contact_modulus, hardness=HARDNESS
     )
     (step,) = run(setup.scene)
     assert step.force_N == pytest.approx(model.solve(0.008).force, rel=1e-7)
@@ -80,7 +80,7 @@ def test_representative_laws_end_below_the_hardness():
     from multiscale.laws.representative import representative_law
 
     surface = make_setup(scene(periodic=True)).surface
-    given = {"contact_modulus": 4000.0, "periodic": True, "upper": HARDNESS}
+    given = {"contact_modulus": 4000.0, "periodic": True, "hardness": HARDNESS}
     law = representative_law(
         [surface], 4000.0, largest_pressure=0.9 * HARDNESS, tolerance=1e-2,
         make_model=lambda sample: HalfSpaceModel(sample, **given),
@@ -148,6 +148,53 @@ def test_errors_are_not_measured_after_unloading():
     history = run(scene(output={"check": "all", "figures": False}))
     assert [bool(step.errors) for step in history] == [True, True, False, False]
     assert sum("after unloading are not measured" in note for note in history.notes) == 1
+
+
+@pytest.mark.parametrize(
+    ("load", "measured"),
+    [
+        # the edge touches first: approaches at the middle are negative
+        ({"force": ["0.02 N", "0.05 N"], "tilt": [0.05, 0.0], "steps": 1}, [True, True]),
+        ({"force": ["0.05 N", "0.02 N", "0.05 N"], "tilt": [0.05, 0.0], "steps": 1}, [1, 0, 1]),
+        ({"approach": [0.004, 0.008, 0.004, 0.008, 0.009], "steps": 1}, [1, 1, 0, 1, 1]),
+    ],
+)
+def test_only_steps_below_earlier_loads_count_as_unloaded(load, measured):
+    history = run(scene(load=load, output={"check": "all", "figures": False}))
+    assert [bool(step.errors) for step in history] == measured
+    assert (history.approach_mm < 0.0).all() == ("force" in load)
+
+
+def test_two_bodies_yield_as_one_of_their_modulus():
+    """Two of twice the modulus give way as one of it before a rigid plane; nothing is round."""
+    young, hardness = "70 GPa", "1000 MPa"
+    given = {"load": {"approach": [0.01, 0.008], "steps": 1}, "micro": {
+        "hardness": hardness, "finite_slopes": False,
+    }}  # fmt: skip
+    one = scene(block={"young_modulus": young, "poisson_ratio": 0.3}, **given)
+    body = {"young_modulus": "140 GPa", "poisson_ratio": 0.3}
+    two = scene(block=body, counter_body=body, **given)
+    alone, both = run(one), run(two)
+    modulus = make_setup(one).materials.contact_modulus
+    assert 1000.0 / modulus * modulus < 1000.0  # what rounding once hid
+    names = ("force_N", "yielding_area_fraction", "plastic_depth_mm", "plastic_work_mJ")
+    for name in (*names, "work_mJ", "mean_separation_mm", "contact_area_fraction"):
+        found, expected = getattr(both, name), getattr(alone, name)
+        # residuals of 1e-10 of the approach, which unloading may leave nothing to compare with
+        np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-9 * expected.max())
+    assert (both.plastic_work_mJ > 0.0).all() and both.yielding_area_fraction[0] > 0.0
+    depth = both.contact.plastic_depth_mm
+    # the plane, less the mean height, plus mean displacement and depth
+    elastic = run(scene(block=body, counter_body=body, load={"approach": 0.01, "steps": 1}, micro={
+        "finite_slopes": False,
+    }))  # fmt: skip
+    assert both.mean_separation_mm[0] - elastic.mean_separation_mm[0] < depth.mean()
+
+
+def test_stiffness_has_an_error_where_cells_yield_anew():
+    history = ran("analytic")
+    assert history.stiffness_error_N_per_mm[1] > 0.0  # nothing yields at the first load step
+    assert (history.stiffness_error_N_per_mm[2:] == 0.0).all()
 
 
 def test_notes_say_what_yielded_and_what_would_bear_elastic_contacts():

@@ -12,7 +12,7 @@ import pytest
 
 import micro.asperities.hertz_pairs
 from geometry import Asperities, PatchGrid
-from micro import AsperityModel, HalfSpaceModel
+from micro import AsperityModel, HalfSpaceModel, HalfSpaceState
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.output.results import write_results
@@ -191,7 +191,7 @@ def test_hardness_and_conductance_cost_nothing_where_nobody_asks(tmp_path, monke
     heat = {"conductance": {"conductivity": ["50 W/m/K"]}}
     assert modules <= loaded(path, "run", data(**heat))
     assert not modules & loaded(asked, "run", data())
-    monkeypatch.setattr(HalfSpaceModel, "interface_stiffness", None)
+    monkeypatch.setattr(HalfSpaceState, "interface_stiffness", None)
     products = [sum(step.newton_iterations for step in Run(one).load_steps()) for one in (
         Scene.from_dict(data()), Scene.from_dict(data(micro={"hardness": 1e9})),
     )]  # fmt: skip

@@ -1,16 +1,18 @@
 """A body's compliance on cells: symmetry, boxes, cells that the body lifts into contact."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from free_motions import contact_problem
 
-from geometry import Control, Surface
+from geometry import Control, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.grid_compliance import Compliance
 from micro.compliance.half_space_grid import Cells
+from micro.contact import solver
 from micro.contact.active_set import solve
 
 E_STAR = 4000.0
@@ -97,6 +99,40 @@ def test_cells_lifted_into_contact_are_found(control, lower):
     problem = replace(contact_problem(interference, SPACING, tolerance=1e-10), compliance=body)
     every = solve(problem, np.zeros(GRID))
     assert state.pressure / E_STAR == pytest.approx(every.pressure, abs=1e-6 * every.pressure.max())
+
+
+@pytest.mark.parametrize("seed", [36, 56, 58, 71])
+def test_a_box_of_cells_only_grows(seed, monkeypatch):
+    """What touched in one box may touch again: dropping it might go on for ever."""
+    boxes, solve_on = [], solver._solve_on
+
+    def recorded(problem, box, start):
+        boxes.append(box)
+        return solve_on(problem, box, start)
+
+    monkeypatch.setattr(solver, "_solve_on", recorded)
+    dice, grown = np.random.default_rng(seed), 0
+    for _ in range(12):
+        cells = int(dice.integers(24, 64))
+        spectrum = Spectrum(hurst=0.8, waves=(2, 6), rms_slope=0.05, seed=int(dice.integers(10000)))
+        surface = synthesise(spectrum, grid=(cells, cells), lengths=LENGTHS)
+        matrix = np.diag([0, 1, 0, 1, 0, 0, 0, 0, 0]) * 10.0 ** dice.uniform(-4, -2, 9)
+        body = BodyModes(LENGTHS, matrix)
+        model = HalfSpaceModel(surface, contact_modulus=E_STAR, body=body)
+        size = np.ptp(surface.heights)
+        controls = (
+            Control(approach=0.1 * size), Control(force=10.0 ** dice.uniform(-2, 0)),
+            Control(approach=0.1 * size, tilt=(3e-3, -2e-3)),
+        )  # fmt: skip
+        for control in controls:
+            boxes.clear()
+            state = model.equilibrium(control)
+            for before, after in pairwise(boxes):
+                grown += 1
+                for old, new in zip(before, after, strict=True):
+                    assert new.start <= old.start and new.stop >= old.stop
+            assert state.gap.min() >= -1.1e-8 * state.interference.max()
+    assert grown > 2
 
 
 def test_a_stiff_body_lifts_nothing():

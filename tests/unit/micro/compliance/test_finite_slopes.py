@@ -221,3 +221,16 @@ def test_surface_that_does_not_continue():
     surface = Surface(heights=rough().heights, lengths=(1.0, 0.9))
     with pytest.raises(InputError, match="periodic slopes need a periodic surface"):
         term(surface, "periodic")
+
+
+@AROUND
+def test_slopes_on_a_half_space_keep_their_cells(around):
+    """Those of another grid would count its error as one of the body."""
+    slopes = term(rough((64, 48)), around, grid=(24, 20))
+    alone = slopes.on_half_space()
+    assert slopes.grid == alone.grid == (24, 20)
+    pressure = pressed(rough((64, 48)), around == "periodic")
+    expected = term(
+        rough((64, 48)), "periodic" if around == "periodic" else "nothing", grid=(24, 20)
+    )
+    np.testing.assert_array_equal(alone.displacement(pressure), expected.displacement(pressure))

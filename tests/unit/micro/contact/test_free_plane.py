@@ -48,7 +48,7 @@ def test_dense_programme_finds_the_same(name, given, bounded, seed):
         upper = 0.6 * expected.pressure.max()
         expected = dense_contact(matrix, interference, **held, upper=upper)
         assert np.count_nonzero(expected.pressure == upper) > 0
-    found = solved(interference, CASES[name][1], motions, upper=upper)
+    found = solved(interference, CASES[name][1], motions, hardness=upper)
     peak = expected.pressure.max()
     assert found.pressure.ravel() == pytest.approx(expected.pressure, abs=1e-8 * peak)
     assert found.motion == pytest.approx(expected.motion, abs=1e-8 * np.abs(interference).max())
@@ -59,7 +59,7 @@ def test_a_tie_at_the_bound_leaves_the_plane_between():
     """Two cells opposite each other yield at once: how far the plane turns then is not unique."""
     _, below, x, y = problem("strip", 1)
     motions = turning(x, y, None)
-    found = solved(below + 0.8, (0.7, 0.2), motions, upper=0.267)
+    found = solved(below + 0.8, (0.7, 0.2), motions, hardness=0.267)
     grid = Compliance(periodic=False).on_grid(below.shape, (0.7, 0.2))
     gap = grid.displacement(found.pressure) - below - 0.8 - motions.displacement(found.motion)
     assert gap[found.pressure < 0.267].min() > -1e-10
@@ -185,6 +185,6 @@ def test_no_plane_turns_on_a_period():
 
 def test_loads_that_no_pressures_meet():
     message = "the pressures to start from did not converge: no pressures within their bounds meet"
-    problem = contact_problem(np.zeros((8, 8)), (1.0, 1.0), approach((8, 8), 65.0), upper=1.0)
+    problem = contact_problem(np.zeros((8, 8)), (1.0, 1.0), approach((8, 8), 65.0), hardness=1.0)
     with pytest.raises(NotConverged, match=message):
         solve(problem, np.ones((8, 8)))

@@ -9,6 +9,7 @@ from geometry import Control, Material, NotConverged, Spectrum, synthesise
 from micro import HalfSpaceModel
 from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.grid_compliance import Compliance
+from micro.contact import slope_iteration
 
 NU, MODULUS = 0.3, 4000.0
 E_STAR = MODULUS / (1.0 - NU**2)
@@ -91,3 +92,21 @@ def test_slopes_that_do_not_agree_are_told():
 def test_nothing_touches():
     state = MODEL.solve(-1e-3)
     assert state.force == 0.0 and state.gap.min() > 0.0
+
+
+@pytest.mark.parametrize("approach", [-2e-3, 2e-6, 8e-3])
+@pytest.mark.parametrize("tilt", [None, (0.0, 0.0)])
+def test_iterations_of_all_solutions_are_counted(approach, tilt, monkeypatch):
+    """Those too that end clear of the surface, where slopes of a far larger load are given up."""
+    counts, solve = [], slope_iteration.solve_on_surface
+
+    def counted(problem, start):
+        found = solve(problem, start)
+        counts.append(found.iterations)
+        return found
+
+    monkeypatch.setattr(slope_iteration, "solve_on_surface", counted)
+    start = MODEL.solve(30e-3)
+    counts.clear()
+    state = MODEL.equilibrium(Control(approach=approach, tilt=tilt), start=start)
+    assert state.iterations == sum(counts)

@@ -25,7 +25,6 @@ def model(**terms):
         ({}, Control(approach=0.006, tilt=TURNING)),
         ({}, Control(force=1.0, tilt=TURNING)),
         ({"periodic": True}, Control(force=1.0, tilt=LEVEL)),
-        ({"upper": 200.0}, Control(approach=0.006, tilt=LEVEL)),
         ({"slopes": SLOPES}, Control(approach=0.006, tilt=LEVEL)),
         ({"slopes": SLOPES}, Control(approach=0.006, tilt=TURNING)),
     ],
@@ -34,7 +33,7 @@ def test_stiffness_is_the_derivative_of_the_force(terms, control):
     contact = model(**terms)
     state = contact.equilibrium(control)
     turns = control.tilt is None
-    stiffness, products = contact.stiffness(state, turns=turns)
+    stiffness, products, _ = contact.stiffness(state, turns=turns)
     # small enough for the same cells in contact, over which the force is linear
     step = 1e-4 * state.approach
     near = [
@@ -57,11 +56,11 @@ def test_stiffness_of_a_sphere_is_that_of_hertz():
     x = (np.arange(cells) + 0.5) / cells - 0.5
     sphere = Surface(heights=-(x[:, None] ** 2 + x**2) / (2.0 * radius), lengths=(1.0, 1.0))
     contact = HalfSpaceModel(surface=sphere, contact_modulus=MODULUS)
-    stiffness, _ = contact.stiffness(contact.solve(approach), turns=False)
+    stiffness = contact.stiffness(contact.solve(approach), turns=False).value
     # 25 cells along the contact's radius: 8e-4 were measured
     assert stiffness == pytest.approx(2.0 * MODULUS * np.sqrt(radius * approach), rel=2e-3)
 
 
 def test_stiffness_is_zero_without_contact():
     contact = model()
-    assert contact.stiffness(contact.solve(-1e-3), turns=False) == (0.0, 0)
+    assert contact.stiffness(contact.solve(-1e-3), turns=False) == (0.0, 0, 0.0)

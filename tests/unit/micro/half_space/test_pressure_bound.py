@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from free_motions import approach, contact_problem
 
 from geometry import Control, InputError, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
+from micro.contact.active_set import ActiveSet
 
 E_STAR = 4000.0
 SURFACE = synthesise(
@@ -30,7 +32,7 @@ def control(request):
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
 def test_three_states(control, share):
     upper = share * ELASTIC.equilibrium(control).pressure.max()
-    state = replace(ELASTIC, upper=upper).equilibrium(control)
+    state = replace(ELASTIC, hardness=upper).equilibrium(control)
     full = state.pressure >= upper * (1.0 - 1e-10)
     assert state.pressure.min() >= 0.0 and state.pressure.max() <= upper * (1.0 + 1e-10)
     assert full.any() and (state.in_contact & ~full).any()
@@ -46,16 +48,18 @@ def test_three_states(control, share):
 def test_a_bound_that_nothing_reaches_changes_nothing(control):
     elastic = ELASTIC.equilibrium(control)
     for factor in (1.001, 1e6):
-        state = replace(ELASTIC, upper=factor * elastic.pressure.max()).equilibrium(control)
+        state = replace(ELASTIC, hardness=factor * elastic.pressure.max()).equilibrium(control)
         assert state.pressure == pytest.approx(elastic.pressure, abs=1e-7 * elastic.pressure.max())
         assert state.force == pytest.approx(elastic.force, rel=1e-8)
 
 
 def test_softer_material_carries_less_and_touches_more():
     peak = ELASTIC.solve(8e-3).pressure.max()
-    states = [replace(ELASTIC, upper=share * peak).solve(8e-3) for share in (1.0, 0.5, 0.2, 0.05)]
+    states = [
+        replace(ELASTIC, hardness=share * peak).solve(8e-3) for share in (1.0, 0.5, 0.2, 0.05)
+    ]
     assert np.all(np.diff([state.force for state in states]) < 0.0)
-    states = [replace(ELASTIC, upper=share * peak).solve_force(1.0) for share in (1.0, 0.5, 0.2)]
+    states = [replace(ELASTIC, hardness=share * peak).solve_force(1.0) for share in (1.0, 0.5, 0.2)]
     assert np.all(np.diff([state.counted_area for state in states]) > 0.0)
     assert np.all(np.diff([state.approach for state in states]) > 0.0)
 
@@ -66,17 +70,28 @@ def test_a_sphere_pressed_far_beyond_yield():
     x = (np.arange(n) + 0.5) / n - 0.5
     sphere = Surface(heights=-(x[:, None] ** 2 + x**2) / (2.0 * radius), lengths=(1.0, 1.0))
     model = HalfSpaceModel(
-        surface=sphere, contact_modulus=E_STAR, highest=0.0, upper=upper, tolerance=1e-8
+        surface=sphere, contact_modulus=E_STAR, highest=0.0, hardness=upper, tolerance=1e-8
     )
     force = np.pi * 2.0 * radius * approach * upper
     # cells count a circle of 36 cells' radius to 1 %; the surface moves by 4 a H/(π E*), δ/220
     assert model.solve(approach).force == pytest.approx(force, rel=0.02)
     assert model.solve_force(force).approach == pytest.approx(approach, rel=0.02)
-    elastic = replace(model, upper=np.inf).solve(approach)
+    elastic = replace(model, hardness=None).solve(approach)
     assert elastic.force > 10.0 * force
 
 
-@pytest.mark.parametrize("upper", [0.0, -1.0, np.nan])
-def test_refuses_bounds(upper):
-    with pytest.raises(InputError, match=f"{upper}: the upper bound of the pressures must be"):
-        replace(ELASTIC, upper=upper)
+@pytest.mark.parametrize("hardness", [0.0, -1.0, np.nan])
+def test_refuses_hardness(hardness):
+    with pytest.raises(InputError, match=f"{hardness}: the hardness must be"):
+        replace(ELASTIC, hardness=hardness)
+
+
+def test_a_plane_clear_of_all_cells_carries_no_force():
+    """A cell yields far below the plane, which rounding of a pressure on another one holds up."""
+    interference, start, hardness = np.full((8, 8), -1.0), np.zeros((8, 8)), 1e-3
+    interference[1, 1], start[1, 1], start[5, 5] = 0.0, 1e-18, hardness
+    motions = approach((8, 8), hardness)
+    problem = contact_problem(interference, (1.0, 1.0), motions, periodic=True, hardness=hardness)
+    search = ActiveSet(problem, start)
+    assert (interference + search.motion[0]).max() < 0.0
+    assert search.residual > 0.5
