@@ -234,7 +234,7 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
     Note:
         Collective.
     """
-    load_history, probe = setup.scene.loading.load_history, error_probe(setup, body)
+    load_history, probe = setup.load_history, error_probe(setup, body)
     by_force, turns = load_history.quantity == "force", load_history.tilt is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))

@@ -58,9 +58,9 @@ class Run:
         setup: The problem set up from it: surface, summits, patches, micro model.
         scene: The scene with values for its auto keys.
         seconds: Wall time of each phase so far [s].
-        table: The patch laws, once made.
+        table: The patch laws, once made, counted from first touch.
         coupling: What finds the load steps, once made.
-        steps: The load steps accepted so far.
+        steps: The load steps accepted so far, counted from first touch.
         fields: The states that the fields of chosen load steps are written from.
         position: Position in the load history after them.
     """
@@ -133,7 +133,7 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         coupling = self.make_coupling()
-        stepper = LoadStepper(coupling, self.scene.loading.load_history, self.position)
+        stepper = LoadStepper(coupling, self.setup.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
@@ -148,7 +148,7 @@ class Run:
                 self.steps.append(self._checked(step))
                 self._deepest = max(self._deepest, step.approach_mm)
                 self.make_contact(last=self.finished)
-                yield self.steps[-1]
+                yield self.steps[-1].counted_from(self.setup.zero)
 
     def make_contact(self, *, last: bool = True) -> None:
         """Record the contact of the last load step if the scene asks for it, once.
@@ -258,12 +258,20 @@ class Run:
         return [face.digest for face in faces if face is not None and face.digest]
 
     @property
+    def laws(self) -> LawTable | None:
+        """The patch laws as they are shown, counted from the zero of the load; None without any."""
+        zero = self.setup.zero
+        if self.table is None or not zero:
+            return self.table
+        return self.table.counted_from(self.scene.loading.zero, zero)
+
+    @property
     def law_bytes(self) -> bytes:
         """The law file's bytes; empty as long as there are no laws."""
         return b"" if self.table is None else law_bytes(self.table)
 
     def history(self) -> History:
-        """Return the load steps accepted so far, with times and notes."""
+        """Return the load steps accepted so far, counted from the zero, with times and notes."""
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
         notes += self._recorder.notes
@@ -275,12 +283,13 @@ class Run:
             from multiscale.conductances import conductance_notes  # other scenes do without
 
             notes += conductance_notes(self.steps, with_laws=self.setup.uses_laws)
+        zero = self.setup.zero
         return History(
-            steps=steps,
+            steps=tuple(step.counted_from(zero) for step in steps),
             patches=self.setup.regions or self.setup.patches,
             seconds=self.times,
             notes=(*notes, *error_notes(self.steps, self.given.accuracy), *mesh_notes),
-            reference=record,
+            reference=None if record is None else record.counted_from(zero),
             contact_records=self.contacts,
         )
 

@@ -73,7 +73,7 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
         setup: The problem set up from the scene.
         run: The run.
     """
-    forced = setup.scene.loading.load_history.quantity == "force"
+    forced = setup.load_history.quantity == "force"
     for name, value, error, unit, given in (
         ("force", last.force_N, last.force_error_N, "N", forced),
         ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),

@@ -111,7 +111,7 @@ class _Search(MeshSearch):
 
     def _measured(self, setup: ProblemSetup, model: HalfSpaceModel, body: OnBody) -> Errors:
         """Return the errors relative to the force, at the load where their sum is largest."""
-        load_history = self.given.loading.load_history
+        load_history = setup.load_history
         order = SLOPES if setup.finite_slopes else 0
         probe = replace(error_probe(setup, body), model=model, by_laws=False)
         worst: Errors = {"grid": 0.0}

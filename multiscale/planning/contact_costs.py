@@ -101,7 +101,7 @@ class ContactCosts:
     @cached_property
     def _free(self) -> bool:
         """Whether the approach of the plane, or its tilt, is free."""
-        loads = self.setup.scene.loading.load_history
+        loads = self.setup.load_history
         return loads.quantity == "force" or loads.tilt is None
 
     @cached_property

@@ -41,6 +41,7 @@ from multiscale.setup.surface_and_block import (
     Bulk,
     check_load,
     check_patches,
+    load_history_on,
     make_shape,
     make_surface,
     make_surfaces,
@@ -157,7 +158,7 @@ def _setup(
         )  # its load steps need no plane ahead of them
     else:
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
-        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+        plane = plane_at_largest_load(load_history_on(scene, (surface,)), coupling, surface)
     seconds["load estimate"] = time.perf_counter() - chosen
     return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
 
@@ -230,7 +231,7 @@ def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> R
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))
-    return plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    return plane_at_largest_load(load_history_on(scene, (surface,)), coupling, surface)
 
 
 def _chosen_model(

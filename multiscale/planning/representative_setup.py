@@ -56,7 +56,8 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         upper=scene.micro.upper,
     )
     made = time.perf_counter()
-    plane = _sample_plane(scene, model, face.area)
+    surfaces = tuple(one for region in samples for one in region.surfaces)
+    plane = _sample_plane(load_history_on(scene, surfaces), model, face.area)
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return ProblemSetup(
         scene=scene,
@@ -99,12 +100,12 @@ def face_of_block(scene: Scene, shape: BlockShape) -> FaceFacts:
     )
 
 
-def _sample_plane(scene: Scene, model: HalfSpaceModel, area: float) -> RigidPlane:
+def _sample_plane(history: LoadHistory, model: HalfSpaceModel, area: float) -> RigidPlane:
     """Return the plane on a sample at the largest load, as if that were uniform on the face.
 
     Under a prescribed approach the body takes part of it, and the plane is an upper bound.
     """
-    surface, history = model.surface, scene.loading.load_history
+    surface = model.surface
     mean = model.reference_height - surface.mean_height
     if history.quantity == "approach":
         return RigidPlane.above(surface, min(history.largest, mean))

@@ -34,7 +34,7 @@ def solved_boxes(setup: ProblemSetup) -> Sequence[Box]:
     Args:
         setup: The problem.
     """
-    loads = setup.scene.loading.load_history
+    loads = setup.load_history
     if setup.samples:
         return (Box(),)
     inside = setup.cell_interference

@@ -125,7 +125,7 @@ class History:
 
     step = Column("Number of the load step, from 1", heading="step")
     approach_mm = Column(
-        "Approach of the rigid plane, counted from the first touch", "mm",
+        "Approach of the rigid plane, counted from the zero of the load", "mm",
         heading="approach", error="approach_error_mm",
     )  # fmt: skip
     force_N = Column(
@@ -184,6 +184,10 @@ class History:
     electrical_conductance_S = Column(
         "Electrical conductance of the contacts", "S",
         heading="electrical conductance", table="more",
+    )  # fmt: skip
+    first_touch_approach_mm = Column(
+        "Approach counted from first touch, where approach_mm counts from another height", "mm",
+        heading="from first touch", table="more",
     )  # fmt: skip
 
     steps: tuple[LoadStep, ...]

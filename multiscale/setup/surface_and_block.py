@@ -23,6 +23,8 @@ from geometry import (
 )
 from geometry.files.reading import surface_of
 from geometry.preparation import prepared
+from geometry.zero import Zero
+from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import BlockSection, CounterSurfaceSection, SurfaceSection
 
@@ -223,6 +225,34 @@ def check_patches(scene: Scene, surface: Surface) -> None:
             )
 
 
+def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
+    """Return the load history of a scene, counted from first touch.
+
+    Args:
+        scene: The scene, whose approaches count from its zero.
+        surfaces: Its surface, or samples of it.
+
+    Raises:
+        InputError: When the zero is none of the surface, or the plane does not touch it.
+    """
+    loading, history = scene.loading, scene.loading.load_history
+    with located(scene, "load.zero"):
+        zero = Zero(loading.zero).depth(surfaces)
+    if loading.approach is None:
+        return replace(history, zero=zero)
+    points = tuple(value + zero for value in history.points)
+    if not points[0] > 0.0 or min(points) < 0.0:
+        raise InputError(
+            f"does not touch the surface, or turns before first touch, {zero:.6g} mm above the "
+            f"{loading.zero}",
+            key="load.approach",
+            value=list(loading.approach),
+            allowed=f"> {-zero:.6g} mm",
+            file=scene.file,
+        )
+    return replace(history, points=points, zero=zero)
+
+
 def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
     """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
@@ -244,7 +274,8 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             file=scene.file,
         )
     resolved = _ROUNDING * float(np.abs(surface.heights).max())
-    if loading.approach is not None and 0.0 < max(loading.approach) < resolved:
+    approaches = load_history_on(scene, (surface,)).points
+    if loading.approach is not None and 0.0 < max(approaches) < resolved:
         raise InputError(
             "is lost in the rounding of the heights",
             key="load.approach",
@@ -259,7 +290,7 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
         key, points = "load.force", loading.force
         most, named, unit = body.young_modulus * body.area, "E times area", "N"
     else:
-        key, points = "load.approach", loading.approach or ()
+        key, points = "load.approach", approaches
         most, named, unit = body.height, "the body's height", "mm"
     if max(points) > most:
         raise InputError(
