@@ -37,6 +37,7 @@ from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import (
     LAW_BLOCK_CELLS,
     block_section,
+    load_history_on,
     make_surface,
     patch_grid,
 )

@@ -299,9 +299,10 @@ class LoadStepper:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws)
                 if beyond or abs(ahead[-1] - last) <= self.position.smallest:
+                    shown = self._load_history.shown(control)
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
                     raise NotConverged(
-                        f"load step {self.position.steps + 1} ({self._load_history.shown(control)})",
+                        f"load step {self.position.steps + 1} ({shown})",
                         reason=error.reason,
                         iterations=error.iterations,
                         remedy=halved + error.remedy,

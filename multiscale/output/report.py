@@ -80,6 +80,9 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
     ):
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
+    if (approach := last.first_touch_approach_mm) is not None:
+        above = f"which is {quantity(last.zero_mm, 'mm')} above the {setup.scene.loading.zero}"
+        yield "approach from first touch", quantity(approach, "mm"), above
     face = setup.patches.area * setup.patches.count
     if not isinstance(run.history().patches, PatchGrid) and setup.face is not None:
         face = setup.face.area

@@ -8,6 +8,7 @@ from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
+from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import ClusterNodes
 from multiscale.scene.scene import Scene
 from multiscale.setup.memory import check_memory
@@ -19,6 +20,7 @@ from multiscale.setup.surface_and_block import (
     Bulk,
     block_material,
     check_load,
+    load_history_on,
     make_shape,
     sample_surface,
 )

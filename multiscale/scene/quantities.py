@@ -225,9 +225,7 @@ Length = Annotated[float, _parser("mm"), _schema("mm")]
 Pressure = Annotated[float, _parser("MPa"), _schema("MPa")]
 SpectralAmplitude = Annotated[float, _parser("mm**4"), _schema("mm**4")]
 Slope = Annotated[float, _parser(""), _schema("")]
-Approaches = Annotated[
-    tuple[float, ...], _parser("mm", parse_points), _schema("mm", several=True)
-]
+Approaches = Annotated[tuple[float, ...], _parser("mm", parse_points), _schema("mm", several=True)]
 Forces = Annotated[
     tuple[float, ...], _parser("N", parse_turning_points), _schema("N", several=True)
 ]

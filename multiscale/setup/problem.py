@@ -19,8 +19,8 @@ from geometry import (
     Surface,
     find_asperities,
 )
-from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from geometry.zero import Zero
+from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.stepper import LoadHistory
 from multiscale.readable import duration
