@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from geometry.interpolant import bordered
 from geometry.surface import Surface
 
 Array = NDArray[np.float64]
+Axis = tuple[NDArray[np.intp], NDArray[Any], NDArray[Any]]
 
 FIRST_TOUCH, MEAN_PLANE = "first touch", "mean plane"
 ALLOWED = "'first touch', 'mean plane', or 'quantile 0.001' with any number between 0 and 1"
@@ -30,9 +32,9 @@ _TOPS, _WINDOW, _FINE = 12, 10, 24
 there, and points per cell and a half. The influence of a sample on a quintic spline falls by 0.43
 a cell."""
 _HIGHER_ORDER = 8.0
-"""Error of the cubic spline's top over its difference from that of the quintic spline. On
-plateau-honed, self-affine and wavy surfaces of 3 to 16 heights per shortest wave the top was right
-within 1.5 × the stated error on 97 of 100."""
+"""Error of the cubic spline's top over its difference from that of the quintic spline. On 24
+plateau-honed surfaces of 8 to 16 heights per wave, where 2 leaves 7 beyond 1.5 × the stated error
+and 8 leaves one, and on 36 self-affine ones of 3 heights and more, where 2 leaves two and 8 one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +91,7 @@ class Zero:
         if self.name == MEAN_PLANE:  # opposite quarters, so that an inclination has none
             return abs(float(parts[0].mean() + parts[3].mean() - parts[1].mean() - parts[2].mean()))
         known = _exceeded_by(heights.ravel(), self.share)
-        return max(abs(_exceeded_by(part, self.share) - known) for part in parts)
+        return float(np.mean([abs(_exceeded_by(part, self.share) - known) for part in parts]))
 
     def _height(self, surfaces: Sequence[Surface]) -> float:
         """Return the height of the zero above the mean plane [mm]."""
@@ -138,7 +140,7 @@ def _error_of_top(surface: Surface) -> float:
     return float(max(_HIGHER_ORDER * abs(quintic), abs(akima)))
 
 
-def _axis(surface: Surface, axis: int, cell: int) -> tuple[Array, Array, Array]:
+def _axis(surface: Surface, axis: int, cell: int) -> Axis:
     """Return rows of samples around a cell, where they are, and points near the cell [mm]."""
     count, step, length = surface.grid[axis], surface.spacing[axis], surface.lengths[axis]
     near = step * (cell + 0.5 + np.linspace(-1.5, 1.5, 3 * _FINE + 1))
@@ -150,9 +152,7 @@ def _axis(surface: Surface, axis: int, cell: int) -> tuple[Array, Array, Array]:
     return rows + 1, places, near[(near >= 0.0) & (near <= length)]
 
 
-def _without_border(
-    surface: Surface, axis: int, given: tuple[Array, Array, Array]
-) -> tuple[Array, Array, Array]:
+def _without_border(surface: Surface, axis: int, given: Axis) -> Axis:
     """Return which rows of `_axis` are no border, where they are, and the points among them."""
     rows, places, near = given
     inner = np.flatnonzero((rows >= 1) & (rows <= surface.grid[axis]))

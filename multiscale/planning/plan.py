@@ -79,7 +79,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     if bare := list(bare_quantities(setup.scene)):
         yield f"numbers without a unit: {', '.join(bare)}"
     excess = setup.surface.highest - setup.surface.heights.max()
-    if excess > 0.1 * setup.largest_interference:
+    if not setup.zero and excess > 0.1 * setup.largest_interference:
         x, y = setup.surface.highest_point
         yield (
             "the approach counts from the interpolant's highest point, "
@@ -260,6 +260,9 @@ def _load(setup: ProblemSetup) -> str:
     way = ", ".join(quantity(point, unit, 6) for point in load_history.points)
     again = f", {load_history.cycles} times" * (load_history.cycles > 1)
     text = f"{load_history.count} steps to {what} of {way}{again}"
+    if setup.zero:
+        depth = quantity(setup.zero, "mm", 4)
+        text += f", approaches from the {setup.scene.loading.zero}, {depth} below first touch"
     if load_history.force_change is not None:
         text += f", halved where the force changes by more than {load_history.force_change:.3g}"
     if load_history.tilt is None:
@@ -267,7 +270,7 @@ def _load(setup: ProblemSetup) -> str:
     elif any(load_history.tilt):
         text += f", tilted by {_slopes(load_history.tilt)}"
     if forced:
-        approach = quantity(setup.plane_at_largest_load.approach, "mm", 3)
+        approach = quantity(setup.plane_at_largest_load.approach - setup.zero, "mm", 3)
         text += f"; on a half-space its approach is about {approach}"
     return text
 

@@ -22,7 +22,7 @@ FLOORS = {
         "blocked_spline cores errors legendre_modes slope_search small_caches",
         "checks collective interpolant materials missing packages regions",
         "face_frame filters spectrum surface",
-        "facing mirroring patches statistics summits synthesis",
+        "facing mirroring patches statistics summits synthesis zero",
         "plausibility preparation rigid_plane",
         "files",
         "asperities meshes plane_equilibrium",
