@@ -14,6 +14,7 @@ from filelock import FileLock, Timeout
 
 from geometry.collective import on_root
 from geometry.errors import InputError
+from multiscale.removed import refuse_removed_results, without_removed
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, read_checkpoint
 from multiscale.run import Run
 from multiscale.scene.keys import dotted
@@ -134,6 +135,10 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
     if not path.exists():
         return None
     found = read_checkpoint(path)
+    try:
+        refuse_removed_results(found.scene)
+    except InputError as error:
+        raise error.located(file=str(path)) from None
     _refuse_changed_keys(folder, scene, found.scene)
     return found
 
@@ -219,7 +224,7 @@ def refuse_other_results(folder: Path, scene: Scene) -> None:
         InputError: When the folder holds results of another scene; names the first keys that
             differ. Results of the same scene, and what is not understood, may be replaced.
     """
-    then = _scene_of_results(folder)
+    then = without_removed(_scene_of_results(folder))
     known = dict(dotted(then))  # a key that an earlier version did not have is no difference
     differing = [change for change in _changes(scene, then) if change[0] in known]
     if differing:
@@ -248,7 +253,8 @@ def _scene_of_results(folder: Path) -> dict[str, Any]:
 
 def _changes(now: Scene, then: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
     """Yield the keys that have changed and can matter, with their present and former values."""
-    old, new = dict(dotted(then)), dict(dotted(now.model_dump(by_alias=True, mode="json")))
+    old = dict(dotted(without_removed(then)))
+    new = dict(dotted(now.model_dump(by_alias=True, mode="json")))
     for key in dict.fromkeys((*new, *old)):
         if not key.startswith("output.") and old.get(key) != new.get(key):
             yield key, new.get(key), old.get(key)
