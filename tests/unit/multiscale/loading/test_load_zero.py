@@ -30,6 +30,8 @@ def scene(zero, kind="analytic", depth=0.0, **sections):
         "load": {"zero": zero, "approach": [UP - depth, 0.5 * UP - depth], "steps": 2},
         "output": {"figures": False, "report": False},
     }
+    if "law" in sections:  # which has no patches
+        del data["patches"]
     return Scene.from_dict({name: data.get(name, {}) | sections.get(name, {}) for name in
                             {*data, *sections}})  # fmt: skip
 
