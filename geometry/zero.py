@@ -120,7 +120,9 @@ def _error_of_top(surface: Surface) -> float:
     hardly overshoot at the edges of grooves; they end at the outermost samples.
     """
     tops, samples = [], surface.heights if surface.periodic else bordered(surface.heights)
-    highest = np.divmod(np.argsort(surface.heights, axis=None)[-_TOPS:], surface.grid[1])
+    highest = np.divmod(
+        np.argpartition(surface.heights, -_TOPS, axis=None)[-_TOPS:], surface.grid[1]
+    )
     top = np.floor(np.divide(surface.highest_point, surface.spacing)).astype(int)
     for cell in {(int(i), int(j)) for i, j in (*zip(*highest, strict=True), top)}:
         axes = [_axis(surface, axis, cell[axis]) for axis in range(2)]

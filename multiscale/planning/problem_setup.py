@@ -115,7 +115,7 @@ def _setup(
     materials, face = materials_in_contact(scene, faces), faces[0]
     shape = make_shape(scene, surface) if face is None else None
     height = shape.height if shape else face.depth if face else 0.0
-    check_load(scene, surface, Bulk(surface.area, height, materials.first.young_modulus))
+    check_load(scene, (surface,), Bulk(surface.area, height, materials.first.young_modulus))
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
     modulus = materials.contact_modulus
     setup = partial(

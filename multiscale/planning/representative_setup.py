@@ -50,7 +50,8 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         face = face_of_block(scene, shape)
     samples = region_samples(scene, face.materials, second_material(scene, counter))
     surface, materials = samples[0].surfaces[0], samples[0].materials
-    check_load(scene, surface, Bulk(face.area, face.depth, materials.first.young_modulus))
+    surfaces = tuple(one for region in samples for one in region.surfaces)
+    check_load(scene, surfaces, Bulk(face.area, face.depth, materials.first.young_modulus))
     model = HalfSpaceModel(
         surface,
         contact_modulus=materials.contact_modulus,
@@ -58,7 +59,6 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         upper=scene.micro.upper,
     )
     made = time.perf_counter()
-    surfaces = tuple(one for region in samples for one in region.surfaces)
     plane = _sample_plane(load_history_on(scene, surfaces), model, face.area)
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     return ProblemSetup(

@@ -253,14 +253,14 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
     return replace(history, points=points, zero=zero)
 
 
-def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
+def check_load(scene: Scene, surfaces: Sequence[Surface], body: Bulk) -> None:
     """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
     Numbers of load steps that there will not be are refused, too.
 
     Args:
         scene: The scene.
-        surface: Its surface.
+        surfaces: Its surface, or samples of it.
         body: Size and stiffness of its body.
     """
     loading, fields = scene.loading, scene.output.fields
@@ -273,8 +273,8 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"numbers up to {count}",
             file=scene.file,
         )
-    resolved = _ROUNDING * float(np.abs(surface.heights).max())
-    approaches = load_history_on(scene, (surface,)).points
+    resolved = _ROUNDING * max(float(np.abs(one.heights).max()) for one in surfaces)
+    approaches = load_history_on(scene, surfaces).points
     if loading.approach is not None and 0.0 < max(approaches) < resolved:
         raise InputError(
             "is lost in the rounding of the heights",
