@@ -108,9 +108,9 @@ def test_the_stated_error_of_first_touch_holds(make, n):
     assert sum(kept) >= 13  # 95 of 100, with what 15 scatter
 
 
-@pytest.mark.parametrize("n", [64, 80, 128])
+@pytest.mark.parametrize("n", [64, 80])
 def test_grooves_that_meet_the_border_leave_no_ridge(n):
-    """An extrapolated spline exceeds the plateau by 142 to 375 nm on each of these."""
+    """An extrapolated spline exceeds the plateau by 140 to 240 nm, at 80 on the last of these."""
     for seed in (0, 2, 3, 5):
         heights = honed(n, seed)
         rough = Surface(heights=heights, lengths=(1.0, 1.0))
