@@ -136,8 +136,8 @@ class ErrorProbe:
         problems = _Problems(self, Control(approach=approach, tilt=tilt))
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
-        parts[ZERO] = problems.zero_error(self.zero)
         parts["grid"] = problems.grid_error(force, others=sum(parts.values()))
+        parts[ZERO] = problems.zero_error(self.zero)
         change = problems.stiffness() if stiffness else math.nan
         return MeasuredErrors(parts=parts, stiffness=change, zero=self.zero)
 
