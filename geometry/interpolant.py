@@ -19,6 +19,9 @@ _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays
 by 2 − √3 per cell and is below 1e-16 there, so that a padded spline is periodic to rounding."""
 
+_HALF_CELL_BEYOND = np.array([35.0, -35.0, 21.0, -5.0]) / 16.0
+"""Weights of the first four samples in the value of their cubic half a cell before the first."""
+
 _MOST_SPANS, _MOST_STARTS = 20_000, 8
 """Spans that are sampled for the highest point, and samples from which it is climbed to."""
 
@@ -26,8 +29,9 @@ _MOST_SPANS, _MOST_STARTS = 20_000, 8
 class Interpolant:
     """Tensor cubic spline through samples at cell centres, defined on the whole rectangle.
 
-    Within the outer half cells the last polynomial piece goes on (not-a-knot); a periodic one
-    wraps instead. Cubic polynomials are reproduced, smooth surfaces at fourth order.
+    A periodic one wraps. Otherwise the spline also goes through heights on the border that the
+    heights beside it bound, see `_on_border`: a groove that meets the border leaves no ridge there.
+    Smooth surfaces are met at fourth order, in the outer half cells at second order at least.
 
     Args:
         heights: Samples at cell centres, shape (nx, ny) [mm].
@@ -41,15 +45,16 @@ class Interpolant:
         self.lengths, self.periodic = lengths, periodic
         self._corner = (0.0, 0.0)
         self._spacing = (lengths[0] / heights.shape[0], lengths[1] / heights.shape[1])
-        padding = _PADDING if periodic else 0
         self._lowest = float(heights.min())  # apart, so that its size adds no rounding to slopes
-        samples = np.pad(heights - self._lowest, padding, mode="wrap")
-        centres, box = [], []
+        samples = heights - self._lowest
+        samples = np.pad(samples, _PADDING, mode="wrap") if periodic else bordered(samples)
+        places = []
         for length, step, count in zip(lengths, self._spacing, heights.shape, strict=True):
-            centres.append((np.arange(-padding, count + padding) + 0.5) * step)
-            box += [min(0.0, centres[-1][0]), max(length, centres[-1][-1])]
-        spline = RectBivariateSpline(*centres, samples, bbox=box, kx=3, ky=3, s=0)
-        self._spline = spline
+            padding = _PADDING if periodic else 1
+            places.append((np.arange(-padding, count + padding) + 0.5) * step)
+            if not periodic:
+                places[-1][[0, -1]] = 0.0, length
+        self._spline = RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
         self._derivatives: dict[tuple[int, int], BlockedSpline] = {}
 
     def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
@@ -193,6 +198,36 @@ class Interpolant:
         found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + found.x * (dx, dy), low, high)
         return float(px), float(py), float(value(px, py, grid=False))
+
+
+def bordered(samples: Array) -> Array:
+    """Return samples with a row of heights on every border, shape (nx + 2, ny + 2).
+
+    A corner is continued along both sides, and gets the mean of the two.
+    """
+    along, across = _on_borders(samples), _on_borders(samples.T).T
+    return np.asarray(0.5 * (_on_borders(along.T).T + _on_borders(across)))
+
+
+def _on_borders(samples: Array) -> Array:
+    """Return samples with a row before the first and one behind the last, half a cell away."""
+    return np.vstack([_on_border(samples), samples, _on_border(samples[::-1])])
+
+
+def _on_border(rows: Array) -> Array:
+    """Return the heights on the border half a cell before the first of some rows, shape (1, m).
+
+    They are those of the cubics through four heights, within bounds: they rise no higher than the
+    second height and the straight line through the first two, so that no ridge is invented, and
+    fall by no more than the four heights differ. The straight line is never in the way of heights
+    that curve downwards, as those of summits do; where they curve upwards it is right to second
+    order. On plateau-honed surfaces of 8 heights per wave the cubics alone rise 0.2 to 0.3 µm above
+    the plateau, and straight lines alone 0.5 µm.
+    """
+    cubic = np.tensordot(_HALF_CELL_BEYOND, rows[:4], axes=1)[None]
+    highest = np.maximum(rows[1:2], 1.5 * rows[:1] - 0.5 * rows[1:2])
+    lowest = rows[:1] - np.ptp(rows[:4], axis=0)
+    return np.clip(cubic, lowest, highest)
 
 
 def _is_lattice(x: Array, y: Array) -> bool:

@@ -91,8 +91,8 @@ class ContactRecorder:
             step = self._solved(step, make_model())
         if self._latest is not None and self._latest[2] == step.step:
             coupling, latest, _ = self._latest
-            lengths = self._setup.surface.lengths
-            self.records.append(ContactRecord.of(coupling.detail(latest), step, lengths))
+            lengths, shown = self._setup.surface.lengths, step.counted_from(self._setup.zero)
+            self.records.append(ContactRecord.of(coupling.detail(latest), shown, lengths))
             self.release()
         return step
 

@@ -57,9 +57,9 @@ class Run:
         setup: The problem set up from it: surface, summits, patches, micro model.
         scene: The scene with values for its auto keys.
         seconds: Wall time of each phase so far [s].
-        table: The patch laws, once made.
+        table: The patch laws, once made, counted from first touch.
         coupling: What finds the load steps, once made.
-        steps: The load steps accepted so far.
+        steps: The load steps accepted so far, counted from first touch.
         fields: The states that the fields of chosen load steps are written from.
         position: Position in the load history after them.
     """
@@ -131,7 +131,7 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         coupling = self.make_coupling()
-        stepper = LoadStepper(coupling, self.scene.loading.load_history, self.position)
+        stepper = LoadStepper(coupling, self.setup.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
@@ -145,7 +145,7 @@ class Run:
                         step = conducting(step, coupling, self.setup)
                 self.steps.append(self._checked(step))
                 self.make_contact(last=self.finished)
-                yield self.steps[-1]
+                yield self.steps[-1].counted_from(self.setup.zero)
 
     def make_contact(self, *, last: bool = True) -> None:
         """Record the contact of the last load step if the scene asks for it, once.
@@ -190,7 +190,7 @@ class Run:
 
     def _has_unloaded(self) -> bool:
         """Tell whether the plastic depth at the last load step is not that of rising loads."""
-        history = self.scene.loading.load_history
+        history = self.setup.load_history
         return self.scene.micro.hardness is not None and self.position.is_below_past(history)
 
     @property
@@ -202,7 +202,7 @@ class Run:
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        return self.position.is_at_end(self.scene.loading.load_history)
+        return self.position.is_at_end(self.setup.load_history)
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
@@ -255,12 +255,20 @@ class Run:
         return [face.digest for face in faces if face is not None and face.digest]
 
     @property
+    def laws(self) -> LawTable | None:
+        """The patch laws as they are shown, counted from the zero of the load; None without any."""
+        zero = self.setup.zero
+        if self.table is None or not zero:
+            return self.table
+        return self.table.counted_from(self.scene.loading.zero, zero)
+
+    @property
     def law_bytes(self) -> bytes:
         """The law file's bytes; empty as long as there are no laws."""
         return b"" if self.table is None else law_bytes(self.table)
 
     def history(self) -> History:
-        """Return the load steps accepted so far, with times and notes."""
+        """Return the load steps accepted so far, counted from the zero, with times and notes."""
         steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
         notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
         notes += self._recorder.notes
@@ -274,16 +282,17 @@ class Run:
             notes += conductance_notes(
                 self.steps, self.scene.conductance, with_laws=self.setup.uses_laws
             )
-        by_force = self.scene.loading.load_history.quantity == "force"
+        by_force = self.setup.load_history.quantity == "force"
         accuracy = verdict(steps, self.given.accuracy, unmeasured(self.setup), by_force=by_force)
         kept = [] if accuracy is None else [accuracy.sentence]
+        zero = self.setup.zero
         return History(
-            steps=steps,
+            steps=tuple(step.counted_from(zero) for step in steps),
             patches=self.setup.regions or self.setup.patches,
             seconds=self.times,
             notes=(*kept, *notes, *error_notes(self.steps), *mesh_notes),
             accuracy=accuracy,
-            reference=record,
+            reference=None if record is None else record.counted_from(zero),
             contact_records=self.contacts,
         )
 

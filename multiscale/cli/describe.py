@@ -77,7 +77,9 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         terminal.show_plan(comm, run.setup)
         with terminal.following(comm) as (begun, _):
             run.observe = terminal.counting(begun)
-            table = run.make_laws()
+            run.make_laws()
+        table = run.laws
+        assert table is not None
 
         def write() -> list[Path]:
             from multiscale.conductances import conducts_of

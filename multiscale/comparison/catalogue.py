@@ -37,6 +37,7 @@ from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import (
     LAW_BLOCK_CELLS,
     block_section,
+    load_history_on,
     make_surface,
     patch_grid,
 )
@@ -201,12 +202,14 @@ class _Catalogue:
     @property
     def _fine(self) -> float | None:
         """Edges of tetrahedra that fit the contacts; None where they are not known."""
-        section, loads = self._scene.reference, self._scene.loading.load_history
+        section, loads = self._scene.reference, self._scene.loading
         if section.hexahedral or section.fine:
             return section.fine
-        if loads.quantity == "force" or loads.tilt is None:
+        if loads.approach is None or loads.tilt == "free":
             return None
-        return suggested_fine(make_surface(self._scene), loads.largest, tilt=loads.tilt)
+        surface = make_surface(self._scene)
+        largest = load_history_on(self._scene, (surface,)).largest
+        return suggested_fine(surface, largest, tilt=loads.tilt)
 
 
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:

@@ -100,7 +100,7 @@ def newton_choice(setup: ProblemSetup, table: LawTable | None = None) -> NewtonC
         return NewtonChoice(True, "the counter-body, a half-space, is in the compliance of patches")
     if coupling.newton != "auto":
         return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
-    patches, steps = setup.patches.count, setup.scene.loading.load_history.count
+    patches, steps = setup.patches.count, setup.load_history.count
     compliance, full = CYCLES_PER_PATCH * patches, full_cycles(setup, steps)
     fewer = "fewer" if compliance < full else "more"
     unless = "" if compliance < full or table or setup.uses_summits else _UNLESS_FLAT
@@ -164,7 +164,7 @@ def make_table(
     if kind == "isolated":
         ends, love = setup.largest_closures, setup.scene.coupling.love
         return isolated_laws(model, setup.patches, closure_ends=ends, love=love, **common)
-    load_history, displacements = setup.scene.loading.load_history, None
+    load_history, displacements = setup.load_history, None
     if has_body_term(setup):  # otherwise rows are those of a half-space, and so are closures
         dense = newton_choice(setup).condensed
         displacements = patch_displacements(setup, comm, dense=dense)
@@ -197,7 +197,7 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
     if setup.samples:
         return face_coupling(setup, made, comm)
     condensed = newton_choice(setup, made).condensed
-    mode, tilt = setup.scene.coupling.interface, setup.scene.loading.load_history.tilt
+    mode, tilt = setup.scene.coupling.interface, setup.load_history.tilt
     if made.path is not None and mode == "patchwise" and tilt is None:
         return FreePlaneCoupling(made, patch_displacements(setup, comm, dense=condensed))
     if condensed:

@@ -93,7 +93,7 @@ def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:
     """
     assert setup.face is not None
     stated, face = setup.scene.law.largest_pressure, setup.face
-    history, body = setup.scene.loading.load_history, setup.bodies.first
+    history, body = setup.load_history, setup.bodies.first
     if history.quantity == "force":
         force = history.largest
         mean = force / face.area

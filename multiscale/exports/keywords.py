@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multiscale.exports.places import made_by, places
+from multiscale.exports.places import made_by, places, zero_text
 from multiscale.exports.sampling import LEAST_PRESSURE, Conducts, LawSample, sample_patch
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -30,13 +30,13 @@ _BY_HAND = """
 CalculiX does not know the pressure of such a law in its heat conduction, and would take the first
 row, without heat. Write *GAP CONDUCTANCE with the value at your pressure below it."""
 
-_HEAD = f"""\
+_HEAD = """\
 Contact laws of a rough surface, written by patchlaw.
 Units: mm, N, MPa. One surface interaction per law, pressure [MPa] over overclosure [mm].
-Overclosure 0: a rigid plane at the height of the highest point of the roughness. Flat faces of
+Overclosure 0: a rigid plane at the height of {zero}. Flat faces of
 the mesh that just touch stand for this state; the mean plane of the heights lies below, as stated.
 The tables lie on the laws at their rows. Straight lines between them are within the stated error
-of the pressure, or of {LEAST_PRESSURE:g} of the largest pressure of the law where that is more."""
+of the pressure, or of {least:g} of the largest pressure of the law where that is more."""
 _ABAQUS = "Beyond the last row Abaqus continues the last line: the laws are not known there."
 _CALCULIX = """\
 The last row of each table continues the tangent beyond the end of the law, because CalculiX keeps
@@ -108,10 +108,11 @@ def calculix_text(table: LawTable, tolerance: float, conducts: Conducts | None =
 
 
 def _text(table: LawTable, tolerance: float, remarks: str, most: int | None, heat: Heat) -> str:
-    lines = _comments(f"{_HEAD}\n{remarks}\nMade by: {made_by(table)}")
+    head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE)
+    lines = _comments(f"{head}\n{remarks}\nMade by: {made_by(table)}")
     for place, law in zip(places(table), table.laws, strict=True):
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
-        lines += _comments(f"mean plane {law.initial_separation:.9g} mm below the highest point")
+        lines += _comments(f"mean plane {law.initial_separation:.9g} mm below overclosure 0")
         sample = sample_patch(law, place, tolerance=tolerance, most=most)
         if not len(sample):
             lines += _comments(_OPEN.format(law.first_touch))

@@ -13,7 +13,7 @@ import inspect
 from bisect import bisect_right
 from collections.abc import Callable
 
-from multiscale.exports.places import made_by, places
+from multiscale.exports.places import made_by, places, zero_text
 from multiscale.exports.sampling import no_function
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -89,8 +89,8 @@ Contact law of {subject} of a rough surface, written by patchlaw, for 4C.
           Python_Filename: {name}
           Offset: 0.0
 
-Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of the
-highest point of the roughness. Flat faces of the mesh that just touch stand for this state; the
+Units: mm, N, MPa. The closure is -(gap + offset). Closure 0: a rigid plane at the height of
+{zero}. Flat faces of the mesh that just touch stand for this state; the
 mean plane of the roughness lies {below:.9g} mm below.
 {extent}{range}
 The values are those of patchlaw's own interpolant, to rounding.
@@ -119,6 +119,7 @@ def law_modules(table: LawTable) -> dict[str, str]:
         head = _HEAD.format(
             subject=place.subject,
             name=name,
+            zero=zero_text(table),
             below=law.initial_separation,
             extent=f"Patch: {place.extent}.\n" if place.extent else "",
             range=(_OPEN if law.is_open else _RANGE).format(*law.range),

@@ -60,6 +60,15 @@ def made_by(table: LawTable) -> str:
     return plain(", ".join(f"{name} {value}" for name, value in table.made_by.items()))
 
 
+def zero_text(table: LawTable) -> str:
+    """Return what the closures of laws count from, as prose."""
+    named = {
+        "first touch": "the highest point of the roughness",
+        "mean plane": "the mean of the heights of the roughness",
+    }
+    return named.get(table.zero, f"the {table.zero} of the heights of the roughness")
+
+
 def plain(text: str) -> str:
     """Return a text that can stand in comments and docstrings: ASCII on one line, no quotes."""
     ascii_text = text.encode("ascii", "replace").decode().replace("\\", "/").replace('"', "'")

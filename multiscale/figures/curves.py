@@ -36,9 +36,10 @@ def history_figure(history: Any, kind: str) -> Figure:
     if len(history) <= MOST_MARKED:
         look |= {"marker": "o", "ms": 3.0}
     pressure = np.append(0.0, history.mean_pressure_MPa)
-    # The first touch of a tilted plane is not at zero approach of the middle.
+    # The first touch of a tilted plane is not at that of the middle.
     level = not any(any(step.tilt) for step in history.steps)
-    approach = 1e3 * np.append(0.0 if level else np.nan, history.approach_mm)
+    touch = -history.steps[0].zero_mm if level and len(history) else np.nan
+    approach = 1e3 * np.append(touch, history.approach_mm)
     force.plot(approach, pressure, **look)
     area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
     gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)

@@ -6,12 +6,13 @@ Theory: demos/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import InputError, PatchGrid, Regions
+from geometry.zero import FIRST_TOUCH
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import PlanePath
 from multiscale.readable import Caution, Detail, number, percent, quantity
@@ -69,6 +70,26 @@ class LawTable:
         if isinstance(self.patches, Regions):
             raise InputError("these laws are not those of patches", value=self.patches.names)
         return self.patches
+
+    @property
+    def zero(self) -> str:
+        """What closures count from, see `geometry.Zero`."""
+        return self.made_by.get("zero", FIRST_TOUCH)
+
+    def counted_from(self, name: str, zero: float) -> LawTable:
+        """Return the laws with approach and closure counted from another height.
+
+        Args:
+            name: What it is.
+            zero: Approach at which the plane is at this height [mm].
+        """
+        path = self.path
+        return replace(
+            self,
+            laws=tuple(law.shifted(-zero) for law in self.laws),
+            made_by=self.made_by | {"zero": name},
+            path=None if path is None else replace(path, approach=path.approach - zero),
+        )
 
     def notes(self, tolerance: float) -> Iterator[str]:
         """Yield what a report says of the laws: their errors, and whether they were repaired.

@@ -197,7 +197,7 @@ class PatchLaw:
     def _check_range(self, closures: Array) -> None:
         start, end = self.range
         # a converged closure may exceed the end of the table by its own rounding
-        if np.any(closures > end * (1 + 1e-12)):
+        if np.any(closures > end + 1e-12 * abs(end)):
             problem = "closure beyond the end of the patch law"
             if not self.is_function:
                 problem += ", where pressure stops being a function of closure"

@@ -84,6 +84,7 @@ class LoadStep:
         gap_conductance_W_per_K: What of it passes through gas and radiation [W/K].
         electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
             none.
+        zero_mm: Approach from first touch of the height that approach and closures count from [mm].
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -118,6 +119,7 @@ class LoadStep:
     thermal_conductance_W_per_K: float | None = None
     gap_conductance_W_per_K: float | None = None
     electrical_conductance_S: float | None = None
+    zero_mm: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -207,6 +209,27 @@ class LoadStep:
             meshes=tuple((approach, ratio * force, area) for approach, force, area in self.meshes),
             patches=patches,
         )
+
+    def counted_from(self, zero: float) -> LoadStep:
+        """Return the load step with approach and closures counted from another height.
+
+        Args:
+            zero: Approach at which the plane is at this height, as this load step counts it [mm].
+        """
+        if not zero:
+            return self
+        return replace(
+            self,
+            approach_mm=self.approach_mm - zero,
+            zero_mm=self.zero_mm + zero,
+            meshes=tuple((approach - zero, *others) for approach, *others in self.meshes),  # type: ignore[misc]
+            patches=replace(self.patches, closure_mm=self.patches.closure_mm - zero),
+        )
+
+    @property
+    def first_touch_approach_mm(self) -> float | None:
+        """Approach counted from first touch [mm]; None where `approach_mm` counts from there."""
+        return self.approach_mm + self.zero_mm if self.zero_mm else None
 
     @property
     def tilt_x(self) -> float:

@@ -119,6 +119,8 @@ class LoadHistory:
         steps: Load steps per leg.
         cycles: How often the points follow each other.
         tilt: Slopes of the plane; None lets it turn freely.
+        zero: Approach at the height that approaches are shown from; it, and an approach among the
+            points, counts from first touch [mm].
         force_change: Largest change of the force in a step relative to the largest force so far,
             that of the step included; steps that exceed it are halved. The first step with a force
             is not limited. None sets no limit.
@@ -130,6 +132,7 @@ class LoadHistory:
     tilt: tuple[float, float] | None = (0.0, 0.0)
     force_change: float | None = None
     cycles: int = 1
+    zero: float = 0.0
 
     @property
     def targets(self) -> list[float]:
@@ -169,6 +172,12 @@ class LoadHistory:
         if self.quantity == "force":
             return Control(force=value, tilt=self.tilt)
         return Control(approach=value, tilt=self.tilt)
+
+    def shown(self, control: Control) -> Control:
+        """Return a control whose approach counts from the zero, as users see it."""
+        if control.approach is None:
+            return control
+        return replace(control, approach=control.approach - self.zero)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -294,9 +303,10 @@ class LoadStepper:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws)
                 if beyond or abs(ahead[-1] - last) <= self.position.smallest:
+                    shown = self._load_history.shown(control)
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
                     raise NotConverged(
-                        f"load step {self.position.steps + 1} ({control})",
+                        f"load step {self.position.steps + 1} ({shown})",
                         reason=error.reason,
                         iterations=error.iterations,
                         remedy=halved + error.remedy,

@@ -47,6 +47,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "lengths_mm": list(setup.surface.lengths),
             "heights_sha256": run.heights,
             "highest_mm": setup.surface.highest,
+            "zero_below_highest_mm": setup.zero,
             **(_summits(setup) if setup.uses_summits else {}),
         },
         "patches": None if setup.samples else list(setup.patches.grid),

@@ -73,13 +73,16 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
         setup: The problem set up from the scene.
         run: The run.
     """
-    forced = setup.scene.loading.load_history.quantity == "force"
+    forced = setup.load_history.quantity == "force"
     for name, value, error, unit, given in (
         ("force", last.force_N, last.force_error_N, "N", forced),
         ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
     ):
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
+    if (approach := last.first_touch_approach_mm) is not None:
+        above = f"which is {quantity(last.zero_mm, 'mm')} above the {setup.scene.loading.zero}"
+        yield "approach from first touch", quantity(approach, "mm"), above
     face = setup.patches.area * setup.patches.count
     if not isinstance(run.history().patches, PatchGrid) and setup.face is not None:
         face = setup.face.area

@@ -81,7 +81,7 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
-    history, table = run.history(), run.table
+    history, table = run.history(), run.laws
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
         files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
@@ -201,8 +201,8 @@ def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
     if name == "contact":
         return run.contacts[-1].plot()
     if name == "face" and face is not None:
-        return figures.face_figure(face, run.steps[-1])
+        return figures.face_figure(face, run.history().steps[-1])
     if name == "pressures":
         return figures.pressure_figure(run.history())
-    assert run.table is not None
-    return figures.law_figure(run.table)
+    assert run.laws is not None
+    return figures.law_figure(run.laws)

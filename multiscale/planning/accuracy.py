@@ -16,7 +16,7 @@ from dataclasses import replace
 from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
 from multiscale.couplings.contact import SLOPES, OnBody, on_body
-from multiscale.measured_errors import error_probe
+from multiscale.measured_errors import ZERO, error_probe
 from multiscale.planning.auto_keys import (
     MOST_HEIGHTS,
     auto_keys,
@@ -98,20 +98,22 @@ class _Search(MeshSearch):
                 model = replace(model, surface=surface, highest=surface.highest)
             else:
                 model = replace(model, surface=setup.surface).resampled(cells)
-            errors = self._measured(setup, model, body)
-            others = sum(errors.values()) - errors["grid"]
+            found = replace(setup, surface=model.surface) if new_surface else setup
+            errors = self._measured(found, model, body)
+            by_cells = errors["grid"] + (errors.get(ZERO, 0.0) if new_surface else 0.0)
+            others = sum(errors.values()) - by_cells
             allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
             last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
-            if not may_refine or last or errors["grid"] <= allowed:
+            if not may_refine or last or by_cells <= allowed:
                 break
-            cells = _scaled(cells, refinement(errors["grid"] / allowed, _ORDER))
+            cells = _scaled(cells, refinement(by_cells / allowed, _ORDER))
         if new_surface:
             setup = self.build(with_value(setup.scene, "surface.grid", model.surface.grid))
         return replace(setup, micro=model), errors
 
     def _measured(self, setup: ProblemSetup, model: HalfSpaceModel, body: OnBody) -> Errors:
         """Return the errors relative to the force, at the load where their sum is largest."""
-        load_history = self.given.loading.load_history
+        load_history = setup.load_history
         order = SLOPES if setup.finite_slopes else 0
         probe = replace(error_probe(setup, body), model=model, by_laws=False)
         worst: Errors = {"grid": 0.0}

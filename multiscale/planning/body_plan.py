@@ -102,7 +102,7 @@ def _sample_warnings(setup: ProblemSetup, face: FaceFacts) -> Iterator[str]:
                 f"the heights of {region.name} do not continue periodically: their sample is four "
                 "mirror images, twice as long and wide"
             )
-    history, second = setup.scene.loading.load_history, setup.materials.second
+    history, second = setup.load_history, setup.materials.second
     if setup.both_give_way and second is not None and history.quantity == "force":
         sunk = _HALF_SPACE * history.largest / face.area * side * second.surface_compliance
         yield (

@@ -46,7 +46,7 @@ def measured_mesh_error(setup: ProblemSetup) -> float:
     Raises:
         NotConverged: When the contact problem cannot be solved.
     """
-    coupling, load_history = make_reference(setup, None), setup.scene.loading.load_history
+    coupling, load_history = make_reference(setup, None), setup.load_history
     step = coupling.press(load_history.control(load_history.largest))
     (found,) = coupling.record([step]).with_errors([step])
     if not step.force_N > 0.0:

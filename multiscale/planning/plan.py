@@ -62,7 +62,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     excess = setup.surface.highest - setup.surface.heights.max()
     known = setup.plane_at_largest_load is not None
     size = setup.largest_interference if known else roughness(setup.surface).sq
-    if excess > 0.1 * size:
+    if not setup.zero and excess > 0.1 * size:
         x, y = setup.surface.highest_point
         yield (
             "the approach counts from the interpolant's highest point, "
@@ -240,6 +240,9 @@ def _load(setup: ProblemSetup) -> str:
     way = ", ".join(quantity(point, unit, 6) for point in load_history.points)
     again = f", {load_history.cycles} times" * (load_history.cycles > 1)
     text = f"{load_history.count} steps to {what} of {way}{again}"
+    if setup.zero:
+        depth = quantity(setup.zero, "mm", 4)
+        text += f", approaches from the {setup.scene.loading.zero}, {depth} below first touch"
     if load_history.force_change is not None:
         text += f", halved where the force changes by more than {load_history.force_change:.3g}"
     if load_history.tilt is None:
@@ -247,7 +250,7 @@ def _load(setup: ProblemSetup) -> str:
     elif any(load_history.tilt):
         text += f", tilted by {_slopes(load_history.tilt)}"
     if forced and setup.plane_at_largest_load is not None:
-        approach = quantity(setup.plane.approach, "mm", 3)
+        approach = quantity(setup.plane.approach - setup.zero, "mm", 3)
         text += f"; on a half-space its approach is about {approach}"
     return text
 

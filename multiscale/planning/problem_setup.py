@@ -38,6 +38,7 @@ from multiscale.setup.surface_and_block import (
     Bulk,
     check_load,
     check_patches,
+    load_history_on,
     make_shape,
     make_surface,
     make_surfaces,
@@ -114,7 +115,7 @@ def _setup(
     materials, face = materials_in_contact(scene, faces), faces[0]
     shape = make_shape(scene, surface) if face is None else None
     height = shape.height if shape else face.depth if face else 0.0
-    check_load(scene, surface, Bulk(surface.area, height, materials.first.young_modulus))
+    check_load(scene, (surface,), Bulk(surface.area, height, materials.first.young_modulus))
     patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
     modulus = materials.contact_modulus
     setup = partial(
@@ -141,11 +142,12 @@ def _setup(
         model = model.resampled((int(known[0]), int(known[1])))
     _refuse_without_summits(scene, model)
     chosen = time.perf_counter()
-    plane = prescribed_plane(scene.loading.load_history, surface)
+    load_history = load_history_on(scene, (surface,))
+    plane = prescribed_plane(load_history, surface)
     isolated_or_meshed = scene.kind == "isolated" or scene.on_mesh  # whose laws end there
     if plane is None and (isolated_or_meshed or not isinstance(model, HalfSpaceModel)):
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
-        plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
+        plane = plane_at_largest_load(load_history, coupling, surface)
     seconds["load estimate"] = time.perf_counter() - chosen
     return setup(micro=model, plane_at_largest_load=plane, seconds=seconds)
 
@@ -228,4 +230,4 @@ def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> R
     model = fine.resampled((min(x, _ESTIMATE_CELLS), min(y, _ESTIMATE_CELLS)))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))
-    return plane_at_largest_load(scene.loading.load_history, coupling, surface)
+    return plane_at_largest_load(load_history_on(scene, (surface,)), coupling, surface)

@@ -8,6 +8,7 @@ from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
+from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import ClusterNodes
 from multiscale.scene.scene import Scene
 from multiscale.setup.memory import check_memory
@@ -19,6 +20,7 @@ from multiscale.setup.surface_and_block import (
     Bulk,
     block_material,
     check_load,
+    load_history_on,
     make_shape,
     sample_surface,
 )
@@ -45,7 +47,8 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         face = face_of_block(scene, shape)
     samples = region_samples(scene, face.materials, second_material(scene, counter))
     surface, materials = samples[0].surfaces[0], samples[0].materials
-    check_load(scene, surface, Bulk(face.area, face.depth, materials.first.young_modulus))
+    surfaces = tuple(one for region in samples for one in region.surfaces)
+    check_load(scene, surfaces, Bulk(face.area, face.depth, materials.first.young_modulus))
     model = HalfSpaceModel(
         surface,
         contact_modulus=materials.contact_modulus,
@@ -65,7 +68,7 @@ def representative_setup(scene: Scene, nodes: ClusterNodes, faces: Faces) -> Pro
         face=face,
         counter_face=counter,
         samples=samples,
-        plane_at_largest_load=_sample_plane(scene, model),
+        plane_at_largest_load=_sample_plane(load_history_on(scene, surfaces), model),
         seconds={"surface": time.perf_counter() - began},
     )
 
@@ -94,12 +97,12 @@ def face_of_block(scene: Scene, shape: BlockShape) -> FaceFacts:
     )
 
 
-def _sample_plane(scene: Scene, model: HalfSpaceModel) -> RigidPlane | None:
+def _sample_plane(history: LoadHistory, model: HalfSpaceModel) -> RigidPlane | None:
     """Return the plane on a sample at the largest approach, or None under a force.
 
     The body takes part of the approach, and the plane is an upper bound.
     """
-    surface, history = model.surface, scene.loading.load_history
+    surface = model.surface
     if history.quantity == "force":
         return None
     mean = model.reference_height - surface.mean_height

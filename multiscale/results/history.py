@@ -127,7 +127,7 @@ class History:
 
     step = Column("Number of the load step, from 1", heading="step")
     approach_mm = Column(
-        "Approach of the rigid plane, counted from the first touch", "mm",
+        "Approach of the rigid plane, counted from the zero of the load", "mm",
         heading="approach", error="approach_error_mm",
     )  # fmt: skip
     force_N = Column(
@@ -188,6 +188,10 @@ class History:
         heading="electrical conductance", table="more",
     )  # fmt: skip
     stiffness_error_N_per_mm = Column("Error of the stiffness, where cells yield anew", "N/mm")
+    first_touch_approach_mm = Column(
+        "Approach counted from first touch, where approach_mm counts from another height", "mm",
+        heading="from first touch", table="more",
+    )  # fmt: skip
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions

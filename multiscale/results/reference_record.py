@@ -136,6 +136,15 @@ class ReferenceRecord:
             for step, one, other in zip(steps, force, approach, strict=True)
         )
 
+    def counted_from(self, zero: float) -> ReferenceRecord:
+        """Return the record with approaches counted from another height.
+
+        Args:
+            zero: Approach at which the plane is at this height [mm].
+        """
+        limit = replace(self.approach, value=self.approach.value - zero)
+        return replace(self, approach_mm=self.approach_mm - zero, approach=limit)
+
     def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
         """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
 

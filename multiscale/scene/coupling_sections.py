@@ -5,11 +5,24 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from geometry.errors import InputError
+from geometry.zero import ALLOWED, FIRST_TOUCH, Zero
 from multiscale.loading.stepper import LoadHistory
-from multiscale.scene.quantities import Approaches, Forces, Length, Tilt
+from multiscale.scene.quantities import Approaches, Forces, Length, Tilt, check_from_zero
 from multiscale.scene.sections import Cells, Number, Section
+
+
+def _zero(name: str) -> str:
+    try:
+        return Zero(name).name
+    except InputError:
+        problem = f"is no height that approaches count from (allowed: {ALLOWED})"
+        raise ValueError(problem) from None
+
+
+ZeroName = Annotated[str, Field(strict=True), AfterValidator(_zero)]
 
 
 class CouplingSection(Section):
@@ -140,9 +153,15 @@ class ReferenceSection(Section):
 class LoadSection(Section):
     """The motion of the rigid plane: turning points of its approach, or of the force on it."""
 
+    zero: ZeroName = FIRST_TOUCH
+    """Height that the approach counts from, here and in all results and laws: ``first touch``, the
+    highest point of the surface; ``mean plane``, the mean of its heights; or ``quantile 0.001``,
+    the height that 0.1 % of its area exceeds, with any number between 0 and 1. On measured surfaces
+    one point decides about first touch, and no single one about the others. Approaches may be
+    negative there."""
     approach: Approaches | None = None
-    """Approach of the rigid plane, counted from first touch, or a list of turning points. Exactly
-    one of ``approach`` and ``force`` is given."""
+    """Approach of the rigid plane, counted from ``zero``, or a list of turning points. Exactly one
+    of ``approach`` and ``force`` is given."""
     force: Forces | None = None
     """Force on the rigid plane, or a list of turning points."""
     steps: Annotated[int, Field(ge=1, le=1_000_000, strict=True)] = 8
@@ -155,6 +174,15 @@ class LoadSection(Section):
     force_change: Annotated[Number, Field(ge=1e-3, lt=1)] | None = None
     """Largest change of the force in one step, relative to the largest force so far; a step that
     exceeds it is halved. When not given no step is halved."""
+
+    @field_validator("approach")
+    @classmethod
+    def _from_first_touch(
+        cls, approach: tuple[float, ...] | None, info: ValidationInfo
+    ) -> tuple[float, ...] | None:
+        if approach is not None and info.data.get("zero") == FIRST_TOUCH:
+            check_from_zero(approach)
+        return approach
 
     @model_validator(mode="after")
     def _one_load(self) -> Self:

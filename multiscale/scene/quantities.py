@@ -143,7 +143,7 @@ def parse_duration(text: str) -> float:
 
 
 def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
-    """Turn one quantity, or a list of them, into the turning points of a load.
+    """Turn one quantity, or a list of them, into the turning points of a load from zero.
 
     Args:
         value: A quantity, or a list of quantities.
@@ -153,18 +153,40 @@ def parse_turning_points(value: Any, unit: str) -> tuple[float, ...]:
         The magnitudes in ``unit``.
 
     Raises:
-        ValueError: When a value is no quantity of that dimension, the list is empty, a value is
-            negative, the first is zero or one repeats the one before.
+        ValueError: As for `parse_points`, or when a value is negative or the first is zero.
+    """
+    points = parse_points(value, unit)
+    check_from_zero(points)
+    return points
+
+
+def check_from_zero(points: tuple[float, ...]) -> None:
+    """Raise a ValueError when turning points are negative, or the first is zero."""
+    if not points[0] > 0.0:
+        raise ValueError("must be greater than 0")
+    if min(points) < 0.0:
+        raise ValueError("must not turn below 0")
+
+
+def parse_points(value: Any, unit: str) -> tuple[float, ...]:
+    """Turn one quantity, or a list of them, into turning points of any sign.
+
+    Args:
+        value: A quantity, or a list of quantities.
+        unit: Target unit in pint's notation.
+
+    Returns:
+        The magnitudes in ``unit``.
+
+    Raises:
+        ValueError: When a value is no quantity of that dimension, the list is empty, or one repeats
+            the one before.
     """
     listed = isinstance(value, list | tuple)
     points = tuple(parse_quantity(one, unit) for one in (value if listed else [value]))
     allowed = f"(allowed: a quantity such as {_UNITS[unit].example}, or a list of turning points)"
     if not points:
         raise ValueError(f"is an empty list {allowed}")
-    if not points[0] > 0.0:
-        raise ValueError("must be greater than 0")
-    if min(points) < 0.0:
-        raise ValueError("must not turn below 0")
     if any(one == other for one, other in pairwise(points)):
         raise ValueError(f"repeats a turning point {allowed}")
     return points
@@ -218,9 +240,7 @@ Length = Annotated[float, _parser("mm"), _schema("mm")]
 Pressure = Annotated[float, _parser("MPa"), _schema("MPa")]
 SpectralAmplitude = Annotated[float, _parser("mm**4"), _schema("mm**4")]
 Slope = Annotated[float, _parser(""), _schema("")]
-Approaches = Annotated[
-    tuple[float, ...], _parser("mm", parse_turning_points), _schema("mm", several=True)
-]
+Approaches = Annotated[tuple[float, ...], _parser("mm", parse_points), _schema("mm", several=True)]
 Forces = Annotated[
     tuple[float, ...], _parser("N", parse_turning_points), _schema("N", several=True)
 ]

@@ -20,13 +20,15 @@ from geometry import (
     find_asperities,
 )
 from geometry.plausibility import check_finite_slopes
+from geometry.zero import Zero
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from multiscale.laws.refinement import MOST_ROWS
+from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies
 from multiscale.setup.reference_meshes import ReferenceMeshes
 from multiscale.setup.samples import RegionSamples
-from multiscale.setup.surface_and_block import located
+from multiscale.setup.surface_and_block import load_history_on, located
 
 Array = NDArray[np.float64]
 
@@ -196,6 +198,27 @@ class ProblemSetup:
     def has_block(self) -> bool:
         """Whether the surface is on a block instead of a half-space."""
         return self.scene.kind != "analytic"
+
+    @cached_property
+    def load_history(self) -> LoadHistory:
+        """The load history, counted from first touch."""
+        return load_history_on(self.scene, self.rough_surfaces)
+
+    @property
+    def rough_surfaces(self) -> tuple[Surface, ...]:
+        """The surface, or all samples of all regions."""
+        samples = tuple(one for region in self.samples for one in region.surfaces)
+        return samples or (self.surface,)
+
+    @property
+    def zero(self) -> float:
+        """Approach from first touch of the height that approaches are shown from [mm]."""
+        return self.load_history.zero
+
+    @cached_property
+    def zero_error(self) -> float:
+        """Error of that height [mm]."""
+        return Zero(self.scene.loading.zero).error(self.surface)
 
     @property
     def uses_laws(self) -> bool:

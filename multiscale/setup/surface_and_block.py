@@ -23,6 +23,8 @@ from geometry import (
 )
 from geometry.files.reading import surface_of
 from geometry.preparation import prepared
+from geometry.zero import Zero
+from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import BlockSection, CounterSurfaceSection, SurfaceSection
 
@@ -232,14 +234,42 @@ def check_patches(scene: Scene, surface: Surface) -> None:
             )
 
 
-def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
+def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
+    """Return the load history of a scene, counted from first touch.
+
+    Args:
+        scene: The scene, whose approaches count from its zero.
+        surfaces: Its surface, or samples of it.
+
+    Raises:
+        InputError: When the zero is none of the surface, or the plane does not touch it.
+    """
+    loading, history = scene.loading, scene.loading.load_history
+    with located(scene, "load.zero"):
+        zero = Zero(loading.zero).depth(surfaces)
+    if loading.approach is None:
+        return replace(history, zero=zero)
+    points = tuple(value + zero for value in history.points)
+    if not points[0] > 0.0 or min(points) < 0.0:
+        raise InputError(
+            f"does not touch the surface, or turns before first touch, {zero:.6g} mm above the "
+            f"{loading.zero}",
+            key="load.approach",
+            value=list(loading.approach),
+            allowed=f"> {-zero:.6g} mm",
+            file=scene.file,
+        )
+    return replace(history, points=points, zero=zero)
+
+
+def check_load(scene: Scene, surfaces: Sequence[Surface], body: Bulk) -> None:
     """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
     Numbers of load steps that there will not be are refused, too.
 
     Args:
         scene: The scene.
-        surface: Its surface.
+        surfaces: Its surface, or samples of it.
         body: Size and stiffness of its body.
     """
     loading, fields = scene.loading, scene.output.fields
@@ -252,8 +282,9 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             allowed=f"numbers up to {count}",
             file=scene.file,
         )
-    resolved = _ROUNDING * float(np.abs(surface.heights).max())
-    if loading.approach is not None and 0.0 < max(loading.approach) < resolved:
+    resolved = _ROUNDING * max(float(np.abs(one.heights).max()) for one in surfaces)
+    approaches = load_history_on(scene, surfaces).points
+    if loading.approach is not None and 0.0 < max(approaches) < resolved:
         raise InputError(
             "is lost in the rounding of the heights",
             key="load.approach",
@@ -262,14 +293,14 @@ def check_load(scene: Scene, surface: Surface, body: Bulk) -> None:
             file=scene.file,
         )
     _check_hardness(scene, body.area)
-    _check_gap(scene, surface)
+    _check_gap(scene, surfaces[0], approaches)
     if scene.kind == "analytic":
         return
     if loading.force is not None:
         key, points = "load.force", loading.force
         most, named, unit = body.young_modulus * body.area, "E times area", "N"
     else:
-        key, points = "load.approach", loading.approach or ()
+        key, points = "load.approach", approaches
         most, named, unit = body.height, "the body's height", "mm"
     if max(points) > most:
         raise InputError(
@@ -296,18 +327,18 @@ def _check_hardness(scene: Scene, area: float) -> None:
     )
 
 
-def _check_gap(scene: Scene, surface: Surface) -> None:
-    """Refuse approaches that leave a periodic surface no gap, without a hardness."""
+def _check_gap(scene: Scene, surface: Surface, approaches: Sequence[float]) -> None:
+    """Refuse approaches from first touch that leave a periodic surface no gap, unless it yields."""
     points, most = scene.loading.approach, surface.highest - surface.mean_height
     if points is None or not scene.surface.periodic or scene.law.representative:
         return
-    if scene.micro.hardness is None and max(points) >= most:
+    if scene.micro.hardness is None and (deepest := max(approaches)) >= most:
         raise InputError(
             "leaves no gap on the periodic surface, whose mean displacement counts as none",
             key="load.approach",
             value=list(points),
-            allowed=f"less than {most:.6g} mm, from the highest point to the mean height; beyond "
-            "it load.force",
+            allowed=f"less than {most - deepest + max(points):.6g} mm, where the plane reaches the "
+            "mean height; beyond it load.force",
             file=scene.file,
         )
 

@@ -22,7 +22,7 @@ FLOORS = {
         "blocked_spline cores errors legendre_modes slope_search small_caches",
         "checks collective interpolant materials missing packages regions",
         "face_frame filters spectrum surface",
-        "mirroring patches statistics summits synthesis",
+        "mirroring patches statistics summits synthesis zero",
         "plausibility",
         "facing preparation rigid_plane",
         "files",

@@ -34,10 +34,10 @@ def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro)
 
 
 CAUSES = {
-    "analytic": {"slopes", "grid"},
-    "concurrent": {"body", "slopes", "grid"},
-    "consistent": {"laws", "body", "slopes", "grid"},
-    "isolated": {"laws", "body", "slopes", "grid"},
+    "analytic": {"slopes", "zero", "grid"},
+    "concurrent": {"body", "slopes", "zero", "grid"},
+    "consistent": {"laws", "body", "slopes", "zero", "grid"},
+    "isolated": {"laws", "body", "slopes", "zero", "grid"},
 }
 
 
@@ -188,7 +188,7 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
     kept = json.loads((tmp_path / "provenance.json").read_text())
     *before, last = kept["errors_N"]
     assert before == [{} for _ in before]
-    assert set(last) == {"slopes", "grid"}
+    assert set(last) == {"slopes", "zero", "grid"}
     assert sum(last.values()) == pytest.approx(run.steps[-1].force_error_N, rel=1e-12)
     assert kept["memory_bytes"] > 1e6
     assert kept["decision"] is None

@@ -61,7 +61,7 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     assert resolved.surface.grid == setup.surface.grid == setup.micro.surface.grid
     assert resolved.micro.model == "half-space"
     assert resolved.block.cells == "auto"  # of no mesh
-    assert set(setup.decision.errors) == {"body", "slopes", "grid"}
+    assert set(setup.decision.errors) == {"body", "slopes", "zero", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
     assert dict(statements(setup))["choice"] == setup.decision.sentence
 

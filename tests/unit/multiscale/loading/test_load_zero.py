@@ -1,0 +1,188 @@
+"""What approaches count from changes how load steps and laws are named, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry import InputError
+from geometry.rigid_plane import Control
+from multiscale import Run, Scene, read_laws, run
+from multiscale.exports.export import export_texts
+from multiscale.output.results import write_results
+
+UP = 8e-3 / np.sqrt(2.0)
+"""A deepest approach from first touch that is no rounded number [mm]."""
+ZEROS = ("mean plane", "quantile 0.02")
+
+
+def scene(zero, kind="analytic", depth=0.0, **sections):
+    """Return a scene whose plane comes to the same places whatever its approaches count from."""
+    data = {
+        "surface": {
+            "spectrum": {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.2, "seed": 28},
+            "grid": [24, 24],
+            "lengths": ["1 mm", "1 mm"],
+        },
+        "block": {"young_modulus": "4 GPa", "poisson_ratio": 0.15, "cells": [8, 8, 6]},
+        "patches": {"grid": [2, 2]},
+        "coupling": {"kind": kind} if kind else {},
+        "load": {"zero": zero, "approach": [UP - depth, 0.5 * UP - depth], "steps": 2},
+        "output": {"figures": False, "report": False},
+    }
+    if "law" in sections:  # which has no patches
+        del data["patches"]
+    return Scene.from_dict({name: data.get(name, {}) | sections.get(name, {}) for name in
+                            {*data, *sections}})  # fmt: skip
+
+
+def depth_of(given):
+    return Run(given).setup.zero
+
+
+CASES = {
+    "analytic": {},
+    "concurrent": {},
+    "isolated": {},
+    "consistent": {},
+    "reference": {"reference": {"meshes": 1, "cells": [12, 12, 4]}},
+    "hardness": {"micro": {"hardness": "1 GPa"}},
+    "tilted": {"load": {"tilt": ["3 um/mm", "-2 um/mm"]}},
+    "counter": {"counter_surface": {
+        "spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1, "seed": 3},
+        "grid": [24, 24], "lengths": ["1 mm", "1 mm"],
+    }},
+    "summits": {"micro": {"model": "elliptic"}},
+}  # fmt: skip
+
+
+def pressed(zero, case, depth=0.0):
+    sections = {name: dict(keys) for name, keys in CASES[case].items()}
+    kind = case if case in ("analytic", "concurrent", "isolated", "consistent", "reference") else ""
+    return scene(zero, kind or "analytic", depth, **sections)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_forces_are_those_of_the_same_places(case):
+    known = run(pressed("first touch", case))
+    assert np.isnan(known.first_touch_approach_mm.astype(float)).all()
+    for zero in ZEROS:
+        depth = depth_of(pressed(zero, case))
+        assert depth > 1e-4
+        found = run(pressed(zero, case, depth))
+        # the load steps are the same solutions; approaches of 10 µm lose 1e-17 mm in the shift
+        for name in ("force_N", "contact_area_fraction", "mean_separation_mm", "contacts"):
+            np.testing.assert_allclose(getattr(found, name), getattr(known, name), rtol=1e-12)
+        np.testing.assert_allclose(found.approach_mm + depth, known.approach_mm, atol=1e-15)
+        np.testing.assert_allclose(found.first_touch_approach_mm, known.approach_mm, atol=1e-15)
+        np.testing.assert_allclose(found.closure_mm + depth, known.closure_mm, atol=1e-12)
+        np.testing.assert_allclose(found.patch_pressure_MPa, known.patch_pressure_MPa, rtol=1e-9)
+
+
+def test_a_force_leads_to_the_same_place():
+    load = {"approach": None, "force": "2 N"}
+    known = run(scene("first touch", load=load))
+    for zero in ZEROS:
+        found = run(scene(zero, load=load))
+        depth = found.steps[0].zero_mm
+        np.testing.assert_allclose(found.approach_mm + depth, known.approach_mm, atol=1e-15)
+
+
+def test_laws_of_samples_count_from_the_zero():
+    def of(zero, depth=0.0):
+        sections = {
+            "law": {"kind": "representative"},
+            "surface": {"periodic": True},
+            "block": {"lengths": ["5 mm", "5 mm"]},
+        }
+        return Run(scene(zero, "", depth, **sections))
+
+    known = of("first touch").make_laws()
+    for zero in ZEROS:
+        run_ = of(zero, of(zero).setup.zero)
+        run_.make_laws()
+        law = run_.laws.laws[0]
+        assert law.first_touch == pytest.approx(known.laws[0].first_touch - run_.setup.zero)
+        closure = np.linspace(*known.laws[0].range, 7)
+        np.testing.assert_allclose(
+            law.pressure(closure - run_.setup.zero), known.laws[0].pressure(closure), rtol=1e-9
+        )
+        if zero == "mean plane":
+            assert law.initial_separation == pytest.approx(0.0, abs=1e-15)
+
+
+def test_files_count_from_the_zero(tmp_path):
+    depth, tables = depth_of(scene("mean plane", "consistent")), {}
+    for zero, below in (("first touch", 0.0), ("mean plane", depth)):
+        whole = Run(scene(zero, "consistent", below))
+        list(whole.load_steps())
+        write_results(tmp_path / zero, whole, options=[])
+        tables[zero] = read_laws(tmp_path / zero / "laws.h5")
+        columns = np.genfromtxt(tmp_path / zero / "history.csv", delimiter=",", names=True)
+        np.testing.assert_allclose(columns["approach_mm"], whole.history().approach_mm)
+        text = next(iter(export_texts(tables[zero], "abaqus").values()))
+        assert ("the mean of the heights" in text) == (zero == "mean plane")
+    first, mean = tables["first touch"], tables["mean plane"]
+    assert (first.zero, mean.zero) == ("first touch", "mean plane")
+    for law, other in zip(first.laws, mean.laws, strict=True):
+        closure = np.linspace(*law.range, 9)
+        np.testing.assert_allclose(
+            other.pressure(closure - depth), law.pressure(closure), rtol=1e-9
+        )
+
+
+def test_a_run_goes_on_from_a_checkpoint():
+    given = scene("mean plane", depth=depth_of(scene("mean plane")))
+    whole, half = Run(given), Run(given)
+    known = [step.force_N for step in whole.load_steps()]
+    steps = half.load_steps()
+    next(steps), next(steps)
+    again = Run(given)
+    again.resume(half.steps, half.position, half.state(), half.law_bytes)
+    assert [step.force_N for step in again.load_steps()] == pytest.approx(known[2:], rel=1e-12)
+    np.testing.assert_allclose(again.history().approach_mm, whole.history().approach_mm, atol=0.0)
+
+
+def test_the_error_of_the_zero_is_a_cause():
+    """It is what the plane's force changes by, and counts in full in the approach under a force."""
+    given = scene("first touch")
+    last = run(given).steps[-1]
+    setup = Run(given).setup
+    error = setup.zero_error
+    assert error > 0.0
+    model = setup.model.resampled((12, 12))
+    nearer = [model.equilibrium(Control(approach=0.5 * UP + more)).force for more in (0.0, error)]
+    assert dict(last.errors)["zero"] == pytest.approx(np.diff(nearer)[0], rel=1e-4)  # residuals
+    forced = run(scene("first touch", load={"approach": None, "force": "2 N"})).steps[-1]
+    assert forced.approach_error_mm > error
+    # the plane below a mean plane does not depend on the highest point
+    depth = depth_of(scene("mean plane"))
+    assert (
+        dict(run(scene("mean plane", depth=depth)).steps[-1].errors)["zero"] < 1e-3 * last.force_N
+    )
+
+
+@pytest.mark.parametrize(
+    ("load", "text"),
+    [
+        ({"zero": "mean"}, r"load\.zero = 'mean': .*'mean plane', or 'quantile 0.001'"),
+        ({"zero": 3}, "load.zero"),
+        ({"zero": "quantile 1e-5"}, r"load\.zero = .*: less than one of 576 heights"),
+        (
+            {"zero": "mean plane", "approach": "-50 um"},
+            r"load\.approach = .*: does not touch the surface",
+        ),
+        ({"approach": "-1 um"}, r"load\.approach = .*: must be greater than 0"),
+        ({"approach": ["2 um", "-1 um"]}, r"load\.approach = .*: must not turn below 0"),
+    ],
+)
+def test_other_zeros_and_approaches_above_first_touch_are_refused(load, text):
+    with pytest.raises(InputError, match=text):
+        Run(scene("first touch", load=load))
+
+
+def test_a_step_counted_from_a_height_and_back_is_the_step():
+    step = run(scene("first touch")).steps[0]
+    again = step.counted_from(0.125).counted_from(-0.125)
+    assert again.zero_mm == 0.0 and again.approach_mm == pytest.approx(step.approach_mm, abs=1e-16)
+    assert replace(again, patches=step.patches, approach_mm=step.approach_mm) == step
