@@ -166,6 +166,13 @@ class LoadHistory:
         points = self.points[-1:] * (self.cycles > 1) + self.points
         return any(later < earlier for earlier, later in pairwise(points))
 
+    @property
+    def up_to_largest(self) -> LoadHistory:
+        """The history of one load step, straight to the largest load."""
+        return LoadHistory(
+            quantity=self.quantity, points=(self.largest,), steps=1, tilt=self.tilt
+        )
+
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""
         if self.quantity == "force":

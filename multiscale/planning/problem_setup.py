@@ -209,8 +209,7 @@ def plane_at_largest_load(
     """
     if load_history.quantity == "approach" and load_history.tilt is not None:
         return RigidPlane.above(surface, load_history.largest, load_history.tilt)
-    largest = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
-    (step,) = load_steps(coupling, largest)
+    (step,) = load_steps(coupling, load_history.up_to_largest)
     return RigidPlane.above(surface, step.approach_mm, step.tilt)
 
 
