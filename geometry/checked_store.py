@@ -117,6 +117,21 @@ def unsealed(content: bytes, mark: Mark = START) -> Iterator[tuple[Record, Mark]
         yield _record(body), mark
 
 
+def end_of(content: bytes) -> Mark:
+    """Return the mark behind the last whole record of a file.
+
+    Args:
+        content: The file.
+
+    Raises:
+        InputError: When bytes are not those that were written.
+    """
+    mark = START
+    for _, behind in unsealed(content):
+        mark = behind
+    return mark
+
+
 def read_record(content: bytes) -> Record:
     """Return the record of a file that is replaced whole.
 

@@ -9,7 +9,7 @@ from geometry.errors import NotInstalled
 
 _SCENES = (
     "scenes, figures and files",
-    "filelock h5py jinja2 matplotlib pint pydantic pydantic_core rich threadpoolctl",
+    "h5py jinja2 matplotlib pint pydantic pydantic_core rich threadpoolctl",
     "pip install 'patchlaw[scenes]', or with Debian's dolfinx ./setup.sh",
 )
 _FINITE_ELEMENTS = (

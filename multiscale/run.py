@@ -11,6 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
+from geometry.checked_store import Arrays
+from geometry.collective import on_root
 from geometry.packages import optional_packages
 from micro import HalfSpaceModel, MicroModel
 from multiscale.contact_recorder import ContactRecorder
@@ -30,9 +32,10 @@ from multiscale.readable import Observer
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.yielding_notes import energy_notes, yielding_notes
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import Arrays, digest
+from multiscale.storage import digest
 
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
@@ -55,6 +58,7 @@ class Run:
     Attributes:
         observe: Called with what the run is at, once it is set.
         given: The scene as the user wrote it.
+        identity: All that its numbers depend on, see `multiscale.scene.identity`.
         setup: The problem set up from it: surface, summits, patches, micro model.
         scene: The scene with values for its auto keys.
         seconds: Wall time of each phase so far [s].
@@ -79,6 +83,7 @@ class Run:
         self._deepest = 0.0  # approach so far
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
+        self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         assembly.load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
         self.setup: ProblemSetup = set_up(scene, comm, resolved=resolved, nodes=nodes)
@@ -250,12 +255,6 @@ class Run:
         for k, region in enumerate(self.setup.samples):
             arrays |= {f"{k} {j}": one.heights for j, one in enumerate(region.surfaces)}
         return digest(arrays)
-
-    @property
-    def meshes(self) -> list[str]:
-        """SHA-256 of the meshes of the bodies; empty without meshes."""
-        faces = self.setup.face, self.setup.counter_face
-        return [face.digest for face in faces if face is not None and face.digest]
 
     @property
     def law_bytes(self) -> bytes:

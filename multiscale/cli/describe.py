@@ -13,6 +13,7 @@ from typing import Any
 from geometry.collective import on_root, on_root_alone
 from geometry.errors import InputError
 from geometry.statistics import roughness
+from geometry.whole_files import write_whole
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.couplings.body import scene_body
@@ -28,10 +29,11 @@ from multiscale.planning.memory_costs import Launch
 from multiscale.planning.set_up import set_up
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
+from multiscale.scene.identity import identity
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import write_text, write_whole
+from multiscale.storage import write_text
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -71,7 +73,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, scene))
+            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
         check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.setup)
@@ -110,7 +112,7 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, scene))
+            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 

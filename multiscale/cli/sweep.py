@@ -26,7 +26,7 @@ from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
 from multiscale.sweeps.forecast import SweepForecast
 from multiscale.sweeps.journal import CaseResult
-from multiscale.sweeps.sweep import JOURNAL, sweep
+from multiscale.sweeps.sweep import JOURNAL, part_name, sweep
 from multiscale.sweeps.sweep_results import SweepResults
 
 MOST_LINES = 20
@@ -47,7 +47,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
     which, parts = choice.part or slurm_part()
-    with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):
+    with locked(folder / JOURNAL / part_name((which, parts)), comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
         terminal.say(comm, on_root(comm, lambda: _forecast(scene, vary, comm, parts)))
@@ -109,7 +109,7 @@ def _forecast(scene: Scene, vary: dict[str, list[Any]], comm: Any, parts: int) -
 
 
 def _remove_results(folder: Path) -> None:
-    for path in [*(folder / JOURNAL).glob("*.jsonl"), *(folder / name for name in FILES)]:
+    for path in [*(folder / JOURNAL).glob("*/*.cases"), *(folder / name for name in FILES)]:
         remove(path)
 
 

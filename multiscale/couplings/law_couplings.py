@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid, RigidPlane
+from geometry.checked_store import Arrays
 from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
-from multiscale.storage import Arrays, packed, unpacked
+from multiscale.storage import packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LawContactState, LoadedFace

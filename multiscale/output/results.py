@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root, shared
+from geometry.whole_files import write_bytes, write_whole, written
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.provenance import provenance
@@ -17,16 +18,7 @@ from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage import (
-    checksummed,
-    remove,
-    write_bytes,
-    write_csv,
-    write_json,
-    write_text,
-    write_whole,
-    written,
-)
+from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

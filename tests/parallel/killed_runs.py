@@ -205,7 +205,7 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         elif dice.random() < 0.5:
             over = after(dice.uniform(0.0, lasts))
         else:
-            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.h5")
+            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.state")
         sessions += 1
         if sessions % every == 0:
             code = runs.on_two_ranks(words_of(out, scene, *words), log, over)

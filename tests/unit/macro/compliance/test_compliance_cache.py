@@ -150,15 +150,13 @@ def test_sound_file_of_another_key_is_not_believed(counted):
     (other,) = set(cache_directory().iterdir()) - {one}
     other.replace(one)
     before = len(calls)
-    np.testing.assert_array_equal(
-        cached("kind", (1,), compute, MPI.COMM_SELF)["c"], compute()["c"]
-    )
+    np.testing.assert_array_equal(cached("kind", (1,), compute, MPI.COMM_SELF)["c"], compute()["c"])
     assert len(calls) == before + 2
 
 
 @pytest.mark.parametrize("mode", [0o620, 0o602, 0o666])
 def test_file_that_others_can_write_is_not_believed(counted, mode):
-    calls, compute = counted
+    _, compute = counted
     cached("kind", (), compute, MPI.COMM_SELF)
     (path,) = cache_directory().iterdir()
     assert path.stat().st_mode & 0o777 == 0o600
@@ -173,7 +171,7 @@ def test_file_that_others_can_write_is_not_believed(counted, mode):
 
 @pytest.mark.parametrize(("owner", "believed"), [(0, True), (12345, False)])
 def test_only_own_files_and_those_of_root_are_believed(counted, monkeypatch, owner, believed):
-    calls, compute = counted
+    _, compute = counted
     cached("kind", (), compute, MPI.COMM_SELF)
     fstat = os.fstat
 
@@ -188,7 +186,7 @@ def test_only_own_files_and_those_of_root_are_believed(counted, monkeypatch, own
 
 
 def test_pipes_and_folders_in_the_cache_are_passed_over(counted):
-    calls, compute = counted
+    _, compute = counted
     cached("kind", (), compute, MPI.COMM_SELF)
     (path,) = cache_directory().iterdir()
     path.unlink()

@@ -73,7 +73,7 @@ def test_signal_stops_after_the_load_step(
     assert f"{text}: stopped after load step 2; go on with --resume" in shown.err
     assert "report.html" in shown.out
     assert rows(tmp_path)[0] == undisturbed[0][:3]
-    assert (tmp_path / "checkpoint.h5").exists()
+    assert (tmp_path / "checkpoint.state").exists()
     assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == handlers
     assert main([*words[:2], "--resume", *words[2:]]) == 0
     assert "goes on after load step 2" in capfd.readouterr().out
@@ -104,7 +104,7 @@ def test_no_time_at_all_keeps_what_there_is(capfd, tmp_path):
     words = ["run", PAPER, "--out", str(tmp_path), "--max-time", "1 s", *SMALL]
     assert main(words) == 4
     assert "stopped before the block was made" in capfd.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.h5"]  # no load step yet
+    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.state"]  # no load step yet
 
 
 @pytest.mark.parametrize(

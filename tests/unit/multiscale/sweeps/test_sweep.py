@@ -2,11 +2,13 @@
 
 import csv
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from small_scene import SMALL_SCENE
 
+from geometry.checked_store import START, unsealed
 from geometry.errors import InputError, NotConverged
 from multiscale import run, sweep
 from multiscale.cli.command_line import main
@@ -148,13 +150,69 @@ def test_means_are_not_over_keys_that_are_set(scene):
 def test_a_sweep_goes_on_after_the_cases_that_are_done(scene, tmp_path):
     first, again = [], []
     whole = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: first.append(case))
-    (journal,) = (tmp_path / "cases").glob("*.jsonl")
-    lines = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join(lines[:4]) + lines[4][:20])  # as a killed process leaves it
+    journal = tmp_path / "cases" / "1-of-1" / "rank-0.cases"
+    whole_file = journal.read_bytes()
+    marks = [mark for _, mark in unsealed(whole_file)]
+    journal.write_bytes(whole_file[: marks[3].size + 20])  # as a killed process leaves it
     rest = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: again.append(case))
     assert (len(first), len(again)) == (6, 3)
     np.testing.assert_allclose(rest.force_N, whole.force_N, rtol=1e-12)
-    assert [json.loads(line)["case"] for line in journal.read_text().splitlines()[1:]]
+    assert len(list(unsealed(journal.read_bytes()))) == 7  # the scene, and six cases
+
+
+def test_damaged_journals_give_no_wrong_number(scene, tmp_path):
+    """Bytes changed, cut off, put in, records in another order: refused by name, or run again."""
+    whole = sweep(scene, VARY, folder=tmp_path / "whole").force_N
+    journal = tmp_path / "out" / "cases" / "1-of-1" / "rank-0.cases"
+    journal.parent.mkdir(parents=True)
+    content = (tmp_path / "whole" / "cases" / "1-of-1" / "rank-0.cases").read_bytes()
+    marks = [START, *(mark for _, mark in unsealed(content))]
+    records = [content[a.size : b.size] for a, b in pairwise(marks)]
+    dice, ends = np.random.default_rng(8), {"refused": 0, "run again": 0}
+    for number in range(60):
+        at, damaged = int(dice.integers(len(content))), bytearray(content)
+        if number % 4 == 0:
+            damaged[at] ^= 1 << int(dice.integers(8))
+        elif number % 4 == 1:
+            del damaged[at:]
+        elif number % 4 == 2:
+            damaged[at:at] = dice.bytes(int(dice.integers(1, 90)))
+        else:
+            one, other = dice.choice(len(records), 2, replace=False)
+            order = list(range(len(records)))
+            order[one] = order[other]  # one record is lost, and one there twice
+            damaged = bytearray(b"".join(records[k] for k in order))
+        journal.write_bytes(damaged)
+        try:
+            found = sweep(scene, VARY, folder=tmp_path / "out").force_N
+        except InputError as error:
+            assert str(error).startswith(f"{journal}: is damaged") and "computed again" in str(
+                error
+            )
+            ends["refused"] += 1
+        else:
+            np.testing.assert_array_equal(found, whole)
+            ends["run again"] += 1
+    assert min(ends.values()) >= 10, ends
+
+
+@pytest.mark.parametrize("varied", [False, True])
+def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path, varied):
+    dice = np.random.default_rng(2)
+    heights = dice.normal(scale=1e-3, size=(8, 8))
+    for name in ("one.npy", "other.npy"):
+        np.save(file.with_name(name), heights)
+    base = Scene.load(file).with_({"surface": {"file": "one.npy", "lengths": [1.0, 1.0]}})
+    vary = {"surface.file": ["one.npy", "other.npy"]} if varied else {MODULUS: ["1 GPa", "2 GPa"]}
+    first = sweep(base, vary, folder=tmp_path / "out")
+    np.save(file.with_name("other.npy" if varied else "one.npy"), 2.0 * heights)
+    problem = r"other.npy: has another content" if varied else "content of surface.file was '"
+    with pytest.raises(InputError, match=problem) as error:
+        sweep(base, vary, folder=tmp_path / "out")
+    assert "surface.file" in str(error.value) and "--overwrite" in str(error.value)
+    np.save(file.with_name("other.npy" if varied else "one.npy"), heights)
+    again = sweep(base, vary, folder=tmp_path / "out", observe=lambda *_: pytest.fail("run again"))
+    np.testing.assert_array_equal(again.force_N, first.force_N)
 
 
 def test_cases_of_another_scene_are_not_mixed_in(scene, tmp_path):
