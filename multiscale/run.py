@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
@@ -282,6 +282,10 @@ class Run:
             reference=record,
             contact_records=self.contacts,
         )
+
+    def remark(self, notes: Iterable[str]) -> None:
+        """Add notes to the history, each once."""
+        self._notes += [note for note in dict.fromkeys(notes) if note not in self._notes]
 
     @property
     def unknowns(self) -> int | None:

@@ -22,6 +22,9 @@ _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
 _WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
 
 
+_told: list[int] = []  # signals since the command began
+
+
 class Ended(KeyboardInterrupt):
     """A signal told this process to end now.
 
@@ -53,7 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     with sturdy_streams() as (output, errors), signals_raise():
         try:
-            code = _run(words)
+            with ended_if_told():
+                code = _run(words)
         except SystemExit:  # of --help and --version
             code = 0
         except KeyboardInterrupt as error:
@@ -99,6 +103,7 @@ def signals_raise() -> Iterator[None]:
     back at the end.
     """
     former: dict[int, Any] = {}
+    _told.clear()
     if threading.current_thread() is threading.main_thread():  # no other thread may set handlers
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             if signal.getsignal(number) not in (None, signal.SIG_IGN):  # None: not of Python
@@ -110,5 +115,20 @@ def signals_raise() -> Iterator[None]:
             signal.signal(watched, handler)
 
 
+@contextmanager
+def ended_if_told() -> Iterator[None]:
+    """Raise `Ended` in place of any error that follows a signal.
+
+    A compiled module whose import is interrupted raises an error of its own instead.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _told:
+            raise Ended(_told[-1]) from error
+        raise
+
+
 def _raise(number: int, frame: FrameType | None) -> None:
+    _told.append(number)
     raise Ended(number)

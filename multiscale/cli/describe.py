@@ -8,7 +8,7 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root, on_root_alone
 from geometry.errors import InputError
@@ -34,6 +34,9 @@ from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -81,16 +84,22 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             run.observe = terminal.counting(begun)
             table = run.make_laws()
 
+        def draw() -> Figure:
+            from multiscale.output.figures import law_figure
+
+            return law_figure(table)
+
         def write() -> list[Path]:
             from multiscale.conductances import conducts_of
-            from multiscale.output.figures import law_figure
 
             conducts = conducts_of(run.setup)
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-            files = [laws, *write_pictures(folder, pictures_of("laws", law_figure(table)))]
+            pictures = pictures_of("laws", draw)
+            run.remark(filter(None, [pictures.problem]))
+            files = [laws, *write_pictures(folder, pictures.files)]
             remove_exports(folder)
             for name, text in exports.items():
                 write_text(folder / name, text)
@@ -116,10 +125,16 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
-        def write() -> list[Path]:
+        def draw() -> Figure:
             from multiscale.output.figures import surface_figure_of
 
-            return write_pictures(folder, pictures_of("surface", surface_figure_of(setup)))
+            return surface_figure_of(setup)
+
+        def write() -> list[Path]:
+            pictures = pictures_of("surface", draw)
+            if pictures.problem:
+                terminal.say(None, pictures.problem)
+            return write_pictures(folder, pictures.files)
 
         terminal.show_files(comm, on_root(comm, write))
 

@@ -91,10 +91,10 @@ def _run(
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
         run.make_contact()
-        terminal.show_history(comm, run.history())
         files = write_results(folder, run, options=options)
         if run.scene.output.fields:
             files += write_fields(folder, run)
+        terminal.show_history(comm, run.history())
         terminal.show_times(comm, run.times)
         terminal.show_files(comm, files)
     if isinstance(failure, NotConverged):

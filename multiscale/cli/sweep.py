@@ -122,8 +122,10 @@ def _write(folder: Path, found: SweepResults, comm: Any, *, figures: bool) -> li
     statistics = _statistics_records(found)
     files += _write_table(folder / "statistics.csv", iter(statistics), comm)
     if figures and statistics:
-        pictures = pictures_of("sweep", found.plot())
-        files += on_root(comm, lambda: write_pictures(folder, pictures))
+        pictures = pictures_of("sweep", found.plot)
+        if pictures.problem:
+            terminal.say(comm, pictures.problem)
+        files += on_root(comm, lambda: write_pictures(folder, pictures.files))
     return files
 
 

@@ -424,7 +424,7 @@ LIMITED = (
 @pytest.mark.parametrize(
     ("size", "file", "left"),
     [
-        (8_000, "checkpoint.state", set()),
+        (2_000, "checkpoint.state", set()),
         pytest.param(
             25_000, "overview.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
         ),
