@@ -19,6 +19,7 @@ from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.fields import FieldRecord
+from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.energy import with_work
@@ -29,6 +30,7 @@ from multiscale.measured_errors import checked, error_notes
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.set_up import set_up
 from multiscale.readable import Observer
+from multiscale.readable import number as readable_number
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.yielding_notes import energy_notes, yielding_notes
@@ -142,6 +144,7 @@ class Run:
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
+                self._take_longer_laws(coupling)
                 self.fields.keep(coupling, step)
                 with self.phase("contact"):
                     step = self._recorder.with_stiffness(step, coupling)
@@ -154,6 +157,13 @@ class Run:
                 self._deepest = max(self._deepest, step.approach_mm)
                 self.make_contact(last=self.finished)
                 yield self.steps[-1]
+
+    def _take_longer_laws(self, coupling: Coupling) -> None:
+        """Take the laws of the coupling, which a load step may have extended."""
+        if isinstance(coupling, EmbeddedCoupling) and coupling.table is not self.table:
+            self.table = coupling.table
+            end = readable_number(self.table.largest_pressure)
+            self.remark([f"the laws were extended to {end} MPa, which a load step needed"])
 
     def make_contact(self, *, last: bool = True) -> None:
         """Record the contact of the last load step if the scene asks for it, once.

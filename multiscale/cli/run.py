@@ -7,7 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged, PatchlawError
+from geometry.errors import InputError, NotConverged, NotInstalled, PatchlawError
+from geometry.packages import optional_packages
 from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
@@ -115,7 +116,8 @@ def _make_load_steps(
                 run.make_laws()
             checkpoints.write()
             interruption.check("before the block was made")
-            run.make_coupling()
+            with optional_packages():
+                run.make_coupling()
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
                 checkpoints.accept()
@@ -124,7 +126,7 @@ def _make_load_steps(
                     interruption.check(f"after load step {step.step}", step.wall_s)
         except (Stopped, NotConverged) as error:  # the load steps before it are written
             return error
-        except InputError:
+        except (InputError, NotInstalled):
             if not run.steps:  # wrong input leaves nothing behind
                 checkpoints.remove()
             raise
