@@ -6,6 +6,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.legend import Legend
 from small_scene import SMALL_SCENE
 
 from geometry.checked_store import START, unsealed
@@ -194,6 +196,56 @@ def test_damaged_journals_give_no_wrong_number(scene, tmp_path):
             np.testing.assert_array_equal(found, whole)
             ends["run again"] += 1
     assert min(ends.values()) >= 5, ends
+
+
+def drawn(figure):
+    """Return how many pixels of each of the two diagrams have a colour, neither grey nor white."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    coloured = np.ptp(pixels, axis=2) > 40
+    return [int(half.sum()) for half in np.array_split(coloured, 2, axis=1)]
+
+
+def legend(figure):
+    """Return the texts of a figure's legend; a title stands for one alone."""
+    texts = [text.get_text() for one in figure.findobj(Legend) for text in one.get_texts()]
+    return texts or [
+        line.get_label() for line in figure.axes[0].lines if line.get_label()[0] != "_"
+    ]
+
+
+@pytest.mark.parametrize("load", [{"load.approach": "1 um"}, {"load.force": "0.5 N"}])
+@pytest.mark.parametrize("vary", [{SEED: range(3)}, {MODULUS: ["1 GPa", "4 GPa"]}])
+def test_one_load_step_is_drawn_as_points(scene, load, vary):
+    found = sweep(scene.with_(load | {"load.steps": 1}), vary)
+    # a point of 4 pt is some 30 pixels at 100 dpi; lines through one point are none
+    assert min(drawn(found.plot())) >= 40
+
+
+def test_scatter_is_drawn_under_forces_too(scene):
+    found = sweep(scene.with_({"load.force": "0.5 N", "load.steps": 3}), {SEED: range(4)})
+    force, _ = found.plot().axes
+    (band,) = force.collections
+    low, high = 1e3 * found.band("approach_mm")
+    (path,) = band.get_paths()
+    assert path.vertices[:, 0].min() == pytest.approx(low.min(), rel=1e-12)
+    assert path.vertices[:, 0].max() == pytest.approx(high.max(), rel=1e-12)
+
+
+def test_files_are_compared_and_seeds_averaged(file, tmp_path):
+    dice = np.random.default_rng(2)
+    for name in ("scan.npy", "worn.npy"):
+        np.save(file.with_name(name), dice.normal(scale=1e-3, size=(8, 8)))
+    base = Scene.load(file).with_({"surface": {"file": "scan.npy", "lengths": [1.0, 1.0]}})
+    found = sweep(base, {"surface.file": ["scan.npy", str(file.with_name("worn.npy"))]})
+    assert [len(part) for _, part in found.ensembles()] == [1, 1]
+    records = [one for one in found.statistics_records() if one["column"] == "force_N"]
+    assert {one["cases"] for one in records} == {1}
+    assert legend(found.plot()) == ["scan.npy", "worn.npy"]
+    seeds = sweep(Scene.load(file), {SEED: range(3)})
+    assert [len(part) for _, part in seeds.ensembles()] == [3]
+    assert legend(seeds.plot()) == ["mean of 3"]
 
 
 @pytest.mark.parametrize("varied", [False, True])
