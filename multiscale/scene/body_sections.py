@@ -151,7 +151,7 @@ class LawSection(Section):
     reported; the seed of the spectrum when not given."""
     largest_pressure: Annotated[Pressure, Field(gt=0)] | None = None
     """Largest pressure at a point of the face that the laws are made for; when not given, ten times
-    the mean one, or more on a crowned face."""
+    the mean one, or more on a crowned face. Laws are extended where a load step needs it."""
     regions: tuple[RegionSection, ...] = ()
     """Further faces of the contact, each with a sample of its own."""
     crown: tuple[Radius, Radius] | None = None
