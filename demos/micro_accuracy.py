@@ -3,8 +3,7 @@
 #
 # What one learns: the error in force and contact area of every micro model against a half-space
 # solution, over many realizations of the paper's Set 1 and Set 2 (Waddad et al. 2016, Table 1, doi
-# 10.1016/j.triboint.2015.12.023), and what each costs. `repaired` has curvature at the scale of the
-# contact and border asperities; `curvature`, `border` have one. Times are the processor's.
+# 10.1016/j.triboint.2015.12.023), and what each costs. Times are the processor's.
 #
 #     reference: cell-wise pressures p ≥ 0, gap ≥ 0, p · gap = 0 on 256², 512² and 1024² cells,
 #                extrapolated (Richardson) with the rate observed over all results; its own
@@ -37,16 +36,11 @@ CELLS = (32, 64, 128) if choice.quick else (32, 64, 128, 256, 512, 1024)
 APPROACHES = np.array([4e-3, 8e-3, 12e-3, 18e-3])
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-CONTACT, BORDER = {"curvature": "contact"}, {"border": "include"}
 ASPERITY_GRID = 128 if choice.quick else 256
 KINDS = ("elliptic-independent", "circular-independent", "elliptic", "circular")
 MODELS = {
-    **{f"{kind}, {ASPERITY_GRID}²": (kind, ASPERITY_GRID, {}) for kind in KINDS},
-    **{f"{kind}, repaired": (kind, ASPERITY_GRID, CONTACT | BORDER) for kind in KINDS},
-    "elliptic, curvature": ("elliptic", ASPERITY_GRID, CONTACT),
-    "elliptic, border": ("elliptic", ASPERITY_GRID, BORDER),
-    "islands": ("islands", ASPERITY_GRID, {}),
-    **{f"half-space, {n}²": ("half-space", n, {}) for n in CELLS},
+    **{f"{kind}, {ASPERITY_GRID}²": (kind, ASPERITY_GRID) for kind in KINDS},
+    **{f"half-space, {n}²": ("half-space", n) for n in CELLS},
 }
 REFERENCE = list(MODELS)[-3:]
 
@@ -56,11 +50,11 @@ def rough(spectrum, grid):
     return synthesise(spectrum, grid=(grid, grid), lengths=(1.0, 1.0))
 
 
-def answer(spectrum, name, grid, options):
+def answer(spectrum, name, grid):
     surface = rough(spectrum, grid)
     _ = surface.highest  # not of the model
     start = time.process_time()
-    model = micro_model(name, surface, contact_modulus=MODULUS, **options)
+    model = micro_model(name, surface, contact_modulus=MODULUS)
     response = model.respond(APPROACHES, patches=WHOLE, mean_heights=patch_means(surface, WHOLE))
     seconds = (time.process_time() - start) / len(APPROACHES)
     return [*response.force, *response.contact_area, seconds]
@@ -109,18 +103,17 @@ print(f"| reference, rates {rate[0]:.2f} and {rate[1]:.2f} | {own[0]:.3%} | {own
 
 # %%
 plain = [f"{kind}, {ASPERITY_GRID}²" for kind in KINDS]
-repaired = ["elliptic, repaired", "circular, repaired", "islands"]
 grids = [f"half-space, {n}²" for n in CELLS if choice.quick or n < 256]  # others are of the truth
 draw_accuracy(
     choice.out / "micro_accuracy.png",
     fractions,
     {key: errors[key][:, 0] for key in (plain[0], plain[2], "half-space, 64²")},
-    {key: (cost[key], 100 * size[key][0]) for key in (*plain, *repaired, *grids)},
+    {key: (cost[key], 100 * size[key][0]) for key in (*plain, *grids)},
     100 * own[0],
 )
 
 # %% [markdown]
-# Without interaction models are far too stiff; with it too soft, until they are repaired.
+# Without interaction models are far too stiff; with it too soft.
 
 # %%
 assert size["half-space, 64²"][0] < min(0.03, size[f"elliptic, {ASPERITY_GRID}²"][0])

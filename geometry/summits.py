@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,9 +96,7 @@ def _centroids(
     return cells[first] + mean
 
 
-def constrained_summits(
-    surface: Surface, start: Array, offset: Surface | None = None, *, bounded: bool = True
-) -> Array:
+def constrained_summits(surface: Surface, start: Array, *, bounded: bool = True) -> Array:
     """Return the summits of the closed rectangle that the surface rises to from given points.
 
     Newton's method climbs the smooth interpolant in steps of at most a cell, uphill also where the
@@ -112,14 +109,12 @@ def constrained_summits(
     Args:
         surface: The surface; its border counts also when it is periodic.
         start: Points near the maxima, shape (n, 2) [mm].
-        offset: Surface on the same rectangle whose heights are added to those of the first, such
-            as those of a tilted plane.
         bounded: Whether climbs end at the border; otherwise the surface continues periodically.
 
     Returns:
         The maxima, shape (n, 2) [mm].
     """
-    climb = _Climb([surface] if offset is None else [surface, offset], bounded)
+    climb = _Climb(surface, bounded)
     point = np.array(start, float)
     on, longest = np.arange(len(point)), np.ones(len(point))
     for _ in range(_MOST_STEPS):
@@ -152,17 +147,16 @@ def coincident(surface: Surface, point: Array) -> Indices:
 
 
 class _Climb:
-    """Steps uphill on the sum of some surfaces."""
+    """Steps uphill on a surface."""
 
-    def __init__(self, parts: Sequence[Surface], bounded: bool) -> None:
-        self._parts, self._bounded = parts, bounded
-        self.cell, self._limit = np.array(parts[0].spacing), np.array(parts[0].lengths)
-        self.rounding = _ROUNDING * sum(float(np.abs(part.heights).max()) for part in parts)
+    def __init__(self, surface: Surface, bounded: bool) -> None:
+        self._surface, self._bounded = surface, bounded
+        self.cell, self._limit = np.array(surface.spacing), np.array(surface.lengths)
+        self.rounding = _ROUNDING * float(np.abs(surface.heights).max())
 
     def height(self, point: Array, dx: int = 0, dy: int = 0) -> Array:
         """Return heights, or a derivative of them."""
-        parts = [part.interpolant(*point.T, dx=dx, dy=dy) for part in self._parts]
-        return np.asarray(np.sum(parts, axis=0))
+        return self._surface.interpolant(*point.T, dx=dx, dy=dy)
 
     def moved(self, point: Array, longest: Array) -> Array:
         """Return points after a step of at most ``longest`` cells, shape (n,)."""

@@ -2,22 +2,17 @@
 
 Every micro model presses a plane on a surface and returns a `Response` of the surface and its
 patches. `HalfSpaceModel` solves the contact problem on the surface's cells. `AsperityModel` sees
-given asperities, `ScaledModel` asperities whose curvature follows the load, and `IslandModel` the
-regions above the plane. `micro_model` makes any of them by name, and `choose` the cheapest one that
-keeps a tolerance.
+its summits alone. `micro_model` makes any of them by name.
 
     closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells
-    interaction → islands, asperities                 contacts that interact pair by pair
-    choice                                            models by name and by accuracy
+    asperities                                        summits that interact pair by pair
 """
 
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS
 from micro.asperities.model import MODELS, AsperityModel
-from micro.asperities.scaled_model import BORDERS, CURVATURES, ScaledModel
-from micro.choice.models import MODEL_NAMES, START_KINDS, micro_model
-from micro.choice.selection import Choice, choose
+from micro.by_name import MODEL_NAMES, START_KINDS, micro_model
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
@@ -35,12 +30,9 @@ from micro.compliance.slopes_of_bodies import SlopesOfBodies
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.half_space.model import HalfSpaceModel
 from micro.half_space.plane_contact import HalfSpaceState
-from micro.islands.model import IslandModel
 from micro.model import MicroModel, Pressed, Response
 
 __all__ = [
-    "BORDERS",
-    "CURVATURES",
     "MODELS",
     "MODEL_NAMES",
     "SOLVERS",
@@ -48,24 +40,20 @@ __all__ = [
     "AsperityModel",
     "BodyModes",
     "BodyStresses",
-    "Choice",
     "Contacts",
     "FiniteSlopes",
     "FreeSides",
     "HalfSpaceModel",
     "HalfSpaceState",
     "HertzContact",
-    "IslandModel",
     "MicroModel",
     "Pressed",
     "RectangleFields",
     "Response",
     "RigidPlane",
-    "ScaledModel",
     "SideStresses",
     "SlopesOfBodies",
     "SurfaceStress",
-    "choose",
     "coarse_grid",
     "find_contacts",
     "half_space_modes",

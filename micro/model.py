@@ -105,7 +105,7 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def stiffness(self, state: Any, *, turns: bool) -> tuple[float | None, int]:
+    def stiffness(self, state: Any, *, turns: bool) -> tuple[float, int]:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
         Args:
@@ -113,7 +113,7 @@ class MicroModel(Protocol):
             turns: Whether the plane turns without moment; otherwise its slopes stay.
 
         Returns:
-            The stiffness [N/mm], None where no linear solution gives it, and the iterations.
+            The stiffness [N/mm], and the iterations.
         """
 
 
@@ -152,7 +152,7 @@ class Response:
     The separation of a patch is the average gap between the plane and the *displaced* surface,
     g_i = z_M − mean height − mean approach + mean displacement. The paper's eq. 9 leaves the
     displacement out. It is the displacement by the model's pressures, to the errors stated in
-    `micro.interaction.patch_sums`, also for the models without interaction.
+    `micro.asperities.patch_sums`, also for the models without interaction.
 
     Args:
         model: Name of the micro model.

@@ -54,8 +54,6 @@ def draw_accuracy(
         (left, "half-space", (0.105, 12), "half-space, 64² heights"),
         (right, "elliptic", (2.9, 23), "without interaction"),
         (right, "elliptic", (2.9, 9), "with interaction"),
-        (right, "elliptic", (90, 1.15), "repaired"),
-        (right, "islands", (38, 3.4), "islands"),
         *((right, key, (1.25 * x, 1.05 * y), key) for key, (x, y) in joined.items()),
     ):
         side = "right" if at[0] > 30 else "left"

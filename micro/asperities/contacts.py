@@ -2,9 +2,9 @@
 
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
-displacements by all contacts add up to w_k (`micro.interaction.contact_problem`).
+displacements by all contacts add up to w_k (`micro.asperities.contact_problem`).
 
-Theory: demos/theory.md, section 8.
+Theory: demos/theory.md, sections 8 and 9.
 """
 
 from __future__ import annotations
@@ -22,20 +22,21 @@ from geometry import Asperities, Control
 from geometry.errors import InputError
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane
-from micro.closed_forms.hertz import HertzContact
-from micro.compliance.body_modes import BodyModes
-from micro.interaction.contact_problem import (
+from micro.asperities.contact_problem import (
     BYTES_PER_PAIR,
     ContactProblem,
     Method,
     Solution,
     active_set,
-    checked_pairs,
+    check_pairs,
     solve,
 )
-from micro.interaction.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs
-from micro.interaction.plane_on_peaks import Peaks, contact_stiffness
-from micro.interaction.truncated_newton import truncated_newton
+from micro.asperities.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs
+from micro.asperities.patch_sums import EllipticContacts
+from micro.asperities.plane_on_peaks import Peaks, contact_stiffness
+from micro.asperities.truncated_newton import truncated_newton
+from micro.closed_forms.hertz import HertzContact
+from micro.compliance.body_modes import BodyModes
 
 Array = NDArray[np.float64]
 
@@ -122,6 +123,22 @@ class AsperityContacts:
             contact_modulus=self.contact_modulus,
         )
 
+    def ellipses(self, indentation: Array) -> EllipticContacts:
+        """Return the n contacts with given indentations.
+
+        Args:
+            indentation: Indentations t ≥ 0, shape (n,) [mm].
+        """
+        a, hertz = self.asperities, self.hertz
+        semi_axes = np.stack([hertz.semi_major, hertz.semi_minor], axis=1)
+        return EllipticContacts(
+            x=a.x,
+            y=a.y,
+            angle=a.angle,
+            semi_axes=semi_axes * np.sqrt(indentation)[:, None],
+            force=hertz.force * indentation**1.5,
+        )
+
     def solution(self, interference: Array, start: Array) -> Solution:
         """Solve for the summits above the plane.
 
@@ -146,7 +163,7 @@ class AsperityContacts:
             return Solution(own, displacement, 0, 0.0, 0)
         size = BYTES_PER_PAIR * (2.0 if self.solver == "truncated-newton" else 1.0)
         while True:
-            checked_pairs(len(above), len(above), "asperities", bytes_per_pair=size)
+            check_pairs(len(above), size)
             pairs = self.pairs.subset(above)
             problem = ContactProblem(interaction=pairs.evaluate, interference=interference[above])
             found = solve(problem, SOLVERS[self.solver], start[above])

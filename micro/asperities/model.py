@@ -1,6 +1,6 @@
 """The four asperity models: elliptic or circular contacts, with or without interaction.
 
-Theory: demos/theory.md, section 8.
+Theory: demos/theory.md, sections 8 and 9.
 """
 
 from __future__ import annotations
@@ -9,16 +9,23 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
-from geometry import Asperities, Control, PatchGrid
+from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.errors import InputError
-from geometry.rigid_plane import normal_stiffness
+from geometry.rigid_plane import RigidPlane, normal_stiffness
 from micro.asperities.contacts import SOLVERS, AsperityContacts, Equilibrium, ModelKind
-from micro.interaction.contact_model import ContactModel, ContactState
-from micro.interaction.patch_sums import EllipticContacts
+from micro.asperities.hertz_pairs import BodyPoints
+from micro.asperities.patch_sums import EllipticContacts, patch_displacements, patch_loads
+from micro.closed_forms.hertz import checked_modulus
+from micro.compliance.body_modes import BodyModes
+from micro.contact_detail import ContactDetail
+from micro.model import Pressed, Response, checked_approaches, checked_patches
+
+Array = NDArray[np.float64]
 
 LARGEST_AREA_FRACTION = 0.1
 """Contact area fraction up to which summits count as separate; errors may be large before."""
@@ -34,73 +41,215 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 """The models (1) to (4) of Waddad et al. 2016, section 2.2, by name."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SummitModel(ContactModel):
-    """Any of the four asperity models; see `ContactModel` for further fields.
+class ContactState(NamedTuple):
+    """Contacts in equilibrium with a plane.
+
+    Attributes:
+        start: The solution, which one for a load step nearby may start from.
+        contacts: The n contacts that there may be; those without force do not touch.
+    """
+
+    start: Equilibrium
+    contacts: EllipticContacts
+
+    @property
+    def plane(self) -> RigidPlane:
+        """The plane."""
+        return self.start.plane
+
+    @property
+    def touching(self) -> EllipticContacts:
+        """The contacts that carry force."""
+        return self.contacts.subset(np.flatnonzero(self.contacts.force > 0.0))
+
+    @property
+    def peak_pressure(self) -> float:
+        """Largest pressure of a contact [MPa]."""
+        return float(self.detail.peak_pressure.max(initial=0.0))
+
+    @property
+    def detail(self) -> ContactDetail:
+        """The contacts as spots, with Hertz's pressures; fields are not known."""
+        spots = self.touching
+        return ContactDetail(
+            place=spots.position,
+            area=spots.area,
+            force=spots.force,
+            peak_pressure=1.5 * spots.force / spots.area,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class AsperityModel:
+    """One of the four asperity models: a rigid plane touches given summits in separate ellipses.
 
     Args:
         kind: Name in `MODELS`.
+        asperities: The n summits, with the highest point z_M that the approach counts from.
+        contact_modulus: E* [MPa].
         solver: Solver of the models with interaction, a name in `SOLVERS`.
+        body: What a finite body with its sides adds to the half-space, between all contacts; a
+            half-space when not given.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
+
+    Source:
+        Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
     """
 
     kind: str
-    solver: str = "active-set"
+    asperities: Asperities
+    contact_modulus: float = field(kw_only=True)
+    solver: str = field(default="active-set", kw_only=True)
+    body: BodyModes | None = field(default=None, kw_only=True)
 
     def __post_init__(self) -> None:
-        super().__post_init__()
-        checked_name(self.kind, MODELS, "micro model")
-        checked_name(self.solver, SOLVERS, "solver")
+        checked_modulus(self.contact_modulus)
+        _checked_name(self.kind, MODELS, "micro model")
+        _checked_name(self.solver, SOLVERS, "solver")
 
-    def contacts_of(self, asperities: Asperities) -> AsperityContacts:
-        """Return the contacts of some asperities."""
+    @property
+    def name(self) -> str:
+        """Name of the model in `MODELS`."""
+        return self.kind
+
+    @property
+    def reference_height(self) -> float:
+        """Height z_M that the approach counts from [mm]."""
+        return self.asperities.highest
+
+    @property
+    def first_touch(self) -> float:
+        """Approach of a level plane at first contact [mm]; infinite without asperities."""
+        return float(self.reference_height - self.asperities.z.max(initial=-np.inf))
+
+    @cached_property
+    def contacts(self) -> AsperityContacts:
+        """The contacts of the asperities."""
         return AsperityContacts(
-            asperities=asperities,
+            asperities=self.asperities,
             contact_modulus=self.contact_modulus,
             kind=MODELS[self.kind],
             solver=self.solver,
             body=self.body,
         )
 
-    def touch_of(self, asperities: Asperities) -> float:
-        """Return the approach of a level plane at first contact with asperities [mm]."""
-        return float(self.reference_height - asperities.z.max(initial=-np.inf))
+    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
+        """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
+        own = patches.index_of(self.asperities.x, self.asperities.y) == index
+        alone = replace(self, asperities=self.asperities.subset(own), body=None)
+        return alone, patches.single(index)
 
-    def state_of(
-        self, contacts: AsperityContacts, found: Equilibrium, summits: Asperities
-    ) -> ContactState:
-        """Return the contacts of a solution.
+    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> ContactState:
+        """Solve for the contacts, and the motions of the plane that are free.
 
         Args:
-            contacts: The contacts of n asperities.
-            found: Their solution.
-            summits: The asperities whose places decide which patch a contact counts for.
-        """
-        a, hertz, solution = contacts.asperities, contacts.hertz, found.solution
-        semi_axes = np.stack([hertz.semi_major, hertz.semi_minor], axis=1)
-        ellipses = EllipticContacts(
-            x=a.x,
-            y=a.y,
-            angle=a.angle,
-            semi_axes=semi_axes * np.sqrt(solution.indentation)[:, None],
-            force=hertz.force * solution.indentation**1.5,
-        )
-        return ContactState(
-            plane=found.plane,
-            contacts=ellipses,
-            summits=np.stack([summits.x, summits.y], axis=1),
-            iterations=solution.iterations,
-            residual=solution.residual,
-            overlapping_contacts=solution.overlapping_contacts,
-            start=found,
-        )
+            control: What is prescribed of the plane.
+            start: `ContactState.start` of a solution nearby; without it the solution starts from
+                no contact.
 
-    def warning(self, state: ContactState, area_fraction: float) -> str:
-        """Return why contacts are too large to count as separate; see `ContactModel.warning`."""
+        Raises:
+            InputError: When the start does not fit, or the interaction of all contacts does not
+                fit into the memory.
+            NotConverged: When the contact conditions cannot be met, or no plane is in equilibrium.
+        """
+        found = self.contacts.equilibrium(control, start)
+        return ContactState(found, self.contacts.ellipses(found.solution.indentation))
+
+    def solve(
+        self,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = (0.0, 0.0),
+        start: Equilibrium | None = None,
+    ) -> ContactState:
+        """Solve for the contacts at one approach of the plane; see `equilibrium`.
+
+        Args:
+            approach: Rigid approach δ at the centre of the rectangle [mm].
+            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
+            start: `ContactState.start` of a solution nearby.
+        """
+        return self.equilibrium(Control(approach=approach, tilt=tilt), start)
+
+    def respond(
+        self,
+        approaches: ArrayLike,
+        *,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
+        tilt: tuple[float, float] = (0.0, 0.0),
+    ) -> Response:
+        """Solve along approaches, each from the solutions before it; see `MicroModel.respond`."""
+        patches, means = checked_patches(self.asperities, patches, mean_heights)
+        given = checked_approaches(approaches)
+        rows: list[dict[str, Any]] = [{}] * len(given)
+        last = before = None
+        for index in np.argsort(given, kind="stable"):
+            state = self.solve(float(given[index]), tilt=tilt, start=_extrapolated(last, before))
+            last, before = state.start, last
+            rows[index] = self._row(state, patches, means)
+        return Response.of(rows, self.name, self.contact_modulus, patches)
+
+    def press(
+        self,
+        control: Control,
+        *,
+        patches: Partition | None = None,
+        mean_heights: ArrayLike | None = None,
+        start: Equilibrium | None = None,
+    ) -> Pressed:
+        """Solve one load step; see `MicroModel.press`."""
+        patches, means = checked_patches(self.asperities, patches, mean_heights)
+        state = self.equilibrium(control, start)
+        rows = [self._row(state, patches, means)]
+        response = Response.of(rows, self.name, self.contact_modulus, patches)
+        return Pressed(response, state.plane, state.start, state)
+
+    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
+        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
+        indentation = state.start.solution.indentation
+        return normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1
+
+    def _row(self, state: ContactState, patches: Partition, mean_heights: Array) -> dict[str, Any]:
+        """Return the fields of a response for one plane.
+
+        By `patch_loads` a contact that straddles borders is shared among patches. As a contact it
+        counts for the patch that holds its summit. The paper assigns it whole.
+        """
+        plane, solution, contacts = state.plane, state.start.solution, state.touching
+        force, area = contacts.force, contacts.area.sum()
+        displacement = patch_displacements(patches, contacts, self.contact_modulus)
+        if self.body is not None:
+            points = BodyPoints.at(self.body, contacts.x, contacts.y)
+            displacement = displacement + points.patch_means(patches, force)
+        below = self.reference_height - plane.means(patches)
+        separation = below - mean_heights + displacement
+        patch_force, patch_area = patch_loads(patches, contacts)
+        owner = patches.index_of(contacts.x, contacts.y)
+        return {
+            "approach": plane.approach,
+            "force": force.sum(),
+            "moment": plane.moment(contacts.x, contacts.y, force),
+            "contact_area": area,
+            "contacts": len(force),
+            "mean_separation": np.average(separation, weights=patches.areas),
+            "iterations": solution.iterations,
+            "residual": solution.residual,
+            "overlapping_contacts": solution.overlapping_contacts,
+            "patch_force": patch_force,
+            "patch_contact_area": patch_area,
+            "patch_contacts": np.bincount(owner, minlength=patches.count),
+            "patch_displacement": displacement,
+            "patch_separation": separation,
+            "warning": self._warning(state, len(force), float(area / np.prod(patches.sides))),
+        }
+
+    def _warning(self, state: ContactState, contacts: int, area_fraction: float) -> str:
+        """Return why contacts are too large to count as separate; empty while they are not."""
         # A single contact, in a small patch say, is Hertz's at any area.
-        single = len(state.contacts.force) + state.overlapping_contacts <= 1
+        single = contacts + state.start.solution.overlapping_contacts <= 1
         if area_fraction <= LARGEST_AREA_FRACTION or single:
             return ""
         return (
@@ -110,74 +259,16 @@ class SummitModel(ContactModel):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class AsperityModel(SummitModel):
-    """One of the four asperity models on given asperities; see `SummitModel` for further fields.
-
-    Args:
-        kind: Name in `MODELS`.
-        asperities: The n summits, with the highest point z_M that the approach counts from.
-
-    Source:
-        Waddad et al. 2016, section 1.2, doi 10.1016/j.triboint.2015.12.023.
-    """
-
-    kind: str = field(kw_only=False)
-    asperities: Asperities = field(kw_only=False)
-
-    @property
-    def name(self) -> str:
-        """Name of the model in `MODELS`."""
-        return self.kind
-
-    @property
-    def rough(self) -> Asperities:
-        """The asperities."""
-        return self.asperities
-
-    @property
-    def first_touch(self) -> float:
-        """Approach of a level plane at first contact [mm]; infinite without asperities."""
-        return self.touch_of(self.asperities)
-
-    def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
-        own = patches.index_of(self.asperities.x, self.asperities.y) == index
-        alone = replace(self, asperities=self.asperities.subset(own), body=None)
-        return alone, patches.single(index)
-
-    @cached_property
-    def contacts(self) -> AsperityContacts:
-        """The contacts of the asperities."""
-        return self.contacts_of(self.asperities)
-
-    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> ContactState:
-        """Solve for contacts and plane; see `ContactModel.equilibrium`."""
-        found = self.contacts.equilibrium(control, start)
-        return self.state_of(self.contacts, found, self.asperities)
-
-    def stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
-        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
-        indentation = state.start.solution.indentation
-        return normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1
-
-    def extrapolated(
-        self, last: Equilibrium | None, before: Equilibrium | None
-    ) -> Equilibrium | None:
-        """Return what to start from; with equal steps it is right to second order."""
-        if last is None:
-            return None
-        own = last.solution.indentation
-        gained = own if before is None else own - before.solution.indentation
-        ahead = np.maximum(own + gained, 0.0)
-        return last._replace(solution=last.solution._replace(indentation=ahead))
+def _extrapolated(last: Equilibrium | None, before: Equilibrium | None) -> Equilibrium | None:
+    """Return what to start from; with equal steps it is right to second order."""
+    if last is None:
+        return None
+    own = last.solution.indentation
+    gained = own if before is None else own - before.solution.indentation
+    ahead = np.maximum(own + gained, 0.0)
+    return last._replace(solution=last.solution._replace(indentation=ahead))
 
 
-def checked_name(name: str, table: Collection[str], what: str) -> None:
-    """Refuse a name that is not in a table.
-
-    Raises:
-        InputError: When it is not.
-    """
+def _checked_name(name: str, table: Collection[str], what: str) -> None:
     if name not in table:
         raise InputError(f"this {what} is unknown", value=name, allowed=", ".join(table))

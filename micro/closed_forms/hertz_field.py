@@ -10,7 +10,7 @@ Both functions below return U/κ and (dU/ds)/κ.
 
 Held at a fixed v, U is linear in s; a lower bound on v therefore continues U linearly, with
 continuous slope, from the size at which the root falls below the bound.
-`micro.interaction.hertz_pairs` uses this for merging contacts.
+`micro.asperities.hertz_pairs` uses this for merging contacts.
 
 Far from the ellipse a series takes the place of Carlson's integrals. With τ = t + (1+β)/3 the
 product under the root of the underlying integrals becomes (1+t)(β+t)t = τ³ (1 + e2/τ² + e3/τ³).

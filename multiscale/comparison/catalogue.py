@@ -16,10 +16,9 @@ from typing import Any
 
 from geometry.errors import InputError, NotConverged
 from geometry.meshes.families import suggested_fine
-from micro import MODEL_NAMES
+from micro import MODELS
 from multiscale.comparison.configuration import OWN, Configuration
 from multiscale.comparison.scene_content import (
-    FITTED,
     LOW_HEIGHTS,
     LOW_HEIGHTS_SCALE,
     Content,
@@ -60,7 +59,7 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     """Return the configurations of a scene, those of the least predicted cost first.
 
     Args:
-        scene: The scene; only its key ``micro.model`` may be ``auto``.
+        scene: The scene, without auto values.
         ranks: Number of processes of configurations that can use more than one.
 
     Raises:
@@ -107,7 +106,8 @@ class _Catalogue:
     def __init__(self, scene: Scene) -> None:
         content, self._scene, self._patches = content_of(scene), scene, patch_grid(scene)
         # Every key of a configuration is stated, so that no accuracy chooses one.
-        self._accuracy = content.pop("accuracy", None)
+        self._accuracy, self._own_micro = content.pop("accuracy", None), content["micro"]
+        content["micro"] = scene.micro.model_dump(mode="json", exclude_none=True)
         # Only laws need a mesh of the block.
         content["block"].pop("cells", None)
         cells = block_section(scene).cells
@@ -123,11 +123,11 @@ class _Catalogue:
     def proposals(self) -> Iterator[Configuration]:
         """Yield all proposals, the scene itself first."""
         own: dict[str, Any] = {"patches": self._patches, "cells": self._own_cells}
-        made = self._proposal(self._base["coupling"], accuracy=self._accuracy, **own)
+        open_or_stated = {"accuracy": self._accuracy, "micro": self._own_micro}
+        made = self._proposal(self._base["coupling"], **open_or_stated, **own)
         yield replace(made, name=f"{OWN}: {made.name}")
-        for micro in (*({"model": name} for name in MODEL_NAMES), FITTED):
-            if micro != _HALF_SPACE:
-                yield self._proposal({"kind": "analytic"}, micro)
+        for model in MODELS:
+            yield self._proposal({"kind": "analytic"}, {"model": model})
         for kind in ("analytic", "concurrent"):
             yield from self._half_spaces({"kind": kind})
         yield from self._laws()
@@ -162,11 +162,11 @@ class _Catalogue:
         yield self._proposal(coupling, small, heights=self._law_grid, **grids)
 
     def _laws(self) -> Iterator[Configuration]:
-        """Yield couplings by laws, from asperities or islands and from half-spaces."""
+        """Yield couplings by laws, from asperities and from half-spaces."""
         own, cells, micro = self._patches, self._cells, self._base["micro"]
         isolated = {"kind": "isolated", "love": self._scene.coupling.love}
         consistent = {"kind": "consistent", "compliance": "decomposed"}
-        if micro["model"] not in ("half-space", "auto"):
+        if micro["model"] != "half-space":
             yield self._proposal(consistent, micro, patches=own)
         else:
             micro = {"model": "elliptic"}

@@ -17,7 +17,7 @@ from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 from multiscale.comparison.launch import check_launchable, launch_process
-from multiscale.planning.auto_keys import auto_keys, provisional, resolved_sections, with_resolved
+from multiscale.planning.auto_keys import auto_keys, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
 from multiscale.scene.identity import identity
@@ -114,7 +114,7 @@ def compare(
 
 
 def resolved_scene(scene: Scene, folder: Path) -> Scene:
-    """Return a scene with values for all keys that are ``auto``, but for the micro model.
+    """Return a scene with values for all keys that are ``auto``.
 
     The values are stored. Another call might measure other times on a busy machine, and then
     choose, for example, other patches.
@@ -133,7 +133,7 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     if values is None:
         values = resolved_sections(make_setup(scene), scene)
         write_record(path, (given, values))
-    return provisional(with_resolved(scene, values), auto & {"micro.model"})
+    return with_resolved(scene, values)
 
 
 def reference_within(

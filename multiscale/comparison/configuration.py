@@ -70,7 +70,9 @@ class Configuration:
     @property
     def model(self) -> str:
         """The micro model; empty for an explicit reference."""
-        return "" if self.kind == "reference" else str(self.content["micro"]["model"])
+        if self.kind == "reference":
+            return ""
+        return str(self.content["micro"].get("model", "half-space"))
 
     @property
     def heights(self) -> Grid:

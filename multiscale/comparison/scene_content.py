@@ -27,9 +27,6 @@ HEIGHTS_PER_WAVE = 3
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""
 
-FITTED: Content = {"model": "elliptic", "curvature": "contact", "border": "include"}
-"""Elliptic asperities with curvatures at the scale of contacts, those on the border included."""
-
 _NO_OUTPUT: Content = {
     "figures": False,
     "report": False,
@@ -46,8 +43,13 @@ def pressure_grid(scene: Scene) -> Grid:
 
 
 def content_of(scene: Scene) -> Content:
-    """Return a scene as it would stand in a file, without output and without halved load steps."""
+    """Return a scene as it would stand in a file, without output and without halved load steps.
+
+    A micro model that an accuracy leaves open stays open.
+    """
     content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
+    if scene.accuracy is not None and not scene.micro.model_fields_set:
+        content["micro"] = {}
     for key, path in scene.files().items():  # the content has no folder that names start in
         *sections, name = key.split(".")
         place: Any = content
@@ -95,7 +97,8 @@ def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
 def name_of(content: Content) -> str:
     """Return the name of a scene among its configurations."""
     micro, reference, surface = (content[name] for name in ("micro", "reference", "surface"))
-    kind, model, cells = content["coupling"]["kind"], micro["model"], content["block"].get("cells")
+    kind, model = content["coupling"]["kind"], micro.get("model", "half-space")
+    cells = content["block"].get("cells")
     if kind == "reference":
         meshes, fine = reference["meshes"], reference.get("fine")
         name = f"reference, {meshes} mesh{'es' * (meshes > 1)}"
@@ -103,7 +106,7 @@ def name_of(content: Content) -> str:
     name = kind
     if kind in ("isolated", "consistent"):
         name += f", {_times(content['patches']['grid'])} patches"
-    name += f", {model}" + ", fitted" * (micro == FITTED)
+    name += f", {model}"
     if model == "half-space":
         name += f" {_times(surface['grid'])}"
     name += f", {_times(cells)} elements" if cells else ""

@@ -284,8 +284,6 @@ def approximation_notes(
         table: The laws, where the steps use laws.
         steps: The load steps.
     """
-    if setup.choice is not None:
-        yield Detail(f"micro model chosen: {setup.choice.sentence}")
     if table is not None:
         yield from table.notes(setup.table_tolerance)
         planned, taken = newton_choice(setup), newton_choice(setup, table)

@@ -148,7 +148,7 @@ class ContactCoupling:
 
         return on_root(self._comm, pressures)
 
-    def stiffness(self) -> tuple[float | None, int]:
+    def stiffness(self) -> tuple[float, int]:
         """Return dF/dδ at the latest load step, and its iterations; see `HasStiffness`."""
         return on_root_alone(
             self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)

@@ -34,7 +34,6 @@ MARKERS = dict(zip(KINDS, "osD^*", strict=True))
 
 MODELS: dict[str, dict[str, Any]] = {
     "half-space": {"color": BLUE, "ls": "-", "marker": "^"},
-    "islands": {"color": GREEN, "ls": "-", "marker": "D"},
     "elliptic": {"color": VERMILLION, "ls": "-", "marker": "s"},
     "circular": {"color": ORANGE, "ls": "-", "marker": "o"},
     "elliptic-independent": {"color": VERMILLION, "ls": "--", "marker": "s", "mfc": "white"},

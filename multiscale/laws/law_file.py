@@ -18,6 +18,7 @@ from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.law_table import LawTable, part_key
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
+from multiscale.removed import refuse_removed_laws
 from multiscale.storage import checksummed, stored_numbers, verified
 
 FORMAT = "patchlaw laws 3"
@@ -97,8 +98,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
         path: The file, by name or open.
 
     Raises:
-        InputError: When the file cannot be read, is no law file, damaged, lacks anything, or was
-            written before law files had a checksum.
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, was
+            written before law files had a checksum, or with a micro model that is gone.
     """
     path = Path(path) if isinstance(path, str) else path
     name = str(path) if isinstance(path, Path) else None
@@ -135,6 +136,7 @@ def _table(file: Any) -> LawTable:
         for name, text in file.attrs.items()
         if name.startswith("made_by_")
     }
+    refuse_removed_laws(made_by.get("model", ""))
     laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]

@@ -69,7 +69,7 @@ class HasStiffness(Protocol):
         The slopes of the plane stay or, where it turns, its moments stay zero.
 
         Returns:
-            The stiffness [N/mm]; None where no linear solution gives it.
+            The stiffness [N/mm]; None before the first load step.
 
         Note:
             Collective.

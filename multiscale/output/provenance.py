@@ -55,7 +55,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "regions": list(setup.regions.names) if setup.regions else None,
         "bodies": [_body(face) for face in (setup.face, setup.counter_face) if face is not None],
         "contact_modulus_MPa": setup.materials.contact_modulus,
-        "micro_model": _micro_model(setup),
+        "micro_model": None if setup.micro is None else {"name": setup.model.name},
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -114,15 +114,6 @@ def _summits(setup: ProblemSetup) -> dict[str, int]:
         "summits_in_reach": int(setup.interfering_summits.sum()),
         "border_maxima_in_reach": setup.interfering_border_maxima,
     }
-
-
-def _micro_model(setup: ProblemSetup) -> dict[str, Any] | None:
-    """Return the micro model and, where it was chosen, the candidates; None without one."""
-    if setup.micro is None:
-        return None
-    choice = setup.choice
-    chosen = {} if choice is None else {"chosen": choice.taken, "candidates": choice.candidates}
-    return {"name": setup.model.name, **chosen}
 
 
 def library_versions() -> dict[str, str]:

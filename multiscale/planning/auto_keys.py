@@ -60,15 +60,12 @@ def accuracy_of(scene: Scene) -> float:
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
-    Without an accuracy, a micro model that is the only auto value besides patches and cells is
-    chosen by its own error, see `micro.choose`.
-
     Args:
         scene: The scene as it was given.
     """
     auto = auto_keys(scene)
     if scene.accuracy is None:
-        return not auto <= {"micro.model", "patches.grid", "block.cells"}
+        return not auto <= {"patches.grid", "block.cells"}
     return bool(auto & {"surface.grid", "micro.model", "coupling.kind"}) or (
         scene.kind == "reference"
     )
@@ -81,12 +78,7 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
         scene: The scene as it was given.
         auto: Its auto keys.
     """
-    measured = is_measured(scene) and scene.micro.tolerance is None
-    start: dict[str, Any] = {
-        "micro.model": "half-space" if measured else "auto",
-        "block.cells": None,
-        "patches.grid": PROVISIONAL_PATCHES,
-    }
+    start: dict[str, Any] = {"block.cells": None, "patches.grid": PROVISIONAL_PATCHES}
     changed = scene
     if "coupling.kind" in auto:
         changed = scene.model_copy(update={"coupling": next(couplings(scene))})
@@ -119,7 +111,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
 
     Returns:
         The sections with auto values by name, as JSON can hold them. That of the micro model is the
-        label of the candidate that was chosen, or the cells of the half-space.
+        cells of the half-space.
     """
     names = {key.partition(".")[0] for key in auto_keys(given)}
     if is_measured(given):
@@ -128,9 +120,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
     for name in sorted(names):
         section = getattr(setup.scene, name)
         found[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
-    if setup.choice is not None:
-        found["micro"] = setup.choice.taken.label
-    elif "micro" in names:
+    if "micro" in names:
         model = setup.micro
         found["micro"] = list(model.surface.grid) if isinstance(model, HalfSpaceModel) else None
     return found
@@ -148,8 +138,6 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         for name, content in resolved.items()
         if name != "micro"
     }
-    if isinstance(resolved.get("micro"), list):
-        changed["micro"] = scene.micro.model_copy(update={"model": "half-space"})
     return scene.model_copy(update=changed)
 
 

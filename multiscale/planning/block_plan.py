@@ -125,12 +125,6 @@ def _proportions(setup: ProblemSetup) -> Iterator[str]:
 def _patch_warnings(setup: ProblemSetup) -> Iterator[str]:
     if setup.scene.kind != "isolated":
         return
-    grids = zip(setup.surface.grid, setup.patches.grid, strict=True)
-    if setup.model.name == "islands" and any(cells % patches for cells, patches in grids):
-        yield (
-            "patch borders cut cells of the surface: every patch is taken alone along whole cells; "
-            "a grid that is a multiple of the patches would fit"
-        )
     widths = [length + 2.0 * setup.shape.margin for length in setup.surface.lengths]
     if max(setup.patches.size) > 0.5 * min(setup.shape.height, *widths):
         yield (

@@ -31,8 +31,6 @@ _NEWTON_STEPS = 2.7
 
 # times on one core [s]
 _SURFACE, _SURFACE_HEIGHT = 2e-3, 0.25e-6
-_CHOICE, _CHOICE_HEIGHT = 0.05, 6e-6
-"""Time of choosing a micro model, and of it per height of the surface."""
 _IMPORT, _BODY = 0.52, 0.05
 """Times of importing dolfinx, PETSc and gmsh, and of the body correction of a cube. Thin blocks
 take several times longer."""
@@ -122,8 +120,6 @@ def _seconds(setup: ProblemSetup, speed: Speed, launch: Launch) -> dict[str, flo
     seconds = {"surface": speed.arrays * (_SURFACE + _SURFACE_HEIGHT * heights)}
     on_mesh = setup.uses_laws and not newton_choice(setup).condensed
     imports = 0.0 if launch.imported("dolfinx") else speed.arrays * _IMPORT
-    if setup.choice is not None:
-        seconds["micro choice"] = speed.arrays * (_CHOICE + _CHOICE_HEIGHT * heights)
     if setup.meshes is not None:
         made, pressed = reference_seconds(setup, setup.meshes, steps, speed)
         seconds |= {"block": imports + made, "load steps": pressed}

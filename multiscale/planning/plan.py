@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from geometry.materials import Material
 from geometry.statistics import roughness
-from micro import MODELS, AsperityModel, HalfSpaceModel
+from micro import AsperityModel, HalfSpaceModel
 from multiscale.couplings.assembly import newton_choice
 from multiscale.planning.auto_keys import heights_per_wave
 from multiscale.planning.block_plan import block_statement, block_warnings
@@ -88,7 +88,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
         )
     if not setup.interfering_patches:
         yield "nothing lies within the largest approach: no force will act"
-    if setup.ignores_border and setup.interfering_border_maxima:
+    if setup.uses_summits and setup.interfering_border_maxima:
         yield (
             "maxima on the surface's border within the largest approach: "
             f"{setup.interfering_border_maxima}; an 8-neighbour search cannot confirm them, and "
@@ -97,7 +97,7 @@ def warnings(setup: ProblemSetup) -> Iterator[str]:
     if isinstance(setup.micro, AsperityModel) and setup.asperities.flat:
         yield (
             f"{setup.asperities.flat} summits are flat, as heights in steps are: without radii "
-            "they carry no load here; take micro.curvature = 'contact', islands or half-space"
+            "they carry no load here; take micro.model = 'half-space'"
         )
     if setup.scene.output.fields and not setup.has_block:
         yield (
@@ -206,15 +206,11 @@ def _two_sides(setup: ProblemSetup) -> str:
 def _model(setup: ProblemSetup) -> str:
     if setup.micro is None:
         return "none: contacts are meshed, and the keys of [micro] are not used"
-    if setup.choice is not None:
-        return f"auto: {setup.choice.sentence}"
-    micro = setup.scene.micro
-    interacts, of_summits = micro.model in _INTERACTING, micro.model in MODELS
-    uses = {"solver": interacts, "curvature": of_summits, "border": of_summits}
-    stated = {key for key in uses if getattr(micro, key) != getattr(type(micro)(), key)}
-    unused = ", ".join(f"micro.{key}" for key in uses if key in stated and not uses[key])
-    text = f"{setup.model.name}, solved by {micro.solver}" if interacts else setup.model.name
-    return f"{text}; it has no use for {unused}" if unused else text
+    micro, name = setup.scene.micro, setup.model.name
+    if micro.model in _INTERACTING:
+        return f"{name}, solved by {micro.solver}"
+    unused = micro.solver != type(micro)().solver
+    return f"{name}; it has no use for micro.solver" if unused else name
 
 
 def _coupling(setup: ProblemSetup) -> str:

@@ -9,19 +9,16 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
-from micro import Choice, HalfSpaceModel, MicroModel, choose, micro_model
+from micro import HalfSpaceModel, MicroModel, micro_model
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.loading.stepper import Coupling, LoadHistory, load_steps
 from multiscale.machine import ClusterNodes
 from multiscale.planning.accuracy import setup_by_accuracy
 from multiscale.planning.auto_keys import (
-    accuracy_of,
     auto_keys,
     is_measured,
     map_grid,
@@ -50,8 +47,6 @@ from multiscale.setup.surface_and_block import (
 _ESTIMATE_CELLS = 96
 """Cells along a side, at most, of the half-space that estimates the plane at the largest load. On
 1024² cells with waves down to a 16th, 64th and 256th of the side the approach was within 1.5 %."""
-SOLUTIONS_OF_LAWS = 40
-"""Approaches that a table of laws takes, roughly, for the cost of a micro model."""
 
 
 def make_setup(
@@ -100,14 +95,13 @@ def _setup(
     known: Any = None,
     like: ProblemSetup | None = None,
 ) -> ProblemSetup:
-    """Set up the problem of a scene of which the micro model alone may have an auto value.
+    """Set up the problem of a scene without auto values, but for cells of its half-space.
 
     Args:
         scene: The scene.
         nodes: The nodes of the run.
         faces: What is known of the meshes of its bodies.
-        known: What the micro model became when the run began, a label or cells; None when that is
-            not known.
+        known: The cells of the half-space when the run began; None when they are the surface's.
         like: As in `make_setup`.
     """
     began = time.perf_counter()
@@ -142,11 +136,7 @@ def _setup(
         seconds["load estimate"] = time.perf_counter() - made
         meshes = reference_meshes(scene, surface, plane, nodes)
         return setup(micro=None, plane_at_largest_load=plane, meshes=meshes, seconds=seconds)
-    choice = None
-    if scene.micro.model == "auto":
-        choice = _chosen_model(scene, surface, patches, known, modulus)
-        seconds["micro choice"] = time.perf_counter() - made
-    model = choice.model if choice else stated_model(scene, surface, modulus)
+    model = stated_model(scene, surface, modulus)
     if isinstance(known, list) and isinstance(model, HalfSpaceModel):
         model = model.resampled((int(known[0]), int(known[1])))
     _refuse_without_summits(scene, model)
@@ -159,7 +149,7 @@ def _setup(
         coupling = ContactCoupling(model, patches, patch_means(surface, patches))
         plane = plane_at_largest_load(scene.loading.load_history, coupling, surface)
     seconds["load estimate"] = time.perf_counter() - chosen
-    return setup(micro=model, plane_at_largest_load=plane, choice=choice, seconds=seconds)
+    return setup(micro=model, plane_at_largest_load=plane, seconds=seconds)
 
 
 def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
@@ -168,7 +158,7 @@ def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
             "the surface has no summit that could carry load",
             key="micro.model",
             value=scene.micro.model,
-            allowed="half-space, islands",
+            allowed="half-space",
             file=scene.file,
         )
 
@@ -186,8 +176,6 @@ def stated_model(scene: Scene, surface: Surface, contact_modulus: float) -> Micr
         surface,
         contact_modulus=contact_modulus,
         solver=scene.micro.solver,
-        curvature=scene.micro.curvature,
-        border=scene.micro.border,
     )
     if isinstance(model, HalfSpaceModel):
         return replace(model, periodic=scene.surface.periodic, upper=scene.micro.upper)
@@ -230,24 +218,3 @@ def estimated_plane(scene: Scene, surface: Surface, contact_modulus: float) -> R
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     coupling = ContactCoupling(model, whole, patch_means(surface, whole))
     return plane_at_largest_load(scene.loading.load_history, coupling, surface)
-
-
-def _chosen_model(
-    scene: Scene, surface: Surface, patches: PatchGrid, label: str | None, modulus: float
-) -> Choice:
-    """Choose the micro model for the largest approach anywhere, or take the one of a label."""
-    kind, plane = scene.kind, estimated_plane(scene, surface, modulus)
-    solutions = scene.loading.load_history.count
-    if kind in ("isolated", "consistent"):
-        solutions = SOLUTIONS_OF_LAWS
-    # a tilted plane comes nearest at a corner of the surface
-    tilted = 0.5 * float(np.abs(np.multiply(surface.lengths, plane.tilt)).sum())
-    return choose(
-        surface,
-        contact_modulus=modulus,
-        approach=plane.approach + tilted,
-        tolerance=scene.micro.tolerance or accuracy_of(scene),
-        patches=patches if kind != "analytic" else None,
-        solutions=solutions,
-        label=label,
-    )

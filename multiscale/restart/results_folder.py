@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from geometry.collective import on_root
 from geometry.errors import InputError
+from multiscale.removed import without_removed
 from multiscale.restart.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
 from multiscale.scene.identity import (
     CONTENT,
@@ -238,7 +239,8 @@ def _provenance(folder: Path) -> _Provenance | None:
     """Return what the results in a folder say of themselves; None where they say nothing."""
     try:
         found = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
-        then = flat_identity(found["scene_given"], found.get("files", {}), found["patchlaw"])
+        scene = without_removed(found["scene_given"])
+        then = flat_identity(scene, found.get("files", {}), found["patchlaw"])
         return _Provenance(then, found["finished"] is True)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None

@@ -14,6 +14,7 @@ from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
 
 _TEXT = "reason"
@@ -38,6 +39,7 @@ def read_history(folder: str | Path) -> History:
     path = folder / "provenance.json"
     try:
         provenance = json.loads(path.read_text(encoding="utf-8"))
+        refuse_removed_results(provenance["scene_given"])
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]
         patches: PatchGrid | Regions
         if grid is None:
@@ -47,6 +49,8 @@ def read_history(folder: str | Path) -> History:
         states = _patch_states(patch_rows, patches.count)
         steps = tuple(_load_step(row, state) for row, state in zip(rows, states, strict=True))
         seconds, notes = provenance["seconds"], tuple(provenance["notes"])
+    except InputError as error:
+        raise error.located(file=str(path)) from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(
             f"is not the result of a run: {type(error).__name__}: {error}", file=str(path)

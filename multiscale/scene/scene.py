@@ -11,6 +11,7 @@ from typing import Any, get_origin
 from pydantic import BaseModel, ValidationError
 
 from geometry.errors import InputError
+from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 from multiscale.scene.sections import NAMES_A_FILE, Section
@@ -66,7 +67,10 @@ class Scene(SceneSections):
             InputError: When anything is wrong; names file, key, value and what is allowed.
         """
         try:
+            refuse_removed(data)
             scene = cls.model_validate(data)
+        except InputError as error:
+            raise error.located(file=str(source) if source else None) from None
         except ValidationError as error:
             raise _first_problem(error, cls).located(file=str(source) if source else None) from None
         scene._source, scene._written = source, Written(data)

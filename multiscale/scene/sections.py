@@ -275,26 +275,15 @@ class MicroSection(Section):
         "circular",
         "elliptic-independent",
         "circular-independent",
-        "islands",
         "half-space",
-        "auto",
     ] = "half-space"
     """How contacts are solved: ``half-space`` cell by cell; as elliptic or circular summits, with
-    interaction or ``-independent`` of each other (Waddad et al. 2016); as ``islands``; ``auto``
-    takes the cheapest that keeps ``tolerance``."""
-    tolerance: Annotated[Number, Field(gt=0, lt=0.5)] | None = None
-    """Relative error of the force that ``model = "auto"`` may have, at the largest load and at half
-    of it. It holds for the whole surface, not for what isolated laws leave out. When not given it
-    is what the scene's accuracy leaves to the micro model, or 2 %."""
+    interaction or ``-independent`` of each other (Waddad et al. 2016)."""
     solver: Literal["active-set", "truncated-newton"] = "active-set"
     """Solver of interacting summits."""
-    curvature: Literal["summit", "contact"] = "summit"
-    """Whether a summit's curvature is taken at its top, or over the size of its contact."""
     finite_slopes: Flag | None = None
     """Whether the slopes of the roughness, where they are not small, count to second order. When
     not given they do with half-space contacts, unless laws are isolated or those of samples."""
-    border: Literal["ignore", "include"] = "ignore"
-    """Whether maxima on the surface's border carry load."""
     hardness: Annotated[Pressure, Field(gt=0)] | None = None
     """Hardness of the softer body, about 2.8 to 3 times its yield strength (Tabor 1951): no contact
     pressure exceeds it, and what it leaves of the overlap stays as plastic depth. Contacts are
@@ -304,18 +293,6 @@ class MicroSection(Section):
     def upper(self) -> float:
         """Largest contact pressure [MPa]; infinite without a hardness."""
         return math.inf if self.hardness is None else self.hardness
-
-    @model_validator(mode="after")
-    def _chooses_or_states(self) -> Self:
-        if self.model != "auto" and self.tolerance is not None:
-            raise ValueError("'tolerance' needs model = 'auto' (allowed: leave it out)")
-        stated = (self.solver, self.curvature, self.border)
-        if self.model == "auto" and stated != ("active-set", "summit", "ignore"):
-            raise ValueError(
-                "'solver', 'curvature' and 'border' are chosen by model = 'auto' "
-                "(allowed: leave them out)"
-            )
-        return self
 
 
 class OutputSection(Section):

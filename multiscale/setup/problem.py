@@ -19,7 +19,7 @@ from geometry import (
     Surface,
     find_asperities,
 )
-from micro import AsperityModel, Choice, HalfSpaceModel, MicroModel, ScaledModel
+from micro import AsperityModel, HalfSpaceModel, MicroModel
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
@@ -115,7 +115,7 @@ class ProblemSetup:
     """Everything that is known of a scene before laws and finite elements are made.
 
     Attributes:
-        scene: The scene with its auto values resolved, but for ``micro.model``.
+        scene: The scene with its auto values resolved.
         surface: Its rough surface, with the heights of both sides where both are rough.
         micro: Micro model of the whole surface; None in a reference, which has none.
         patches: Partition of the interface.
@@ -131,10 +131,9 @@ class ProblemSetup:
         counter_face: The same of a counter-body on a mesh.
         samples: Under laws of samples those of every region; empty otherwise.
         bodies: The bodies on meshes, on every rank; empty without any.
-        choice: Why this micro model was chosen, where the scene says ``auto``.
         meshes: The meshes of a reference; None with other couplings.
         decision: Why the auto values became what they are, where measured errors decided.
-        seconds: Wall time of making the surface and of choosing the micro model [s].
+        seconds: Wall time of each part of setting it up [s].
     """
 
     scene: Scene
@@ -150,7 +149,6 @@ class ProblemSetup:
     counter_face: FaceFacts | None = None
     samples: tuple[RegionSamples, ...] = ()
     bodies: SceneBodies = field(default_factory=SceneBodies)
-    choice: Choice | None = None
     meshes: ReferenceMeshes | None = None
     decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -216,13 +214,7 @@ class ProblemSetup:
     @property
     def uses_summits(self) -> bool:
         """Whether the micro model knows the summits alone and not the whole surface."""
-        return isinstance(self.micro, AsperityModel | ScaledModel)
-
-    @property
-    def ignores_border(self) -> bool:
-        """Whether maxima on the border of the surface carry no load in the micro model."""
-        includes = isinstance(self.micro, ScaledModel) and self.micro.border == "include"
-        return self.uses_summits and not includes
+        return isinstance(self.micro, AsperityModel)
 
     @property
     def table_tolerance(self) -> float:
@@ -276,7 +268,7 @@ class ProblemSetup:
     def interfering_patches(self) -> int:
         """Number of patches that the largest closures of their laws bring into contact."""
         surface, largest = self.surface, self.largest_closures
-        if self.ignores_border:
+        if self.uses_summits:
             x, y, z = self.asperities.x, self.asperities.y, self.asperities.z
         else:  # few of many heights come near
             i, j = np.nonzero(largest.max() > surface.highest - surface.heights)

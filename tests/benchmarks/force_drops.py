@@ -13,7 +13,7 @@ import time
 import numpy as np
 
 from geometry import PatchGrid, Spectrum, find_asperities, synthesise
-from micro import MODELS, AsperityModel, IslandModel, ScaledModel
+from micro import MODELS, AsperityModel
 
 APPROACHES = np.arange(1, 105) * 0.25e-3
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -25,9 +25,6 @@ def models(seed):
     asperities = find_asperities(surface, periodic=False)
     for kind in MODELS:
         yield kind, AsperityModel(kind, asperities, contact_modulus=4000.0)
-    for kind in ("elliptic", "circular"):
-        yield f"{kind}, scaled", ScaledModel(kind=kind, surface=surface, contact_modulus=4000.0)
-    yield "islands", IslandModel(surface=surface, contact_modulus=4000.0)
 
 
 def study(surfaces):

@@ -38,7 +38,7 @@ def body(mesh, contact, support, *more):
 
 NO_FIGURES = "[output]\nfigures = false\nreport = false"
 SMALL_SLOPES = "[micro]\nfinite_slopes = false"
-ELLIPTIC, ISLANDS = '[micro]\nmodel = "elliptic"', '[micro]\nmodel = "islands"'
+ELLIPTIC = '[micro]\nmodel = "elliptic"'
 SAMPLE = '[law]\nkind = "representative"'
 
 SCENES = {
@@ -63,9 +63,6 @@ SCENES = {
     ),
     "elliptic-256": (scene("analytic", 256, by(8, approach=6), ELLIPTIC), 1, 1),
     "elliptic-1024": (scene("analytic", 1024, by(4, force=1), ELLIPTIC, waves=(2, 64)), 1, 1),
-    "islands-256": (scene("analytic", 256, by(8, approach=4), ISLANDS), 1, 1),
-    "islands-512": (scene("analytic", 512, by(4, force=2), ISLANDS, waves=(2, 32)), 1, 2),
-    "auto-256": (scene("analytic", 256, by(4, approach=4), '[micro]\nmodel = "auto"'), 1, 1),
     "concurrent-64": (scene("concurrent", 64, by(8, approach=6)), 1, 1),
     "concurrent-128-all": (
         scene("concurrent", 128, by(4, approach=6), '[output]\ncheck = "all"'), 1, 1,

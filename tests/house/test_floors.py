@@ -30,10 +30,9 @@ FLOORS = {
     "micro": [
         "closed_forms conductance contact_detail",
         "compliance model",
-        "contact interaction",
-        "half_space islands",
-        "asperities",
-        "choice",
+        "asperities contact",
+        "half_space",
+        "by_name",
     ],
     "macro": [
         "elasticity form_cache",
@@ -46,7 +45,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "readable",
+        "readable removed",
         "figures installation machine storage",
         "doctor laws loading",
         "compiled_forms exports results scene",

@@ -53,12 +53,11 @@ SCENES = {
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],
-    "concurrent, islands": ["coupling.kind=concurrent", "micro.model=islands"],
     "concurrent, asperities": [
         "coupling.kind=concurrent", "micro.model=elliptic", "load.tilt=free",
     ],
     "cells for an accuracy": [
-        "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto", "micro.model=auto",
+        "accuracy=0.05", "surface.grid=auto", "coupling.kind=auto",
         "output.check=all",
     ],
     "laws of the half-space, contact on request": [
@@ -115,7 +114,6 @@ LONG = {
     "cube, patchwise",  # as the wide block
     "concurrent, asperities",
     "condensed, up and down",
-    "concurrent, islands",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",
     "concurrent, with a hardness, conducting",

@@ -11,10 +11,8 @@ KINDS = ("isolated", "consistent", "concurrent", "analytic")
 MODELS = (
     {"model": "half-space"},
     {"model": "half-space"},
-    {"model": "islands"},
     {"model": "elliptic"},
     {"model": "circular-independent"},
-    {"model": "elliptic", "curvature": "contact", "border": "include"},
 )
 PLACES = ("anywhere", "anywhere", "middle", "border", "beside a side", "side", "corner")
 

@@ -43,7 +43,7 @@ def checks(case, folder):
     base = case.history(folder, **points)
     yield from _alone(case, base)
     solved = _solved(case)
-    ellipses = case.micro["model"] not in ("half-space", "islands")
+    ellipses = case.micro["model"] != "half-space"
     shared = max(solved, SHARED) if ellipses else solved
     mirrored = case.mirrored().history(folder, **points)
     yield from _same("mirrored", case, base, mirrored, lambda f: f[::-1], solved, shared)
@@ -110,23 +110,15 @@ def _same(name, case, base, other, change, solved, shared, scale=(1.0, 1.0)):
 
 def _solved(case):
     """Return what a coupling and its micro model are solved to, relative to the force."""
-    if case.micro["model"] == "islands" and case.kind in ("isolated", "consistent"):
-        return 1e-3  # forces jump where islands merge: rounding tells on which side a row lies
-    if case.micro["model"] == "islands":
-        return 1e-6  # changes of displacements
-    if (
-        case.micro["model"] == "half-space"
-        or "curvature" in case.micro
-        or case.kind in ("concurrent", "consistent")
-    ):
-        return 1e-8  # residuals of pressures, curvatures, forces; rounding of the body's compliance
+    if case.micro["model"] == "half-space" or case.kind in ("concurrent", "consistent"):
+        return 1e-8  # residuals of pressures and forces; rounding of the body's compliance
     return 1e-9
 
 
 def _stated(case):
     """Return the error that the README states of consistent laws, against concurrent contacts.
 
-    Half-space contacts on a cube under a level plane are best; asperities and islands know of no
+    Half-space contacts on a cube under a level plane are best; asperities know of no
     free sides, and few patches or a tilt want small bending.
     """
     cube = 0.5 <= case.block["height"] <= 2.0 and case.tilt == (0.0, 0.0)

@@ -9,7 +9,7 @@ import pytest
 from hard_cases import KINDS, history, scene
 
 from geometry import PatchGrid, patch_means
-from micro.choice.models import MODEL_NAMES
+from micro import MODEL_NAMES
 from multiscale.planning.problem_setup import stated_model
 from multiscale.setup.surface_and_block import make_surface
 
@@ -19,41 +19,29 @@ COARSE = {
     "surface__grid": [24, 24],
     "surface__spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": 2},
 }
-OPTIONS = {"micro__curvature": "contact", "micro__border": "include"}
-SHORT = ("isolated", "analytic")  # the others make the body's compliance first
 
 
-def models():
-    """Yield what names each micro model."""
-    yield from ({"micro__model": name} for name in MODEL_NAMES)
-    yield {"micro__model": "elliptic"} | OPTIONS
-
-
-def named(given):
-    """Return what a case is called."""
-    return given if isinstance(given, str) else "-".join(given.values())
-
-
-@pytest.mark.parametrize(
-    ("kind", "model"),
-    [(kind, model) for model in models() for kind in KINDS if kind in SHORT or len(model) == 1],
-    ids=named,
-)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("model", MODEL_NAMES)
 def test_forces_rise_from_nothing(kind, model):
     """Twenty-four heights across ten waves: a spline of a part differs from the whole's by 3 µm."""
     force = history(
-        coupling__kind=kind, load__steps=1, load__approach=["1 pm", "1 nm"], **COARSE, **model
+        coupling__kind=kind,
+        load__steps=1,
+        load__approach=["1 pm", "1 nm"],
+        micro__model=model,
+        **COARSE,
     ).force_N
     assert np.all((force >= 0.0) & (force <= PUNCH * np.array([1e-9, 1e-6])))
 
 
-@pytest.mark.parametrize("model", list(models()), ids=named)
+@pytest.mark.parametrize("model", MODEL_NAMES)
 @pytest.mark.parametrize("patches", [(1, 1), pytest.param((4, 4), marks=pytest.mark.long), (3, 5)])
 def test_nothing_touches_before_first_touch(model, patches):
     """Neither the whole surface nor a patch of it alone, which rises no higher than the whole."""
     for seed in range(3):
         spectrum = COARSE["surface__spectrum"] | {"seed": seed}
-        given = scene(**COARSE | {"surface__spectrum": spectrum}, **model)
+        given = scene(**COARSE | {"surface__spectrum": spectrum}, micro__model=model)
         surface = make_surface(given)
         grid = PatchGrid(grid=patches, lengths=surface.lengths)
         means = patch_means(surface, grid)

@@ -86,7 +86,7 @@ def test_coincident_summits_share_the_force_of_one(name, count, share):
     assert all_of_them.contacts.force.sum() / alone.contacts.force[0] == pytest.approx(
         share, rel=tolerance
     )
-    assert all_of_them.overlapping_contacts == count * (count - 1)
+    assert all_of_them.start.solution.overlapping_contacts == count * (count - 1)
 
 
 @both_shapes
@@ -95,7 +95,7 @@ def test_kernel_is_exact_before_merging(name):
     model = AsperityModel(name, CASES["two equal"], contact_modulus=E_STAR)
     states = [model.solve(approach) for approach in np.linspace(1e-3, 0.03, 100)]
     reach = np.array([state.contacts.semi_axes[0, 0] for state in states]) / 0.04
-    overlapping_contacts = np.array([state.overlapping_contacts for state in states])
+    overlapping_contacts = np.array([state.start.solution.overlapping_contacts for state in states])
     assert np.all(overlapping_contacts[reach < 0.796] == 0) and np.all(
         overlapping_contacts[reach > 0.798] == 2
     )

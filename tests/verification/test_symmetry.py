@@ -1,7 +1,6 @@
 """A mirrored or turned surface gives the mirrored or turned result, in every coupling.
 
-Borders of patches run through the middle of cells here, and the rectangles that a body's loads are
-gathered on are finer than what the islands are sampled with.
+Borders of patches run through the middle of cells here.
 """
 
 from itertools import product
@@ -14,7 +13,7 @@ from geometry import Spectrum, synthesise
 
 PATCHES, CELLS = (4, 2), (6, 4)
 GRID, LENGTHS = (18, 15), (1.0, 0.8)
-MODELS = ("half-space", "islands", "elliptic", "circular-independent")
+MODELS = ("half-space", "elliptic", "circular-independent")
 
 CHANGES = {
     "mirror": lambda field: field[::-1],
@@ -42,8 +41,6 @@ def pressed(folder, heights, kind, model, turned=False):
 
 
 LONG = [
-    ("isolated", "islands"),
-    ("consistent", "islands"),
     ("consistent", "half-space"),
     ("consistent", "elliptic"),
 ]

@@ -14,7 +14,7 @@ COMMANDS = (
 SCENE = "SCENE"  # stands for the scene file
 GOOD = (
     "--out out", "--out out/deeper", "--set output.figures=false", "--resume", "--overwrite",
-    "--set load.steps=1 micro.model=islands", "--set load.tilt=free",
+    "--set load.steps=1 micro.model=elliptic", "--set load.tilt=free",
     "--set coupling.kind=isolated block.cells=[4,4,3]",
     "--set output.report=false load.force=0.1", "--export csv", "--export 4c --export calculix",
 )  # fmt: skip

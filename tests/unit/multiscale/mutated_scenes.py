@@ -170,7 +170,6 @@ def surfaces(draw):
     kinds = ("analytic", "isolated", "consistent", "concurrent")
     data = put(data, "coupling.kind", draw(st.sampled_from(kinds)))
     data = put(data, "micro.model", draw(KEYS["micro.model"]))
-    data = put(data, "micro.curvature", draw(KEYS["micro.curvature"]))
     data = put(data, "block.cells", [4, 4, 4])
     data = put(data, "load.approach", draw(st.sampled_from([1e-15, 1e-6, 1e-3, 5e-3, 0.3])))
     data = put(data, "load.tilt", draw(st.sampled_from([[0.0, 0.0], [1e-3, 0.0], "free"])))

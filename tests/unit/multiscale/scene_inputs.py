@@ -120,11 +120,8 @@ KEYS = {
     "block.margin_cells": counts,
     "block.margin_grading": st.one_of(st.floats(1, 9), extreme),
     "patches.grid": st.one_of(small, pairs, st.just("auto")),
-    "micro.model": _words("elliptic circular elliptic-independent islands half-space auto"),
-    "micro.tolerance": ratios,
+    "micro.model": _words("elliptic circular elliptic-independent half-space"),
     "micro.solver": _words("active-set truncated-newton"),
-    "micro.curvature": _words("summit contact"),
-    "micro.border": _words("ignore include"),
     "coupling.compliance": _words("auto finite-element decomposed"),
     "coupling.newton": _words("auto condensed full"),
     "coupling.love": _words("mean centre"),
@@ -165,7 +162,7 @@ def scenes(draw):
     data = BASE
     kinds = ("analytic", "isolated", "consistent", "concurrent", "reference", "auto")
     data = put(data, "coupling.kind", draw(st.sampled_from(kinds)))
-    data = put(data, "micro.model", draw(st.sampled_from(["half-space", "elliptic", "islands"])))
+    data = put(data, "micro.model", draw(st.sampled_from(["half-space", "elliptic"])))
     if draw(st.booleans()):
         data = put(data, "block.cells", [4, 4, 4])
     for _ in range(draw(st.integers(1, 3))):

@@ -43,7 +43,6 @@ def ran(*given):
         ("analytic", "half-space", True),
         ("analytic", "elliptic", False),
         ("concurrent", "half-space", True),
-        ("concurrent", "islands", False),
         pytest.param("reference", "half-space", True, marks=pytest.mark.long),
     ],
 )

@@ -65,7 +65,7 @@ def test_as_many_load_steps_are_measured_as_asked_for(check, measured):
 
 
 def test_models_without_cells_have_no_measure():
-    history = run(scene(model="islands"))
+    history = run(scene(model="elliptic"))
     assert np.isnan(history.force_error_N).all()
     assert np.isnan(history.approach_error_mm).all()
     assert "check" not in history.seconds

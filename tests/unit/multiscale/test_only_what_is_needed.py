@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import micro.interaction.hertz_pairs
+import micro.asperities.hertz_pairs
 from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
@@ -138,14 +138,14 @@ def summits(below: int) -> Asperities:
 def evaluations(monkeypatch, below: int) -> int:
     """Return how many pairs of summits a load takes."""
     counted = [0]
-    field = micro.interaction.hertz_pairs.circular_field
+    field = micro.asperities.hertz_pairs.circular_field
 
     def watched(*given, **options):
         counted[0] += int(np.prod(np.broadcast_shapes(*(np.shape(part) for part in given))))
         return field(*given, **options)
 
     with monkeypatch.context() as patch:
-        patch.setattr(micro.interaction.hertz_pairs, "circular_field", watched)
+        patch.setattr(micro.asperities.hertz_pairs, "circular_field", watched)
         model = AsperityModel("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
         model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])

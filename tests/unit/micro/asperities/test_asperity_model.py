@@ -6,7 +6,7 @@ from asperity_states import displacement, interference, surface_displacement
 
 from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, micro_model
-from micro.interaction.patch_sums import patch_loads
+from micro.asperities.patch_sums import patch_loads
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -97,7 +97,7 @@ def test_warm_start(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     near = model.solve(4.0e-3)
     cold, warm = model.solve(4.1e-3), model.solve(4.1e-3, start=near.start)
-    assert warm.iterations < cold.iterations
+    assert warm.start.solution.iterations < cold.start.solution.iterations
     # both stop at 1e-10 in displacement
     assert warm.contacts.force == pytest.approx(cold.contacts.force, rel=1e-8)
 
@@ -185,7 +185,7 @@ def test_round_asperities_make_the_models_equal(summits):
 def test_surface_displacement(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     state = model.solve(2e-4)  # small contacts: no kernel is continued
-    assert state.overlapping_contacts == 0
+    assert state.start.solution.overlapping_contacts == 0
     summits = surface_displacement(model, state, cluster.x, cluster.y)
     assert summits == pytest.approx(displacement(model, state), rel=1e-12)
     far = surface_displacement(model, state, 1e3, 0.0)

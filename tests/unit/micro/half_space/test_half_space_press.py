@@ -15,13 +15,10 @@ MEANS = patch_means(SURFACE, PATCHES)
 APPROACH, TILT = 8e-3, (4e-3, -3e-3)
 HALF = 0.5 * np.hypot(*SURFACE.lengths)
 
-KINDS = [*((name, "summit") for name in MODEL_NAMES), ("elliptic", "contact")]
 
-
-@pytest.fixture(params=KINDS, ids="-".join)
+@pytest.fixture(params=MODEL_NAMES)
 def model(request):
-    name, curvature = request.param
-    return micro_model(name, SURFACE, contact_modulus=4000.0, curvature=curvature)
+    return micro_model(request.param, SURFACE, contact_modulus=4000.0)
 
 
 def press(model, *, start=None, **given):
@@ -60,8 +57,8 @@ def test_force_finds_the_plane_that_gave_it(model, tilt):
     force = press(model, approach=APPROACH, tilt=tilt).response.force[0]
     found = press(model, force=force, tilt=tilt)
     assert found.response.force[0] == pytest.approx(force, rel=1e-8)
-    # islands and fitted curvatures agree with their forces to 1e-6
-    assert found.plane.approach == pytest.approx(APPROACH, rel=1e-5)
+    # forces of asperities are met to 1e-9; those of the half-space to its residual of 1e-6
+    assert found.plane.approach == pytest.approx(APPROACH, rel=1e-7)
     assert found.plane.tilt == tilt
 
 
@@ -73,8 +70,7 @@ def test_free_plane_has_no_moment(model, share):
     assert found.response.force[0] == pytest.approx(force, rel=1e-8)
     assert np.abs(found.response.moment).max() <= 1e-8 * HALF * force
     there = press(model, approach=found.plane.approach, tilt=found.plane.tilt).response
-    # islands are cut anew under the slopes found, which change by less than 1e-4 of their depth
-    assert there.force[0] == pytest.approx(force, rel=2e-4)
+    assert there.force[0] == pytest.approx(force, rel=1e-6)  # the residual of the half-space
 
 
 def test_plane_turns_under_a_given_approach(model):
@@ -122,9 +118,7 @@ def test_goes_on_from_a_plane_nearby(model):
     same(nearby.response, press(model, approach=1.01 * APPROACH).response, rel=1e-5)
 
 
-@pytest.mark.parametrize("name", [name for name in MODEL_NAMES if name != "islands"])
-def test_the_same_plane_again_costs_nothing(name):
-    model = micro_model(name, SURFACE, contact_modulus=4000.0)
+def test_the_same_plane_again_costs_nothing(model):
     first = press(model)
     # the half-space evaluates the displacement once to see that nothing is left to do
     assert press(model, start=first.start).response.iterations[0] <= 1

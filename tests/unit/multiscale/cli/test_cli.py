@@ -98,10 +98,6 @@ def test_files_of_an_earlier_scene_do_not_stay(capsys, tmp_path):
         (["patches.grid=[4, 4]"], "maxima on the surface's border"),
         (["block.margin='3 mm'"], "3 mm beyond it in 8 cells"),
         (
-            ["micro.model=half-space", "micro.curvature=contact", "micro.border=include"],
-            "half-space; it has no use for micro.curvature, micro.border",
-        ),
-        (
             ["micro.model=circular-independent", "micro.solver=truncated-newton"],
             "circular-independent; it has no use for micro.solver",
         ),
@@ -271,25 +267,6 @@ def test_surface_without_summit_needs_another_model(capsys, heights):
     code, shown, _ = call(capsys, "run", str(scene), "--out", str(path.parent / "out"), *words)
     assert code == 0
     assert " 100 " in shown  # full contact, in per cent
-
-
-def test_border_and_curvature_come_closer_to_the_half_space(capsys, tmp_path):
-    """Seed 1 carries a fifth of its load on the border, which the paper's search leaves out."""
-    forces = {}
-    for model, options in {
-        "half-space": [],
-        "elliptic": [],
-        "mended": ["micro.curvature=contact", "micro.border=include"],
-    }.items():
-        name = "half-space" if model == "half-space" else "elliptic"
-        extra = ["coupling.kind=analytic", f"micro.model={name}", "output.figures=false"]
-        words = ("run", PAPER, "--out", str(tmp_path), "--set", "load.steps=1", *extra, *options)
-        words = (*words, "--overwrite")
-        assert call(capsys, *words)[0] == 0
-        with (tmp_path / "history.csv").open(encoding="utf-8") as file:
-            forces[model] = float(next(csv.DictReader(file))["force_N"])
-    assert forces["elliptic"] < 0.85 * forces["half-space"]
-    assert forces["mended"] == pytest.approx(forces["half-space"], rel=0.03)  # the model's own
 
 
 def test_areas_beyond_the_asperity_models_are_said(capsys, tmp_path):

@@ -272,7 +272,7 @@ def test_command_refuses_before_anything_is_run(capsys, tmp_path, words, text):
 
 
 def test_history_gives_records():
-    scene = Scene.load(PAPER, [*TINY, "coupling.kind=analytic", "micro.model=islands"])
+    scene = Scene.load(PAPER, [*TINY, "coupling.kind=analytic", "micro.model=elliptic"])
     history = run(scene)
     records, patches = history.records(), history.patch_records()
     assert [record["force_N"] for record in records] == list(history.force_N)

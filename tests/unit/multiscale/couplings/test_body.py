@@ -62,7 +62,7 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
 
 @pytest.mark.parametrize(
     "given",
-    [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "islands"}],
+    [{"sides": "roller"}, {"margin": 0.5, "margin_cells": 2}, {"model": "elliptic"}],
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
     found = setup(slopes=False, **given)

@@ -16,7 +16,6 @@ CONTACTS = ["coupling.kind=concurrent", "micro.model=half-space"]
 COUPLINGS = {
     "half-space": CONTACTS,
     "asperities": ["coupling.kind=concurrent"],
-    "islands": ["coupling.kind=concurrent", "micro.model=islands"],
     "laws on the mesh": ["coupling.newton=full"],
     "laws, condensed": ["coupling.newton=condensed"],
     "free plane": ["coupling.kind=consistent", "micro.model=half-space", "load.tilt=free"],

@@ -104,18 +104,17 @@ def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     assert law.along(local).dclosure.min() < -0.5
 
 
-@pytest.mark.parametrize("name", ["half-space", "islands"])
-def test_surface_models_make_laws_too(surface, name):
+def test_surface_models_make_laws_too(surface):
     """Laws of a model that knows no summits: the whole patch is the surface itself."""
-    model = micro_model(name, surface, contact_modulus=MODULUS)
+    model = micro_model("half-space", surface, contact_modulus=MODULUS)
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     alone, patch = model.of_patch(patches, 0)
     law = IsolatedPatch(model=alone, patch=patch, mean_height=surface.mean_height).law(8e-3, 1e-3)
     response = model.respond(
         law.rows.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
     )
-    # the same solver from other starts: its tolerance of 1e-8 (half-space), 1e-6 (islands)
-    np.testing.assert_allclose(law.rows.pressure[1:], response.mean_pressure, rtol=1e-5)
+    # the same solver from other starts, to its tolerance of 1e-8 of the largest pressure
+    np.testing.assert_allclose(law.rows.pressure[1:], response.mean_pressure, rtol=1e-7)
 
 
 def test_patches_of_the_half_space_press_alone(surface):

@@ -25,6 +25,7 @@ from multiscale.restart.checkpoint import (
     write_checkpoint,
 )
 from multiscale.restart.results_folder import FolderLock, find_checkpoint
+from multiscale.scene.sections import MicroSection
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -34,9 +35,6 @@ COUPLINGS = {
     "half-space": ALONE,
     "half-space, balanced force": ALONE | {"load": FORCE},
     "asperities": ALONE | {"micro": {"model": "elliptic"}},
-    "asperities fitted to the contacts": ALONE
-    | {"micro": {"model": "elliptic", "curvature": "contact", "border": "include"}},
-    "islands": ALONE | {"micro": {"model": "islands"}},
     "condensed, halved steps": CUBE
     | {"coupling": {"kind": "isolated", "newton": "condensed"}}
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
@@ -501,8 +499,7 @@ def test_a_plan_stands_though_another_machine_would_choose_otherwise(tmp_path, m
         "block": {"cells": "auto"},
         "patches": {"grid": "auto"},
         "coupling": {"kind": "auto"},
-        "micro": {"model": "auto"},
-    }).model_copy(update={"accuracy": 0.4})  # fmt: skip
+    }).model_copy(update={"accuracy": 0.4, "micro": MicroSection()})  # fmt: skip
     whole = Run(left_open)
     next(steps := whole.load_steps())
     path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.state()))

@@ -69,7 +69,7 @@ def test_a_periodic_scene_is_pressed_periodically():
 
 
 @pytest.mark.parametrize(
-    "left", ["coupling.kind=consistent", "micro.model=islands", "load.tilt=free"]
+    "left", ["coupling.kind=consistent", "micro.model=elliptic", "load.tilt=free"]
 )
 def test_what_does_not_continue_is_refused_periodically(left):
     with pytest.raises(InputError, match=r"does not continue periodically .*coupling.kind = 'ana"):

@@ -6,7 +6,7 @@ conjugate gradients, and only to the accuracy that the step needs; `scipy.sparse
 the stable form of that. Then summits with t_k < 0 leave A and summits with w_k < d_k enter it,
 until there are none of either.
 
-Theory: demos/theory.md, section 8.
+Theory: demos/theory.md, section 9.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
 from geometry.errors import NotConverged
-from micro.interaction.contact_problem import (
+from micro.asperities.contact_problem import (
     TOLERANCE,
     ContactProblem,
     InteractionDisplacement,

@@ -5,10 +5,10 @@ import pytest
 from asperity_states import places
 
 from geometry import NotConverged
+from micro.asperities.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.asperities.truncated_newton import truncated_newton
 from micro.closed_forms.hertz import shape_factors
-from micro.interaction.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
-from micro.interaction.hertz_pairs import HertzPairs
-from micro.interaction.truncated_newton import truncated_newton
 
 
 def problem(asperities, approach):

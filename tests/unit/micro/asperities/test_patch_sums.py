@@ -7,7 +7,7 @@ from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
 from micro import HertzContact
-from micro.interaction.patch_sums import EllipticContacts, patch_displacements
+from micro.asperities.patch_sums import EllipticContacts, patch_displacements
 
 PATCHES = PatchGrid(grid=(4, 2), lengths=(1.0, 0.6))
 

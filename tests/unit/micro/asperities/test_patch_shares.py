@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from geometry import PatchGrid
-from micro.interaction.patch_sums import EllipticContacts, shares
+from micro.asperities.patch_sums import EllipticContacts, shares
 
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 

@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from geometry import Control, NotConverged
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane
-from micro.interaction.plane_on_peaks import Peaks, contact_stiffness
+from micro.asperities.plane_on_peaks import Peaks, contact_stiffness
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])
 Y = np.array([-0.3, -0.4, 0.35, 0.4, 0.05])

@@ -17,7 +17,7 @@ A finite body adds smooth displacements, in modes. Contacts are small against th
 So forces act and displacements are taken at the centres of the contacts, and a contact's own force
 counts as well.
 
-Theory: demos/theory.md, section 8, eq. 6.1.
+Theory: demos/theory.md, section 9, eq. 6.1.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ from scipy.special import elliprf
 
 from geometry import Partition
 from geometry.legendre_modes import mode_values
+from micro.asperities.contact_problem import InteractionDisplacement
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
 from micro.compliance.body_modes import BodyModes
-from micro.interaction.contact_problem import InteractionDisplacement
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -73,8 +73,9 @@ class EllipticContacts:
 
     def subset(self, index: Indices) -> EllipticContacts:
         """Return some of the contacts."""
-        names = [item.name for item in fields(EllipticContacts)]
-        return EllipticContacts(**{name: getattr(self, name)[index] for name in names})
+        return EllipticContacts(
+            **{item.name: getattr(self, item.name)[index] for item in fields(self)}
+        )
 
 
 class Shares(NamedTuple):

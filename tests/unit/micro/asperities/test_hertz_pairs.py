@@ -5,9 +5,9 @@ import pytest
 from asperity_states import places
 from scipy.special import elliprf
 
+from micro.asperities.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter
 from micro.closed_forms.hertz import HertzContact, shape_factors
 from micro.compliance.body_modes import BodyModes
-from micro.interaction.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter
 
 
 def interaction(asperities, circular):

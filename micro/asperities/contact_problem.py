@@ -17,7 +17,7 @@ together are the one equation
 Every U_ki starts with the slope 0 at t_i = 0, so G is continuously differentiable. Its Jacobian
 I + ∂U/∂t has columns for the active set {z_i > 0} alone.
 
-Theory: demos/theory.md, section 8, eq. 8.1.
+Theory: demos/theory.md, section 9, eq. 9.1.
 
 Source:
     Waddad et al. 2016, eqs. 10–12 and 23, doi 10.1016/j.triboint.2015.12.023;
@@ -141,28 +141,20 @@ Method = Callable[[ContactProblem, Array], Solution]
 """Takes a problem and a first guess of the indentations (n,) [mm]; raises NotConverged."""
 
 
-def checked_pairs(
-    rows: int,
-    columns: int,
-    what: str,
-    *,
-    bytes_per_pair: float = BYTES_PER_PAIR,
-) -> None:
-    """Refuse a number of pairs whose dense matrices do not fit into the memory.
+def check_pairs(count: int, bytes_per_pair: float) -> None:
+    """Refuse a number of asperities whose dense matrices do not fit into the memory.
 
     Args:
-        rows: Number of displaced summits.
-        columns: Number of contacts that displace them.
-        what: Name of the contacts in the message, such as ``asperities``.
-        bytes_per_pair: Memory that a pair takes [B].
+        count: Number of asperities that interact.
+        bytes_per_pair: Memory that a pair of them takes [B].
 
     Raises:
         InputError: When the matrices need more than the memory of this process.
     """
-    needed, available = bytes_per_pair * rows * columns, process_memory()
+    needed, available = bytes_per_pair * count**2, process_memory()
     if needed > available:
         raise InputError(
-            f"the interaction of {columns} {what} needs {needed / 1e9:.3g} GB of memory"
+            f"the interaction of {count} asperities needs {needed / 1e9:.3g} GB of memory"
             f" and {available / 1e9:.3g} GB are there",
             allowed="half-space, circular-independent or elliptic-independent",
             key="micro.model",

@@ -1,8 +1,8 @@
 """A rigid plane on few contacts: where its search for equilibrium starts, and their stiffness.
 
-The equilibrium itself is found by `geometry.plane_equilibrium`. Contacts of asperities and islands
-are few, so that their stiffness can be formed, and cheap alone, so that contacts that do not see
-each other give a start close to the solution.
+The equilibrium itself is found by `geometry.plane_equilibrium`. Contacts of asperities are few, so
+that their stiffness can be formed, and cheap alone, so that contacts that do not see each other
+give a start close to the solution.
 """
 
 from __future__ import annotations

@@ -5,17 +5,17 @@ import pytest
 from asperity_states import places
 
 from geometry import InputError, NotConverged
-from micro.closed_forms.hertz import shape_factors
-from micro.interaction import contact_problem
-from micro.interaction.contact_problem import (
+from micro.asperities import contact_problem
+from micro.asperities.contact_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,
     ContactProblem,
     active_set,
-    checked_pairs,
+    check_pairs,
     solve,
 )
-from micro.interaction.hertz_pairs import HertzPairs
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.closed_forms.hertz import shape_factors
 
 
 @pytest.fixture
@@ -70,12 +70,12 @@ def test_gives_up_loudly(problem):
 def test_pairs_that_do_not_fit_into_the_memory_are_refused(monkeypatch):
     most = BYTES_PER_PAIR * 3000.0**2
     monkeypatch.setattr(contact_problem, "process_memory", lambda: most)
-    checked_pairs(3000, 3000, "asperities")
+    check_pairs(3000, BYTES_PER_PAIR)
     message = (
         r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"
         r" are there \(allowed: half-space, "
     )
     with pytest.raises(InputError, match=message):
-        checked_pairs(3001, 3001, "asperities")
-    with pytest.raises(InputError, match="of 1000 islands needs 480 GB"):
-        checked_pairs(10**7, 1000, "islands")
+        check_pairs(3001, BYTES_PER_PAIR)
+    with pytest.raises(InputError, match=r"of 2122 asperities needs 0\.432 GB"):
+        check_pairs(2122, 2.0 * BYTES_PER_PAIR)

@@ -1,0 +1,40 @@
+"""The micro models by name, and what their load steps start from."""
+
+from __future__ import annotations
+
+from geometry import Surface, find_asperities
+from geometry.errors import InputError
+from geometry.rigid_plane import RigidPlane
+from micro.asperities.contact_problem import Solution
+from micro.asperities.contacts import Equilibrium
+from micro.asperities.model import MODELS, AsperityModel
+from micro.half_space.model import HalfSpaceModel
+from micro.model import MicroModel
+
+MODEL_NAMES = (*MODELS, "half-space")
+"""Names of all micro models."""
+
+START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
+"""Records that `Pressed.start` may consist of, besides arrays and tuples."""
+
+
+def micro_model(
+    name: str, surface: Surface, *, contact_modulus: float, solver: str = "active-set"
+) -> MicroModel:
+    """Return the micro model of a surface whose border is free, as that of a block's top is.
+
+    Args:
+        name: A name in `MODEL_NAMES`.
+        surface: The surface.
+        contact_modulus: E* [MPa].
+        solver: Solver of the interacting asperity models.
+
+    Raises:
+        InputError: When there is no such model or solver, or the modulus is not positive.
+    """
+    if name == "half-space":
+        return HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
+    if name not in MODELS:
+        raise InputError("unknown micro model", value=name, allowed=", ".join(MODEL_NAMES))
+    asperities = find_asperities(surface, periodic=False)
+    return AsperityModel(name, asperities, contact_modulus=contact_modulus, solver=solver)

@@ -1,1 +1,0 @@
-"""The micro model `islands`: connected regions above the plane as Hertz contacts."""
