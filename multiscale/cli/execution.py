@@ -16,7 +16,7 @@ from geometry.collective import on_root
 from geometry.cores import hold_blas
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from geometry.packages import optional_packages
-from multiscale.cli.command_line import ended_if_told
+from multiscale.cli.signals import ended_if_told
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,

@@ -1,4 +1,4 @@
-"""Kills runs of all couplings, sweeps, laws and comparisons at random moments; goes on, compares."""
+"""Kills runs, sweeps, laws and comparisons at random moments, goes on with them and compares."""
 
 import argparse
 import os

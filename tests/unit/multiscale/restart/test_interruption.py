@@ -12,7 +12,8 @@ import pytest
 from geometry.errors import InputError
 from multiscale import Run
 from multiscale.cli import describe
-from multiscale.cli.command_line import Ended, main, signals_raise
+from multiscale.cli.command_line import main
+from multiscale.cli.signals import Ended, signals_raise
 from multiscale.restart.interruption import Interruption, Stopped
 from multiscale.scene.quantities import parse_duration
 
