@@ -107,6 +107,10 @@ class NotConverged(PatchlawError, RuntimeError):
             f"{what} did not converge: {reason} after {iterations} iterations; {remedy}"
         )
 
+    def advised(self, more: str) -> NotConverged:
+        """Return the same error with more advice behind its remedy."""
+        return _not_converged(self.what, self.reason, self.iterations, f"{self.remedy}; {more}")
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Let the error travel between ranks."""
         return _not_converged, (self.what, self.reason, self.iterations, self.remedy)

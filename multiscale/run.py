@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from io import BytesIO
@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
+from geometry.checked_store import Arrays
+from geometry.collective import on_root
 from geometry.packages import optional_packages
 from micro import HalfSpaceModel, MicroModel
 from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
 from multiscale.couplings.contact import OnBody, contact_model, on_body
 from multiscale.couplings.fields import FieldRecord
+from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.energy import with_work
@@ -27,13 +30,15 @@ from multiscale.measured_errors import checked, error_notes, unmeasured
 from multiscale.planning.auto_keys import resolved_sections
 from multiscale.planning.set_up import set_up
 from multiscale.readable import Observer
+from multiscale.readable import number as readable_number
 from multiscale.results.accuracy_verdict import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.yielding_notes import energy_notes, yielding_notes
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import Arrays, digest
+from multiscale.storage import digest
 
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
@@ -54,6 +59,7 @@ class Run:
     Attributes:
         observe: Called with what the run is at, once it is set.
         given: The scene as the user wrote it.
+        identity: All that its numbers depend on, see `multiscale.scene.identity`.
         setup: The problem set up from it: surface, summits, patches, micro model.
         scene: The scene with values for its auto keys.
         seconds: Wall time of each phase so far [s].
@@ -77,6 +83,7 @@ class Run:
         self._start: Arrays = {}
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
+        self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         assembly.load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
         self.setup: ProblemSetup = set_up(scene, comm, resolved=resolved, nodes=nodes)
@@ -135,6 +142,7 @@ class Run:
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
+                self._take_longer_laws(coupling)
                 self.fields.keep(coupling, step)
                 with self.phase("contact"):
                     step = self._recorder.with_stiffness(step, coupling)
@@ -146,6 +154,13 @@ class Run:
                 self.steps.append(self._checked(step))
                 self.make_contact(last=self.finished)
                 yield self.steps[-1].counted_from(self.setup.zero)
+
+    def _take_longer_laws(self, coupling: Coupling) -> None:
+        """Take the laws of the coupling, which a load step may have extended."""
+        if isinstance(coupling, EmbeddedCoupling) and coupling.table is not self.table:
+            self.table = coupling.table
+            end = readable_number(self.table.largest_pressure)
+            self.remark([f"the laws were extended to {end} MPa, which a load step needed"])
 
     def make_contact(self, *, last: bool = True) -> None:
         """Record the contact of the last load step if the scene asks for it, once.
@@ -249,12 +264,6 @@ class Run:
         return digest(arrays)
 
     @property
-    def meshes(self) -> list[str]:
-        """SHA-256 of the meshes of the bodies; empty without meshes."""
-        faces = self.setup.face, self.setup.counter_face
-        return [face.digest for face in faces if face is not None and face.digest]
-
-    @property
     def laws(self) -> LawTable | None:
         """The patch laws as they are shown, counted from the zero of the load; None without any."""
         zero = self.setup.zero
@@ -295,6 +304,10 @@ class Run:
             reference=None if record is None else record.counted_from(zero),
             contact_records=self.contacts,
         )
+
+    def remark(self, notes: Iterable[str]) -> None:
+        """Add notes to the history, each once."""
+        self._notes += [note for note in dict.fromkeys(notes) if note not in self._notes]
 
     @property
     def unknowns(self) -> int | None:

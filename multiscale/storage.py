@@ -1,4 +1,4 @@
-"""Writes files whole or not at all, and stores arrays in HDF5 files with a checksum.
+"""Writes texts and tables whole or not at all, and HDF5 files with a checksum; packs records.
 
 The library that reads HDF5 trusts what a file says of itself: a few damaged bytes can make it ask
 for gigabytes, never return or end the process. So the bytes are compared with a SHA-256 checksum
@@ -15,10 +15,8 @@ from __future__ import annotations
 import csv
 import hashlib
 import json
-import os
 import shutil
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from io import BytesIO
 from pathlib import Path
@@ -28,10 +26,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError, NotWritten
-
-Arrays = dict[str, NDArray[Any]]
-"""Arrays by name: what a file can hold and a checksum be taken of."""
+from geometry.checked_store import Arrays
+from geometry.errors import InputError
+from geometry.whole_files import write_whole
 
 _STRUCTURE = "structure"
 _HEAD = 512  # bytes before the content, the least that HDF5 leaves to users
@@ -174,48 +171,6 @@ def _head_of(content: bytes) -> bytes:
     return (_MARK + check.encode() + b"\n").ljust(_HEAD, b"\0")
 
 
-@contextmanager
-def written(path: Path) -> Iterator[None]:
-    """Turn an error of the system while a file is written into one that names the file.
-
-    Args:
-        path: The file.
-
-    Raises:
-        NotWritten: When the system raised an error.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
-
-
-def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
-    """Write a file under a temporary name beside it and rename it when it is complete.
-
-    Args:
-        path: Final name; its folder is made when missing.
-        write: Writes the file whose name it is given; the suffix is that of the final name.
-
-    Returns:
-        The final name.
-
-    Raises:
-        NotWritten: When the system refuses; whatever stood under the final name stands there still.
-    """
-    partial = path.with_name(f".{path.stem}.partial-{os.getpid()}{path.suffix}")
-    with written(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            write(partial)
-            with partial.open("rb") as file:
-                os.fsync(file.fileno())  # lest a crash of the machine leave the name without data
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
-    return path
-
-
 def remove_partial(folder: Path) -> None:
     """Remove the half-written files of runs that were killed.
 
@@ -249,16 +204,6 @@ def write_json(path: Path, content: dict[str, Any]) -> Path:
         content: What JSON can hold; everything else is written as its text.
     """
     return write_text(path, json.dumps(content, indent=2, default=str) + "\n")
-
-
-def write_bytes(path: Path, content: bytes) -> Path:
-    """Write bytes.
-
-    Args:
-        path: File to write.
-        content: Its content.
-    """
-    return write_whole(path, lambda partial: partial.write_bytes(content))
 
 
 def write_text(path: Path, text: str) -> Path:

@@ -1,6 +1,8 @@
 """Caches solutions of the elastic block on disk, under a key of everything that they depend on.
 
-The key includes the sources of the packages that make them: other sources do not find the files.
+The key includes the sources of the packages that make them: other sources do not find the files. A
+file is believed when its bytes fit its checksum, it states that key, and nobody but this user or
+root could write it: where several users share a directory, each reads its own files alone.
 """
 
 from __future__ import annotations
@@ -8,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
+import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import fields, is_dataclass
@@ -20,6 +22,9 @@ import numpy as np
 from mpi4py.util import pkl5
 from numpy.typing import NDArray
 
+from geometry.checked_store import read_record, write_record
+from geometry.errors import InputError, NotWritten
+
 Arrays = Mapping[str, NDArray[np.float64]]
 
 VARIABLE = "PATCHLAW_CACHE"
@@ -28,7 +33,10 @@ VARIABLE = "PATCHLAW_CACHE"
 MOST_BYTES = 500_000_000
 """Largest size of all files together; beyond it the least recently used are removed [B]."""
 
-_FORMAT = 3  # of the files; sources are part of the key anyway
+_FORMAT = 4  # of the files; sources are part of the key anyway
+_SUFFIX = ".arrays"
+_OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+_ROOT = 0  # user number of the administrator, who may fill a directory for all
 
 _SOURCES = "macro", "micro", "geometry"
 """Packages whose sources make the cached arrays."""
@@ -56,8 +64,9 @@ def cache_directory() -> Path | None:
 def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], comm: Any) -> Arrays:
     """Return arrays from the cache, or compute and cache them.
 
-    Rank 0 alone reads and writes, and all ranks get its arrays. Arrays whose file cannot be read
-    are computed again, and a file that cannot be written is left out.
+    Rank 0 alone reads and writes, and all ranks get its arrays. Arrays whose file cannot be read,
+    is damaged or could be another user's are computed again, and a file that cannot be written is
+    left out.
 
     Args:
         kind: Name of the kind of arrays.
@@ -71,24 +80,24 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     Note:
         Collective.
     """
-    place = _path(kind, key)  # on every rank, so that a wrong key raises on all of them
+    words, place = _place(kind, key)  # on every rank, so that a wrong key raises on all of them
     path = place if comm.rank == 0 else None
     large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
-    found: Arrays | None = large.bcast(_read(path) if path else None, root=0)
+    found: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)
     if found is not None:
         return found
     made = compute()
     if path:
-        with suppress(OSError):
-            _write(path, made)
+        with suppress(OSError, NotWritten):
+            _write(path, words, made)
             _clear(path.parent)
     return large.bcast(made, root=0)
 
 
 def is_cached(kind: str, key: tuple[object, ...]) -> bool:
-    """Tell whether this process finds a file of arrays in the cache; see `cached`."""
-    path = _path(kind, key)
-    return path is not None and path.exists()
+    """Tell whether this process finds arrays in the cache; see `cached`."""
+    words, path = _place(kind, key)
+    return path is not None and _read(path, words) is not None
 
 
 @cache
@@ -105,11 +114,12 @@ def sources_digest(top: Path = _TOP) -> str:
     return found.hexdigest()
 
 
-def _path(kind: str, key: tuple[object, ...]) -> Path | None:
+def _place(kind: str, key: tuple[object, ...]) -> tuple[str, Path | None]:
+    """Return all that arrays depend on as a text, and their file."""
     directory = cache_directory()
     words = json.dumps((_FORMAT, sources_digest(), kind, key), default=_spelled)
     digest = hashlib.sha256(words.encode()).hexdigest()[:32]
-    return directory / f"{kind}-{digest}.npz" if directory else None
+    return words, directory / f"{kind}-{digest}{_SUFFIX}" if directory else None
 
 
 def _spelled(value: object) -> object:
@@ -121,33 +131,38 @@ def _spelled(value: object) -> object:
     raise TypeError(f"{type(value).__name__} in a key of the cache")
 
 
-def _read(path: Path) -> Arrays | None:
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            found = {name: file[name] for name in file.files}
-    except Exception:  # zip, zlib and numpy raise many kinds for a damaged file
-        return None
-    with suppress(OSError):
-        os.utime(path)  # marks it as recently used
-    return found
+def _read(path: Path, words: str) -> Arrays | None:
+    """Return the arrays of a file that is this user's and says what they depend on, else None."""
+    with suppress(OSError, InputError), open(path, "rb", opener=_opened_at_once) as file:
+        facts = os.fstat(file.fileno())
+        if not stat.S_ISREG(facts.st_mode) or facts.st_mode & _OTHERS_WRITE:
+            return None
+        if facts.st_uid not in (os.geteuid(), _ROOT):
+            return None
+        found = read_record(file.read())
+        if found.facts == words:
+            os.utime(path)  # marks it as recently used
+            return found.arrays
+    return None
 
 
-def _write(path: Path, arrays: Arrays) -> None:
-    """Write a temporary file and move it, so that nobody reads half a file."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, **dict[str, Any](arrays))
-        os.replace(name, path)
-    except BaseException:
-        Path(name).unlink(missing_ok=True)
-        raise
+def _opened_at_once(path: str, flags: int) -> int:
+    """Open a file without waiting for the writer of a pipe."""
+    return os.open(path, flags | os.O_NONBLOCK)
+
+
+def _write(path: Path, words: str, arrays: Arrays) -> None:
+    """Write a file that this user alone may change, unless it would not stay."""
+    if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
+        return
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    write_record(path, words, arrays)
+    path.chmod(0o600)
 
 
 def _clear(directory: Path) -> None:
     """Remove the least recently used files until the rest is small enough."""
-    files = sorted(directory.glob("*-*.npz"), key=lambda path: path.stat().st_mtime, reverse=True)
+    files = sorted(directory.glob("*-*.*"), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size

@@ -7,31 +7,15 @@ takes a tenth of a second.
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
-from typing import Any
+from collections.abc import Sequence
 
+from multiscale.cli.signals import ended_if_told, signals_raise
 from multiscale.cli.words import UsageError, command_parser
 from multiscale.output.streams import sturdy_streams
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
 _WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
-
-
-class Ended(KeyboardInterrupt):
-    """A signal told this process to end now.
-
-    Args:
-        number: The signal.
-    """
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.exit_code = 128 + number
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,7 +37,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments)
     with sturdy_streams() as (output, errors), signals_raise():
         try:
-            code = _run(words)
+            with ended_if_told():
+                code = _run(words)
         except SystemExit:  # of --help and --version
             code = 0
         except KeyboardInterrupt as error:
@@ -89,26 +74,3 @@ def _run(words: list[str]) -> int:
         print(f"patchlaw: {error}", file=sys.stderr)
         return error.exit_code
     return execute(choice, words[cut + 1 :])
-
-
-@contextmanager
-def signals_raise() -> Iterator[None]:
-    """Let SIGINT, SIGTERM and SIGHUP raise `Ended`, so that files and child processes are cleared.
-
-    A signal that is ignored, as SIGHUP is under ``nohup``, stays ignored. The former handlers come
-    back at the end.
-    """
-    former: dict[int, Any] = {}
-    if threading.current_thread() is threading.main_thread():  # no other thread may set handlers
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            if signal.getsignal(number) not in (None, signal.SIG_IGN):  # None: not of Python
-                former[number] = signal.signal(number, _raise)
-    try:
-        yield
-    finally:
-        for watched, handler in former.items():
-            signal.signal(watched, handler)
-
-
-def _raise(number: int, frame: FrameType | None) -> None:
-    raise Ended(number)

@@ -6,8 +6,9 @@ import argparse
 import os
 import platform
 from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
@@ -25,6 +26,9 @@ from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_csv, write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RESULTS = "configurations"
 """Folder of the results of all configurations, within the folder of the comparison."""
@@ -106,17 +110,21 @@ def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
 
 def _pictures(comparison: Comparison) -> dict[str, bytes]:
     """Return the files of the figures by name; matplotlib is loaded only here."""
-    from multiscale.comparison.error_over_time import pareto_figure
-    from multiscale.comparison.figures import curves_figure, maps_figure
 
-    drawn = {}
-    if comparison.measure is not None:
-        drawn["pareto"] = pareto_figure(comparison)
-    if any(row.steps for row in comparison.rows):
-        drawn["curves"] = curves_figure(comparison)
-        drawn["pressures"] = maps_figure(comparison)
-    files = (pictures_of(name, figure) for name, figure in drawn.items())
-    return {name: content for found in files for name, content in found.items()}
+    def figure(name: str) -> Figure:
+        from multiscale.comparison.error_over_time import pareto_figure
+        from multiscale.comparison.figures import curves_figure, maps_figure
+
+        return {"pareto": pareto_figure, "curves": curves_figure, "pressures": maps_figure}[name](
+            comparison
+        )
+
+    names = ["pareto"] * (comparison.measure is not None)
+    names += ["curves", "pressures"] * any(row.steps for row in comparison.rows)
+    drawn = [pictures_of(name, partial(figure, name)) for name in names]
+    for problem in dict.fromkeys(filter(None, (one.problem for one in drawn))):
+        terminal.say(None, problem)
+    return {name: content for one in drawn for name, content in one.files.items()}
 
 
 def comparison_html(comparison: Comparison, pictures: Mapping[str, bytes]) -> str:

@@ -8,11 +8,12 @@ import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from geometry.collective import on_root, on_root_alone
 from geometry.errors import InputError
 from geometry.statistics import roughness
+from geometry.whole_files import write_whole
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.couplings.body import scene_body
@@ -28,10 +29,14 @@ from multiscale.planning.set_up import set_up
 from multiscale.planning.work import work_of
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
+from multiscale.scene.identity import identity
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import write_text, write_whole
+from multiscale.storage import write_text
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -71,7 +76,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, scene))
+            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
         check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.setup)
@@ -81,16 +86,22 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         table = run.laws
         assert table is not None
 
+        def draw() -> Figure:
+            from multiscale.output.figures import law_figure
+
+            return law_figure(table)
+
         def write() -> list[Path]:
             from multiscale.conductances import conducts_of
-            from multiscale.output.figures import law_figure
 
             conducts = conducts_of(run.setup)
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
             laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
-            files = [laws, *write_pictures(folder, pictures_of("laws", law_figure(table)))]
+            pictures = pictures_of("laws", draw)
+            run.remark(filter(None, [pictures.problem]))
+            files = [laws, *write_pictures(folder, pictures.files)]
             remove_exports(folder)
             for name, text in exports.items():
                 write_text(folder / name, text)
@@ -112,14 +123,20 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, scene))
+            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
-        def write() -> list[Path]:
+        def draw() -> Figure:
             from multiscale.output.figures import surface_figure_of
 
-            return write_pictures(folder, pictures_of("surface", surface_figure_of(setup)))
+            return surface_figure_of(setup)
+
+        def write() -> list[Path]:
+            pictures = pictures_of("surface", draw)
+            if pictures.problem:
+                terminal.say(None, pictures.problem)
+            return write_pictures(folder, pictures.files)
 
         terminal.show_files(comm, on_root(comm, write))
 

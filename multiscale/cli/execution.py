@@ -16,6 +16,7 @@ from geometry.collective import on_root
 from geometry.cores import hold_blas
 from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from geometry.packages import optional_packages
+from multiscale.cli.signals import ended_if_told
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -53,7 +54,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        with optional_packages():
+        with ended_if_told(), optional_packages():
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             command(choice, _start_petsc(options), comm)
     except PatchlawError as error:

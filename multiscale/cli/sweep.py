@@ -21,7 +21,7 @@ from multiscale.restart.results_folder import locked
 from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
 from multiscale.sweeps.journal import CaseResult
-from multiscale.sweeps.sweep import JOURNAL, sweep
+from multiscale.sweeps.sweep import JOURNAL, part_name, sweep
 from multiscale.sweeps.sweep_results import SweepResults
 
 MOST_LINES = 20
@@ -42,7 +42,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
     which, parts = choice.part or slurm_part()
-    with locked(folder / JOURNAL / f"{which}-of-{parts}", comm):
+    with locked(folder / JOURNAL / part_name((which, parts)), comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
@@ -86,7 +86,7 @@ def slurm_part() -> tuple[int, int]:
 
 
 def _remove_results(folder: Path) -> None:
-    for path in [*(folder / JOURNAL).glob("*.jsonl"), *(folder / name for name in FILES)]:
+    for path in [*(folder / JOURNAL).glob("*/*.cases"), *(folder / name for name in FILES)]:
         remove(path)
 
 
@@ -99,8 +99,10 @@ def _write(folder: Path, found: SweepResults, comm: Any, *, figures: bool) -> li
     statistics = _statistics_records(found)
     files += _write_table(folder / "statistics.csv", iter(statistics), comm)
     if figures and statistics:
-        pictures = pictures_of("sweep", found.plot())
-        files += on_root(comm, lambda: write_pictures(folder, pictures))
+        pictures = pictures_of("sweep", found.plot)
+        if pictures.problem:
+            terminal.say(comm, pictures.problem)
+        files += on_root(comm, lambda: write_pictures(folder, pictures.files))
     return files
 
 

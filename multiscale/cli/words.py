@@ -124,7 +124,11 @@ def _add_init(init: argparse.ArgumentParser) -> None:
 def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run scenes."""
     run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
-    run.add_argument("--resume", action="store_true", help="go on with an interrupted run")
+    run.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with an interrupted run, as without this; leave a finished one",
+    )
     run.add_argument("--max-time", help="stop cleanly before this wall time is over", **_TIME)
     _add_scene(run)
     compare = command(
@@ -189,7 +193,7 @@ def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: st
     command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
     keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
     if not ending:  # the folders of comparisons and sweeps hold many scenes
-        other = "replace the results of another scene in this folder"
+        other = "begin anew, whatever results are in this folder"
         command.add_argument("--overwrite", action="store_true", help=other)
     changes = "change keys of the scene, such as load.approach='4 um'"
     command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -11,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from geometry.checked_store import read_record, write_record
 from geometry.errors import InputError
 from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
@@ -20,13 +20,13 @@ from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.planning.auto_keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_json
 
 Launch: TypeAlias = Callable[[Configuration, float | None], RunResult]
 """Runs a configuration, and stops it after so many seconds if they are not None."""
 
-AUTO_VALUES = "auto_values.json"
+AUTO_VALUES = "auto_values"
 """File of the values that were chosen for the scene's keys that are ``auto``."""
 
 REFERENCE_SHARE, REFERENCE_LIMIT = 0.6, 0.8
@@ -125,14 +125,13 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
     sized = scene.kind != "reference" or not is_measured(scene)
     if auto_keys(scene) <= {"micro.model"} and sized:
         return scene
-    path, given = folder / AUTO_VALUES, scene.model_dump(by_alias=True, mode="json")
-    values = None
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        stored = json.loads(path.read_text(encoding="utf-8"))
-        values = stored["sections"] if stored["scene"] == given else None
+    path, given, values = folder / AUTO_VALUES, identity(scene), None
+    with suppress(OSError, InputError):
+        then, stored = read_record(path.read_bytes()).facts
+        values = stored if then == given else None
     if values is None:
         values = resolved_sections(make_setup(scene), scene)
-        write_json(path, {"scene": given, "sections": values})
+        write_record(path, (given, values))
     return with_resolved(scene, values)
 
 
@@ -198,7 +197,7 @@ def run_all(
     end = None if budget_s is None else clock() + budget_s
     ahead = [] if first is None else [first]
     for one in [*ahead, *(one for one in configurations if one is not first)]:
-        path = folder / f"{one.key}.json"
+        path = folder / f"{one.key}.result"
         stored = read_result(path)
         left = None if end is None else end - clock()
         if stored is not None and stored.status in REPEATABLE:

@@ -6,7 +6,6 @@ import hashlib
 import json
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -14,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
+from geometry.checked_store import read_record, write_record
 from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
 from multiscale.comparison.scene_content import Content, Grid
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_bytes
 
 Array = Annotated[
     NDArray[np.float64],
@@ -83,12 +83,8 @@ class Configuration:
     @cached_property
     def key(self) -> str:
         """Hash of everything that the results depend on."""
-        parts = {"scene": self.content, "version": version("patchlaw"), "ranks": self.ranks}
-        for name, key in (("surface", "heights"), ("counter_surface", "counter_heights")):
-            file = self.content.get(name, {}).get("file")
-            if file is not None:
-                parts[key] = _checksum(Path(file).read_bytes())
-        return _checksum(json.dumps(parts, sort_keys=True).encode())[:20]
+        parts = {"scene": identity(self.scene), "ranks": self.ranks}
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:20]
 
 
 _none, _ONE_PATCH = partial(np.empty, 0), PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -198,14 +194,13 @@ _RESULTS = TypeAdapter(RunResult)
 
 
 def write_result(path: Path, result: RunResult) -> Path:
-    """Write a result, whole or not at all: a line with the checksum, then JSON.
+    """Write a result, checked, whole or not at all.
 
     Args:
         path: The file.
         result: The result.
     """
-    content = json.dumps(_RESULTS.dump_python(result, mode="json")).encode()
-    return write_bytes(path, _checksum(content).encode() + b"\n" + content)
+    return write_record(path, _RESULTS.dump_python(result, mode="json"))
 
 
 def read_result(path: Path) -> RunResult | None:
@@ -215,13 +210,6 @@ def read_result(path: Path) -> RunResult | None:
         path: The file.
     """
     try:
-        checksum, _, content = path.read_bytes().partition(b"\n")
-        if checksum.decode() != _checksum(content):
-            return None
-        return _RESULTS.validate_json(content)
+        return _RESULTS.validate_python(read_record(path.read_bytes()).facts)
     except (OSError, ValueError, PatchlawError):
         return None
-
-
-def _checksum(content: bytes) -> str:
-    return hashlib.sha256(content).hexdigest()

@@ -50,10 +50,12 @@ def content_of(scene: Scene) -> Content:
     content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
     if scene.accuracy is not None and not scene.micro.model_fields_set:
         content["micro"] = {}
-    for name in ("surface", "counter_surface"):
-        path = scene.path_of(content.get(name, {}).get("file"))
-        if path is not None:
-            content[name]["file"] = str(path.resolve())
+    for key, path in scene.files().items():  # the content has no folder that names start in
+        *sections, name = key.split(".")
+        place: Any = content
+        for one in sections:
+            place = place[int(one) if one.isdigit() else one]
+        place[name] = str(path.resolve())
     content["load"].pop("force_change", None)
     return content | {"output": _NO_OUTPUT}
 

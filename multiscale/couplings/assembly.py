@@ -17,7 +17,7 @@ from multiscale.couplings.contact import ContactCoupling
 from multiscale.couplings.law_couplings import EmbeddedCoupling, FreePlaneCoupling
 from multiscale.couplings.patch_compliance import embedding, patch_compliance, patch_displacements
 from multiscale.couplings.reference import ReferenceCoupling, make_reference
-from multiscale.couplings.representative import face_coupling, face_laws
+from multiscale.couplings.representative import FaceCoupling, face_laws
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
@@ -195,7 +195,7 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
     if not isinstance(made, LawTable):
         return ContactCoupling(made, setup.patches, setup.mean_heights, comm)
     if setup.samples:
-        return face_coupling(setup, made, comm)
+        return FaceCoupling(setup, made, comm)
     condensed = newton_choice(setup, made).condensed
     mode, tilt = setup.scene.coupling.interface, setup.load_history.tilt
     if made.path is not None and mode == "patchwise" and tilt is None:

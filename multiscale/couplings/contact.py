@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
+from geometry.checked_store import Arrays
 from geometry.collective import on_root, on_root_alone
 from micro import (
     START_KINDS,
@@ -27,7 +28,7 @@ from micro.model import SolvedContact, Stiffness
 from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import Arrays, packed, unpacked
+from multiscale.storage import packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceCompliance

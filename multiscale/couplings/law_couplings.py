@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid, RigidPlane
+from geometry.checked_store import Arrays
 from micro.model import Stiffness
 from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
@@ -18,7 +19,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
-from multiscale.storage import Arrays, packed, unpacked
+from multiscale.storage import packed, unpacked
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
@@ -40,12 +41,16 @@ class EmbeddedCoupling:
         problem: The body with the laws on its contact face.
         table: The laws, which also give contact area, contacts and separation.
         face: The patches on its contact face.
+
+    Attributes:
+        table: The laws.
+        face: The patches on its contact face.
     """
 
     def __init__(
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
-        self._problem, self._table, self.face = problem, table, face
+        self._problem, self.table, self.face = problem, table, face
         self._last: LawContactState | None = None
 
     @property
@@ -94,10 +99,10 @@ class EmbeddedCoupling:
         try:
             state = self._problem.solve(control)
         except NotConverged as error:
-            if not any(law.is_flat for law in self._table.laws):
+            if not any(law.is_flat for law in self.table.laws):
                 raise
             problem = "a flat patch, whose pressure is a function of closure nowhere"
-            raise beyond_law(control, problem, self._table) from error
+            raise beyond_law(control, problem, self.table) from error
         step = self._step(control, state)
         self._last = state
         return step
@@ -114,13 +119,13 @@ class EmbeddedCoupling:
         """
         if state:
             approach, tilt, pressure = unpacked(state, ())
-            if isinstance(self._table.patches, PatchGrid) or len(self.blocks) == 1:
+            if isinstance(self.table.patches, PatchGrid) or len(self.blocks) == 1:
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
     def _step(self, control: Control, state: LawContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
-        laws = self._table.laws
+        laws = self.table.laws
 
         def means(name: str) -> Array:
             functions = [lambda closure, at=law.at: getattr(at(closure), name) for law in laws]
@@ -131,9 +136,9 @@ class EmbeddedCoupling:
             stiffness = means("stiffness")
         except InputError as error:
             falls = not all(law.is_function for law in laws)
-            raise beyond_law(control, str(error), self._table, falls=falls) from error
+            raise beyond_law(control, str(error), self.table, falls=falls) from error
         return LoadStep.of_patches(
-            self._table.patches,
+            self.table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
             closure=state.closure,
@@ -154,8 +159,8 @@ class EmbeddedCoupling:
         Where laws are those of samples, contacts are counted on the area of the samples, and the
         pressure has a largest value on the face.
         """
-        laws = self._table.laws
-        if isinstance(self._table.patches, PatchGrid):
+        laws = self.table.laws
+        if isinstance(self.table.patches, PatchGrid):
             mean_closures = zip(laws, state.closure, strict=True)
             return {"contacts": [law.at(c, extend=True).contacts for law, c in mean_closures]}
         areas = self.face.areas
@@ -264,8 +269,8 @@ def beyond_law(
     """
     if table.made_by.get("coupling") == "representative":
         remedy = (
-            "somewhere on the face the pressure is larger than the laws were made for: state "
-            "law.largest_pressure, ten times the mean one otherwise, or take a smaller load"
+            "somewhere on the face the pressure is larger than any that laws are made for, almost "
+            "the hardness or the contact modulus: take a smaller load"
         )
     elif table.made_by.get("coupling") != "consistent":
         remedy = (

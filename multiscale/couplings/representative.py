@@ -8,20 +8,25 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Surface
+from geometry import Control, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.couplings.patch_compliance import embedding
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.representative import representative_laws
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import BeyondLaws
 from multiscale.readable import Observer
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.samples import RegionSamples
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import FacePair, LawContactProblem, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -32,17 +37,27 @@ _CROWNED = 2.0
 _YIELDED = 0.95
 """Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
 then, and at it the pressure is no function of closure."""
+_EXTENSION = 2.0
+"""Largest pressure of laws that turned out to end too early, over that of the earlier ones."""
 _RESERVE = 0.15
 """Closure that laws are made for beyond the largest approach on the face, relative to it."""
 
 
-def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -> LawTable:
+def face_laws(
+    setup: ProblemSetup,
+    comm: Any,
+    observe: Observer | None = None,
+    *,
+    before: LawTable | None = None,
+) -> LawTable:
     """Tabulate the laws of the samples of a scene, one for each region of its face.
 
     Args:
         setup: The problem set up from the scene, with laws of samples.
         comm: MPI communicator; None for this process alone.
         observe: Called as rows are made.
+        before: Laws that end too early. They are extended to twice their largest pressure, or as
+            far as the material allows; where that is no further they come back as they are.
 
     Raises:
         NotConverged: When the micro model does not converge.
@@ -50,13 +65,18 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
     Note:
         Collective.
     """
-    pressure, closure = largest_loads(setup, comm)
-    if setup.scene.micro.hardness is not None:
-        pressure = min(pressure, _YIELDED * setup.scene.micro.hardness)
+    hardness = setup.scene.micro.hardness
+    most = math.inf if hardness is None else _YIELDED * hardness
+    if before is None or not (reached := before.largest_pressure):
+        pressure, closure = largest_loads(setup, comm)
+    else:
+        pressure, closure = _EXTENSION * reached, None
+        most = min(most, setup.materials.contact_modulus)
+    pressure = min(pressure, most)
     models = {
         id(one): _model(setup, region, one) for region in setup.samples for one in region.surfaces
     }
-    return representative_laws(
+    found = representative_laws(
         {region.name: region.surfaces for region in setup.samples},
         setup.materials.contact_modulus,
         largest_pressure=pressure,
@@ -64,9 +84,13 @@ def face_laws(setup: ProblemSetup, comm: Any, observe: Observer | None = None) -
         tolerance=setup.table_tolerance,
         most_rows=setup.table_rows,
         make_model=lambda sample: models[id(sample)],
+        before=before,
         comm=comm,
         observe=observe,
     )
+    if before is not None and found.rows == before.rows:
+        return before
+    return found
 
 
 def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
@@ -145,8 +169,8 @@ def _hertz(setup: ProblemSetup, *, force: float = 0.0, approach: float = 0.0) ->
     return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
 
 
-def face_coupling(setup: ProblemSetup, table: LawTable, comm: Any) -> EmbeddedCoupling:
-    """Return the body with laws of samples at the points of its contact face.
+class FaceCoupling(EmbeddedCoupling):
+    """Laws of samples on the contact face of a body; they are extended where a load step needs it.
 
     Args:
         setup: The problem set up from the scene, with laws of samples.
@@ -154,15 +178,34 @@ def face_coupling(setup: ProblemSetup, table: LawTable, comm: Any) -> EmbeddedCo
         comm: MPI communicator; None for this process alone.
 
     Note:
-        Collective.
+        Construction and all methods are collective.
     """
-    from macro import FacePair, LawContactProblem
 
-    face = embedding(setup, comm)
-    problem = LawContactProblem(face, table.laws, mode="pointwise", crown=crown(setup))
-    if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
-        problem.start_from(np.ones(face.patches.count))
-    return EmbeddedCoupling(problem, table, face)
+    def __init__(self, setup: ProblemSetup, table: LawTable, comm: Any) -> None:
+        self._setup, self._comm = setup, comm
+        face = embedding(setup, comm)
+        super().__init__(self._problem_with(table, face), table, face)
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step, with longer laws where these end too early."""
+        while True:
+            try:
+                return super().press(control)
+            except BeyondLaws:
+                longer = face_laws(self._setup, self._comm, before=self.table)
+                if longer is self.table:
+                    raise
+                last = self.state()
+                self.table, self._problem = longer, self._problem_with(longer, self.face)
+                self.restore(last)
+
+    def _problem_with(self, table: LawTable, face: LoadedFace | FacePair) -> LawContactProblem:
+        from macro import FacePair, LawContactProblem
+
+        problem = LawContactProblem(face, table.laws, mode="pointwise", crown=crown(self._setup))
+        if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
+            problem.start_from(np.ones(face.patches.count))
+        return problem
 
 
 def crown(setup: ProblemSetup) -> Callable[[Array, Array], Array] | None:

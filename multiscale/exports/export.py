@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from geometry import InputError
+from geometry.whole_files import written
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import abaqus_text, calculix_text
 from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts
 from multiscale.exports.tables import csv_text
 from multiscale.laws.law_table import LawTable
-from multiscale.storage import remove, write_text, written
+from multiscale.storage import remove, write_text
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

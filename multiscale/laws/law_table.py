@@ -61,6 +61,16 @@ class LawTable:
         return self.laws[int(index)]
 
     @property
+    def rows(self) -> int:
+        """Number of rows of all laws together."""
+        return sum(len(law.rows) for law in self.laws)
+
+    @property
+    def largest_pressure(self) -> float:
+        """Largest pressure of any law [MPa]; zero where no patch is touched."""
+        return max(float(law.rows.pressure.max(initial=0.0)) for law in self.laws)
+
+    @property
     def grid(self) -> PatchGrid:
         """The patches of a rectangle.
 

@@ -31,6 +31,7 @@ _ROWS_TOGETHER = 2
 results do not depend on the number of ranks."""
 
 _CLOSE = 0.01  # of its way: further than needed that the last row may lie
+_ROUNDING = 1e-12  # of a closure, from counting it from another height and back
 _FULL_ROWS = 4  # of a law that goes on in full contact
 
 
@@ -87,39 +88,59 @@ class PeriodicSamples:
         samples = self.samples
         return shared(self.comm, len(samples), lambda k: samples[k].full_contact_pressure())
 
-    def law(self, limit: Limit, tolerance: float, most_rows: int) -> PatchLaw:
+    def law(
+        self, limit: Limit, tolerance: float, most_rows: int, before: PatchLaw | None = None
+    ) -> PatchLaw:
         """Tabulate the mean law of the samples up to a limit; collective.
 
         Args:
             limit: Where it ends.
             tolerance: Interpolation error of the pressure.
             most_rows: Rows that are solved at most, for each sample.
+            before: A law of the same samples, whose rows are kept; others are added beyond them.
         """
         touch = max(self.reference - self.first_touch, 0.0)
         area = sum(sample.area for sample in self.samples)
         if limit.closure <= touch:
             open_law = PatchLaw.of(SolvedRows.none(), touch, self.reference)
             return replace(open_law, sample_area=area)
-        end = self.end(limit)
-        last = self.rows(np.array([end]), 0.0)[:, 0]
-        compliance = float((last.closure[0] - touch) / last.pressure[0])
+        end, start, kept = self.end(limit), 0.0, SolvedRows.none()
+        if before is not None and not before.is_open:
+            kept = self._without_full_contact(before)
+            start = self._parameter(max(self.reference - float(kept.closure[-1]), 0.0))
+            compliance = float((kept.approach[-1] - kept.closure[-1]) / kept.pressure[-1])
+        else:
+            last = self.rows(np.array([end]), 0.0)[:, 0]
+            compliance = float((last.closure[0] - touch) / last.pressure[0])
 
         def make(rows: SolvedRows) -> list[PatchLaw]:
-            rising, change = rows[:, 0].rising()
-            if end == 1.0 and not any(sample.yields for sample in self.samples):
+            new = rows[:, 0]
+            rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
+            if max(start, end) == 1.0 and not any(sample.yields for sample in self.samples):
                 rising = self._in_full_contact(rising, limit, compliance)
             return [replace(PatchLaw.of(rising, touch, self.reference), repaired=change)]
 
         (law,), _ = refined(
             lambda parameters: self.rows(parameters, compliance),
             make,
-            0.0,
+            start,
             end,
             compliance=np.array([[compliance]]),
             tolerance=tolerance,
             most_rows=most_rows,
         )
+        if before is not None:
+            error = max(law.interpolation_error, before.interpolation_error)
+            law = replace(law, interpolation_error=error)
         return replace(law, sample_area=area)
+
+    def _without_full_contact(self, law: PatchLaw) -> SolvedRows:
+        """Return the rows of a law of these samples that were solved, on their own reference."""
+        rows = law.shifted(self.reference - law.initial_separation).rows
+        # beyond the reference the rows of full contact follow, which go on straight
+        rows = rows[rows.closure <= self.reference * (1.0 + _ROUNDING)]
+        outside = {"outside_range": rows.pressure >= law.warning_pressure}
+        return SolvedRows(**dict(rows.columns()) | outside)
 
     def end(self, limit: Limit) -> float:
         """Return the parameter of the last row, in full contact at most; collective.

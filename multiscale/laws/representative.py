@@ -33,6 +33,7 @@ def representative_law(
     tolerance: float = 1e-3,
     most_rows: int = MOST_ROWS,
     make_model: MakeModel | None = None,
+    before: PatchLaw | None = None,
     comm: Any = None,
     observe: Observer | None = None,
 ) -> PatchLaw:
@@ -53,6 +54,8 @@ def representative_law(
         tolerance: Interpolation error of the pressure, see `refinement.refined`.
         most_rows: Rows that are solved at most, for each sample.
         make_model: Makes the model of a sample; by default the periodic half-space.
+        before: A law of the same samples that ends too early: its rows are kept, and only what lies
+            beyond them is solved.
         comm: MPI communicator, whose ranks share samples and rows. The law does not depend on
             their number.
         observe: Called as rows are solved.
@@ -93,17 +96,22 @@ def representative_law(
         comm=comm,
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
-    return face.law(Limit(*given), tolerance, most_rows)
+    return face.law(Limit(*given), tolerance, most_rows, before)
 
 
 def representative_laws(
-    regions: Mapping[str, Sequence[Surface]], contact_modulus: float, **options: Any
+    regions: Mapping[str, Sequence[Surface]],
+    contact_modulus: float,
+    *,
+    before: LawTable | None = None,
+    **options: Any,
 ) -> LawTable:
     """Tabulate the laws of all regions of a face, whose mean planes are one plane.
 
     Args:
         regions: Samples of each region, by its name; a face in one piece is one region.
         contact_modulus: E* [MPa].
+        before: Laws of the same samples that end too early, as for `representative_law`.
         options: As for `representative_law`.
 
     Returns:
@@ -118,7 +126,11 @@ def representative_laws(
         Collective.
     """
     names = Regions(tuple(regions))
-    laws = [representative_law(regions[name], contact_modulus, **options) for name in names.names]
+    earlier = [None] * len(names.names) if before is None else before.laws
+    laws = [
+        representative_law(regions[name], contact_modulus, before=law, **options)
+        for name, law in zip(names.names, earlier, strict=True)
+    ]
     highest = max(law.initial_separation for law in laws)
     return LawTable(
         patches=names,

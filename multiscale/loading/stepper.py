@@ -11,10 +11,10 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 
 from geometry import Control, NotConverged
+from geometry.checked_store import Arrays
 from micro.contact_detail import ContactDetail
 from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
@@ -166,6 +166,11 @@ class LoadHistory:
         """Whether the load falls anywhere."""
         points = self.points[-1:] * (self.cycles > 1) + self.points
         return any(later < earlier for earlier, later in pairwise(points))
+
+    @property
+    def up_to_largest(self) -> LoadHistory:
+        """The history of one load step, straight to the largest load."""
+        return LoadHistory(quantity=self.quantity, points=(self.largest,), steps=1, tilt=self.tilt)
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""

@@ -15,8 +15,9 @@ import h5py
 
 from geometry.collective import on_root
 from geometry.errors import NotWritten, PatchlawError
+from geometry.whole_files import written
 from multiscale.run import Run
-from multiscale.storage import remove, written
+from multiscale.storage import remove
 
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""

@@ -16,6 +16,7 @@ from pydantic_core import to_jsonable_python
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.machine import peak_memory
 from multiscale.run import Run
+from multiscale.scene.identity import files_of
 from multiscale.setup.mesh_bodies import FaceFacts
 from multiscale.setup.problem import ProblemSetup
 
@@ -40,6 +41,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "scene_file": run.scene.file,
         "scene": run.scene,
         "scene_given": run.given,
+        "files": files_of(run.identity),
         "units": "mm, N, MPa",
         "surface": {
             "source": setup.surface.source,

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry.collective import on_root, shared
+from geometry.errors import NotInstalled
+from geometry.packages import optional_packages
+from geometry.whole_files import write_bytes, write_whole, written
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.provenance import provenance
@@ -17,16 +20,7 @@ from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage import (
-    checksummed,
-    remove,
-    write_bytes,
-    write_csv,
-    write_json,
-    write_text,
-    write_whole,
-    written,
-)
+from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -59,7 +53,7 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    pictures: dict[str, bytes] = {}
+    drawn: list[Pictures] = []
     if run.scene.output.figures and run.steps:
         names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
         face = _face_pressures(run)
@@ -70,9 +64,10 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
             drawn = shared(
                 run.comm,
                 len(names),
-                lambda index: pictures_of(names[index], _figure(run, names[index], face)),
+                lambda index: pictures_of(names[index], lambda: _figure(run, names[index], face)),
             )
-        pictures = {name: content for files in drawn for name, content in files.items()}
+    run.remark(filter(None, (one.problem for one in drawn)))
+    pictures = {name: content for one in drawn for name, content in one.files.items()}
     with run.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
@@ -153,16 +148,35 @@ def has_block_figure(run: Run) -> bool:
     return pressure is not None and pressure.shape == run.setup.surface.grid
 
 
-def pictures_of(name: str, figure: Figure) -> dict[str, bytes]:
-    """Return the files of a figure by name: PNG, and SVG beside it.
+class Pictures(NamedTuple):
+    """The files of figures.
+
+    Attributes:
+        files: Their contents by name.
+        problem: Why there are none; empty where there are.
+    """
+
+    files: dict[str, bytes]
+    problem: str = ""
+
+
+def pictures_of(name: str, draw: Callable[[], Figure]) -> Pictures:
+    """Return the files of a figure: PNG, and SVG beside it.
+
+    Results do not depend on figures: without matplotlib, or with one that fails, there are none.
 
     Args:
         name: Name of the files without an ending.
-        figure: The figure.
+        draw: Draws the figure.
     """
-    from multiscale.figures.style import encoded  # loads matplotlib
+    try:
+        with optional_packages():
+            from multiscale.figures.style import encoded  # loads matplotlib
 
-    return {f"{name}.{kind}": content for kind, content in encoded(figure).items()}
+            found = encoded(draw())
+    except NotInstalled as error:
+        return Pictures({}, f"no figures are drawn: {error}")
+    return Pictures({f"{name}.{kind}": content for kind, content in found.items()})
 
 
 def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:

@@ -209,8 +209,7 @@ def plane_at_largest_load(
     """
     if plane := prescribed_plane(load_history, surface):
         return plane
-    largest = replace(load_history, points=(load_history.largest,), steps=1, force_change=None)
-    (step,) = load_steps(coupling, largest)
+    (step,) = load_steps(coupling, load_history.up_to_largest)
     return RigidPlane.above(surface, step.approach_mm, step.tilt)
 
 

@@ -1,4 +1,4 @@
-"""The checkpoint of a run: what it needs to go on, in an HDF5 file that is replaced whole.
+"""The checkpoint of a run: what it needs to go on, in a checked file that is replaced whole.
 
 The load steps so far stand in a log beside it, which grows by a line for each: what a checkpoint
 writes does not grow with the run.
@@ -6,37 +6,29 @@ writes does not grow with the run.
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import h5py
 import numpy as np
 
+from geometry.checked_store import Arrays, Mark, read_record, write_record
 from geometry.collective import on_root
 from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition
-from multiscale.restart.step_log import LogMark, StepLog, read_steps
+from multiscale.restart.step_log import StepLog, read_steps
 from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
-from multiscale.storage import (
-    Arrays,
-    checksummed,
-    packed,
-    remove_partial,
-    stored_numbers,
-    unpacked,
-    verified,
-    write_bytes,
-)
+from multiscale.storage import packed, remove_partial, unpacked
 
-FORMAT = "patchlaw checkpoint 7"
-FILE_NAME = "checkpoint.h5"
+FORMAT = "patchlaw checkpoint 8"
+FILE_NAME = "checkpoint.state"
+FORMER_NAME = "checkpoint.h5"
+"""Name of the checkpoints of earlier versions, which nothing goes on from."""
 
 LEAST_INTERVAL = 1.0
 """Least wall time between two writes [s]; a kill loses the load steps of this time."""
@@ -52,10 +44,8 @@ class Checkpoint:
     """A run between two load steps. Nothing in it depends on the number of ranks.
 
     Attributes:
-        scene: The scene as it was given, as nested dictionaries.
+        identity: All that the numbers of the run depend on, see `multiscale.scene.identity`.
         resolved: What the auto values of the scene became, see `resolved_sections`.
-        heights: SHA-256 of the surface's heights.
-        meshes: SHA-256 of the meshes of the bodies.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.
         position: Where the load history has come to.
@@ -63,15 +53,13 @@ class Checkpoint:
         contacts: The contacts recorded so far.
     """
 
-    scene: dict[str, Any]
+    identity: dict[str, Any]
     resolved: dict[str, Any]
-    heights: str
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
     position: LoadPosition
     state: Arrays
     contacts: tuple[ContactRecord, ...] = ()
-    meshes: list[str] = field(default_factory=list)
 
 
 def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
@@ -82,10 +70,8 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
         state: What `Run.state` returned.
     """
     return Checkpoint(
-        scene=run.given.model_dump(by_alias=True, mode="json"),
+        identity=run.identity,
         resolved=run.resolved,
-        heights=run.heights,
-        meshes=run.meshes,
         laws=run.law_bytes,
         steps=tuple(run.steps),
         position=run.position,
@@ -107,22 +93,16 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint, log: StepLog | None = N
     """
     log = log or StepLog(path.with_suffix(LOG_SUFFIX))
     log.write(checkpoint.steps)
-    facts = {name: getattr(checkpoint, name) for name in ("scene", "resolved", "heights", "meshes")}
-    facts["log"] = asdict(log.mark)
-    record = (
-        json.dumps(facts, default=np.generic.item),
-        np.frombuffer(checkpoint.laws, np.uint8),
-        checkpoint.position,
-        checkpoint.contacts,
-    )
-
-    def fill(file: Any) -> None:
-        file.attrs["format"] = FORMAT
-        for group, arrays in (("run", packed(record)), ("state", checkpoint.state)):
-            for name, array in arrays.items():
-                file.create_dataset(f"{group}/{name}", data=array)
-
-    return write_bytes(path, checksummed(fill))
+    facts = {
+        "format": FORMAT,
+        "identity": checkpoint.identity,
+        "resolved": checkpoint.resolved,
+        "log": asdict(log.mark),
+    }
+    run = packed((checkpoint.position, checkpoint.contacts))
+    arrays = {f"run/{name}": array for name, array in run.items()}
+    arrays |= {f"state/{name}": array for name, array in checkpoint.state.items()}
+    return write_record(path, facts, arrays | {"laws": np.frombuffer(checkpoint.laws, np.uint8)})
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -144,28 +124,28 @@ def read_checkpoint(path: Path) -> Checkpoint:
         found = InputError(f"cannot be read: {error}")
     except Exception as error:  # the checksum fits content that this version does not know
         found = InputError(f"is not understood: {error!r}")
-    problem = f"{found.problem}; remove it, or run without --resume to begin anew"
+    problem = f"{found.problem}; remove it, or begin anew with --overwrite"
     raise InputError(problem, file=str(path), value=found.value, allowed=found.allowed)
 
 
 def _read(path: Path) -> Checkpoint:
-    with h5py.File(verified(path), "r") as file:
-        form = str(file.attrs.get("format", ""))
-        if form != FORMAT:
-            raise InputError("was written by another patchlaw", value=form, allowed=FORMAT)
-        run, state = (
-            {name: stored_numbers(item) for name, item in file.get(group, {}).items()}
-            for group in ("run", "state")
-        )
-    text, laws, position, contacts = unpacked(run, (LoadPosition, ContactRecord))
-    facts = json.loads(text)
-    mark = LogMark(**facts.pop("log"))
+    facts, arrays = read_record(path.read_bytes())
+    form = facts.get("format") if isinstance(facts, dict) else None
+    if form != FORMAT:
+        raise InputError("was written by another patchlaw", value=form, allowed=FORMAT)
+
+    def group(name: str) -> Arrays:
+        found = (key.partition("/") for key in arrays if key.startswith(f"{name}/"))
+        return {key: arrays[f"{name}/{key}"] for _, _, key in found}
+
+    position, contacts = unpacked(group("run"), (LoadPosition, ContactRecord))
     return Checkpoint(
-        **facts,
-        laws=laws.tobytes(),
-        steps=read_steps(path.with_suffix(LOG_SUFFIX), mark),
+        identity=facts["identity"],
+        resolved=facts["resolved"],
+        laws=arrays["laws"].tobytes(),
+        steps=read_steps(path.with_suffix(LOG_SUFFIX), Mark(**facts["log"])),
         position=position,
-        state=state,
+        state=group("state"),
         contacts=contacts,
     )
 
@@ -278,6 +258,7 @@ class CheckpointWriter:
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
         write_checkpoint(self.path, self._pending.checkpoint(self._run), self._log)
+        self.path.with_name(FORMER_NAME).unlink(missing_ok=True)
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))

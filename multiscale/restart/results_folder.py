@@ -3,28 +3,36 @@
 from __future__ import annotations
 
 import errno
+import fcntl
 import json
 import os
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
-
-from filelock import FileLock, Timeout
+from typing import Any, NamedTuple
 
 from geometry.collective import on_root
 from geometry.errors import InputError
-from multiscale.removed import refuse_removed_results, without_removed
-from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, read_checkpoint
-from multiscale.run import Run
-from multiscale.scene.keys import dotted
+from multiscale.removed import without_removed
+from multiscale.restart.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
+from multiscale.scene.identity import (
+    CONTENT,
+    VERSION,
+    Change,
+    changes,
+    flat_identity,
+    identity,
+    told,
+)
 from multiscale.scene.scene import Scene
 
 _NAME = ".lock"
-_ATTEMPTS = 10  # while others make and remove the folder
-_PATIENCE = 0.2  # for another run that is just ending [s]
-_MOST_SHOWN = 3  # keys that differ between two scenes
+_PATIENCE = 0.2  # for another run that is just ending, or others that remove the folder [s]
+_NAP = 0.02
+_OUTPUT = "output."
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
+_NO_FOLDERS = (errno.EBADF, errno.EISDIR, errno.EINVAL, *_NO_LOCKS)
 
 
 @contextmanager
@@ -55,68 +63,101 @@ def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
 class FolderLock:
     """A lock on a folder of results, which the system lifts when the process ends, however it does.
 
-    A missing folder is made, with those above it, and removed again when nothing was written to
-    it. Where the file system has no locks, nothing is locked: a lock that outlives a killed run
-    would be worse.
+    The folder itself is locked, so that a killed process leaves nothing of it. Network file systems
+    that lock no folders (NFS) get a file ``.lock`` instead. A missing folder is made, with those
+    above it, and removed again when nothing was written to it. Where the file system has no locks,
+    nothing is locked: a lock that outlives a killed run would be worse.
 
     Args:
         folder: The folder.
     """
 
     def __init__(self, folder: Path) -> None:
-        self._path = folder / _NAME
-        self._lock = FileLock(
-            self._path, _PATIENCE, thread_local=False, poll_interval=0.02, fallback_to_soft=False
-        )
-        self._file: os.stat_result | None = None
+        self._folder, self._locked = folder, folder
+        self._handle: int | None = None
         self._made: list[Path] = []
 
     def hold(self) -> None:
-        """Take the lock; do nothing when it is held and its file is still there.
+        """Take the lock; do nothing when it is held on the folder that is there.
 
         Raises:
             InputError: When another process holds it, or the folder cannot be written to.
         """
         if self._is_held():
             return
-        self._lock.release()
-        for _ in range(_ATTEMPTS):
+        self._close()
+        until = time.monotonic() + _PATIENCE
+        while True:
             try:
-                self._made += [folder for folder in self._path.parents if not folder.exists()]
-                self._path.parent.mkdir(parents=True, exist_ok=True)
-                self._lock.acquire()
-                self._file = os.stat(self._path)
-                return
-            except Timeout:
-                problem = "another run is writing to this folder"
-                break
-            except OSError as error:
-                if error.errno in _NO_LOCKS:
+                self._make_folder()
+                self._take()
+                if self._handle is None or self._is_held():
                     return
+                problem = "is removed by another run"
+            except BlockingIOError:
+                problem = "another run is writing to this folder"
+            except (FileExistsError, NotADirectoryError):
+                problem, until = "is not a folder", 0.0
+            except OSError as error:
                 problem = f"cannot be written to: {error.strerror}"
-                if isinstance(error, FileExistsError | NotADirectoryError):
-                    problem = "is not a folder"
-                if not isinstance(error, FileNotFoundError):
-                    break
-                self._lock.release()  # another run removed the folder between two of these calls
+                if not isinstance(error, FileNotFoundError):  # removed between two of these calls
+                    until = 0.0
+            self._close()
+            if time.monotonic() > until:
+                break
+            time.sleep(_NAP)
         self.release()
-        raise InputError(problem, key="--out", value=str(self._path.parent))
+        raise InputError(problem, key="--out", value=str(self._folder))
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
-        if self._is_held():
+        if self._locked != self._folder and self._is_held():
             with suppress(OSError):  # in a folder that became read-only the file stays
-                self._path.unlink(missing_ok=True)
-        self._lock.release()
-        self._file = None
+                self._locked.unlink(missing_ok=True)
+        self._close()
         with suppress(OSError):  # results are there, or a folder is gone
             for folder in self._made:
                 folder.rmdir()
 
-    def _is_held(self) -> bool:
-        """Whether this lock is on the file of that name: others may have removed or made it."""
+    def _make_folder(self) -> None:
+        above = [self._folder, *self._folder.parents]
+        self._made += [folder for folder in above if not folder.exists()]
+        self._folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(self._folder, os.W_OK | os.X_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+    def _take(self) -> None:
+        """Lock the folder or, where it cannot be locked, the file in it."""
+        self._locked = self._folder
         try:
-            return self._file is not None and os.path.samestat(os.stat(self._path), self._file)
+            self._lock(os.O_RDONLY)
+        except OSError as error:
+            if error.errno not in _NO_FOLDERS:
+                raise
+            self._locked = self._folder / _NAME
+            try:
+                self._lock(os.O_RDWR | os.O_CREAT)
+            except OSError as none:
+                if none.errno not in _NO_LOCKS:
+                    raise
+                self._close()
+
+    def _lock(self, flags: int) -> None:
+        self._close()
+        self._handle = os.open(self._locked, flags, 0o666)
+        fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    def _close(self) -> None:
+        if self._handle is not None:
+            os.close(self._handle)
+        self._handle = None
+
+    def _is_held(self) -> bool:
+        """Whether this lock is on what has its name: others may have removed or made it."""
+        try:
+            return self._handle is not None and os.path.samestat(
+                os.stat(self._locked), os.fstat(self._handle)
+            )
         except OSError:
             return False
 
@@ -129,132 +170,90 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
         scene: The present scene.
 
     Raises:
-        InputError: When the checkpoint is damaged, or a key of the scene has changed.
+        InputError: When the checkpoint is damaged, or anything that its numbers depend on has
+            changed: a key of the scene, the content of a file that it names, the version.
     """
-    path = folder / FILE_NAME
+    path, former = folder / FILE_NAME, folder / FORMER_NAME
+    if former.exists():
+        raise InputError(
+            "was written by another patchlaw; remove it, or begin anew with --overwrite",
+            file=str(former),
+        )
     if not path.exists():
         return None
     found = read_checkpoint(path)
-    try:
-        refuse_removed_results(found.scene)
-    except InputError as error:
-        raise error.located(file=str(path)) from None
-    _refuse_changed_keys(folder, scene, found.scene)
+    for key, new, old in changes(identity(scene), found.identity):
+        if not key.startswith(_OUTPUT):
+            raise InputError(
+                f"is not what the run in {folder} began with; restore it, or begin anew with "
+                "--overwrite",
+                key=key,
+                value=new,
+                allowed=repr(old),
+            )
     return found
 
 
-def go_on(run: Run, found: Checkpoint, folder: Path) -> None:
-    """Let a run go on from a checkpoint of the same scene.
-
-    Args:
-        run: The run, made with the resolved values of the checkpoint; nothing of it made yet.
-        found: The checkpoint.
-        folder: Folder of the results, for messages.
-
-    Raises:
-        InputError: When the heights or the meshes have changed.
-    """
-    _refuse_changed_heights(folder, run, found.heights)
-    _refuse_changed_meshes(folder, run, found.meshes)
-    run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
-
-
-def is_finished(folder: Path, run: Run) -> bool:
+def is_finished(folder: Path, now: Mapping[str, Any]) -> bool:
     """Tell whether the results in a folder are those of a finished run of the same scene.
 
     Args:
         folder: The folder.
-        run: A run of the scene.
+        now: Identity of the scene.
     """
-    try:
-        facts = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
-        _refuse_changed_keys(folder, run.given, facts["scene_given"])
-        _refuse_changed_heights(folder, run, facts["surface"]["heights_sha256"])
-        meshes = [one["mesh_sha256"] for one in facts.get("bodies", ())]
-        _refuse_changed_meshes(folder, run, [one for one in meshes if one])
-        return bool(facts["finished"])
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return False  # InputError is a ValueError
+    found = _provenance(folder)
+    return found is not None and found.finished and not _differing(now, found.identity)
 
 
-def _refuse_changed_heights(folder: Path, run: Run, heights: str) -> None:
-    """Refuse to go on with heights other than those that a run began with."""
-    if heights != run.heights:
-        raise InputError(
-            f"the heights are not those that the run in {folder} began with; restore them, or "
-            "run without --resume to begin anew",
-            key="surface.file",
-            value=run.given.surface.file,
-        )
-
-
-def _refuse_changed_meshes(folder: Path, run: Run, meshes: list[str]) -> None:
-    """Refuse to go on with bodies other than those that a run began with."""
-    if meshes != run.meshes:
-        body, counter = run.given.body, run.given.counter_body
-        key, section = ("body.mesh", body) if body else ("counter_body.mesh", counter)
-        raise InputError(
-            f"the meshes are not those that the run in {folder} began with; restore them, or run "
-            "without --resume to begin anew",
-            key=key,
-            value=section and section.mesh,
-        )
-
-
-def _refuse_changed_keys(folder: Path, now: Scene, then: dict[str, Any]) -> None:
-    """Refuse to go on with a scene in which a key has changed that can matter."""
-    for key, new, old in _changes(now, then):
-        raise InputError(
-            f"is not what the run in {folder} began with; restore it, or run without --resume and "
-            "with --overwrite to begin anew",
-            key=key,
-            value=new,
-            allowed=repr(old),
-        )
-
-
-def refuse_other_results(folder: Path, scene: Scene) -> None:
+def refuse_other_results(folder: Path, now: Mapping[str, Any]) -> None:
     """Refuse to replace the results of another scene, finished or not.
 
     Args:
         folder: The folder.
-        scene: The scene whose results are to be written.
+        now: Identity of the scene whose results are to be written.
 
     Raises:
-        InputError: When the folder holds results of another scene; names the first keys that
-            differ. Results of the same scene, and what is not understood, may be replaced.
+        InputError: When the folder holds results of another scene, or of other content of the files
+            that it names; says what differs. Results of the same scene, and what is not understood,
+            may be replaced.
     """
-    then = without_removed(_scene_of_results(folder))
-    known = dict(dotted(then))  # a key that an earlier version did not have is no difference
-    differing = [change for change in _changes(scene, then) if change[0] in known]
+    found = _provenance(folder)
+    differing = [] if found is None else _differing(now, found.identity)
     if differing:
-        shown = ", ".join(f"{key} was {old!r}" for key, _, old in differing[:_MOST_SHOWN])
-        more = f" and {len(differing) - _MOST_SHOWN} more" * (len(differing) > _MOST_SHOWN)
         raise InputError(
-            f"holds results of another scene, where {shown}{more}",
+            f"holds results of another scene, where {told(differing)}",
             key="--out",
             value=str(folder),
             allowed="another folder, or --overwrite",
         )
 
 
-def _scene_of_results(folder: Path) -> dict[str, Any]:
-    """Return the scene, as given, whose results a folder holds; nothing where it has none."""
+class _Provenance(NamedTuple):
+    """What results say of themselves: the identity of their scene, and if its run was finished."""
+
+    identity: dict[str, Any]
+    finished: bool
+
+
+def _provenance(folder: Path) -> _Provenance | None:
+    """Return what the results in a folder say of themselves; None where they say nothing."""
     try:
-        path = folder / "provenance.json"
-        if path.is_file():
-            found = json.loads(path.read_text(encoding="utf-8"))["scene_given"]
-            return found if isinstance(found, dict) else {}
-        path = folder / FILE_NAME
-        return read_checkpoint(path).scene if path.exists() else {}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return {}  # InputError is a ValueError
+        found = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
+        scene = without_removed(found["scene_given"])
+        then = flat_identity(scene, found.get("files", {}), found["patchlaw"])
+        return _Provenance(then, found["finished"] is True)
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return None
 
 
-def _changes(now: Scene, then: dict[str, Any]) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the keys that have changed and can matter, with their present and former values."""
-    old = dict(dotted(without_removed(then)))
-    new = dict(dotted(now.model_dump(by_alias=True, mode="json")))
-    for key in dict.fromkeys((*new, *old)):
-        if not key.startswith("output.") and old.get(key) != new.get(key):
-            yield key, new.get(key), old.get(key)
+def _differing(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[Change]:
+    """Return the changes by which results are those of another scene.
+
+    A key that an earlier version did not have is no difference, nor is the version itself. A file
+    whose content was not recorded is one.
+    """
+    return [
+        (key, new, old)
+        for key, new, old in changes(now, then)
+        if (key in then or key.startswith(CONTENT)) and not key.startswith((VERSION, _OUTPUT))
+    ]

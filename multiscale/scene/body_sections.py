@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from geometry.materials import Material
 from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.quantities import Length, Pressure
-from multiscale.scene.sections import Number, PositiveLength, Section, SurfaceSection
+from multiscale.scene.sections import NAMES_A_FILE, Number, PositiveLength, Section, SurfaceSection
 
 Tag = str | Annotated[int, Field(ge=0, strict=True)]
 """Physical name or number of a face in a mesh."""
@@ -62,7 +62,7 @@ class CounterBodySection(Section):
     supports move with the approach.
     """
 
-    mesh: str | None = None
+    mesh: Annotated[str | None, NAMES_A_FILE] = None
     """File of the mesh, gmsh's .msh or .xdmf, with named or numbered faces. A relative path starts
     in the folder of the scene. Without it the body is a half-space."""
     mesh_unit: Literal["mm", "m", "um", "inch"] = "mm"
@@ -123,7 +123,7 @@ class CounterBodySection(Section):
 class BodySection(CounterBodySection):
     """The elastic body below the surface, from a mesh, instead of ``[block]``."""
 
-    mesh: str
+    mesh: Annotated[str, NAMES_A_FILE]
     """File of the mesh, gmsh's .msh or .xdmf, with named or numbered faces. A relative path starts
     in the folder of the scene."""
     contact: Tag
@@ -157,7 +157,7 @@ class LawSection(Section):
     reported; the seed of the spectrum when not given."""
     largest_pressure: Annotated[Pressure, Field(gt=0)] | None = None
     """Largest pressure at a point of the face that the laws are made for; when not given, ten times
-    the mean one, or more on a crowned face."""
+    the mean one, or more on a crowned face. Laws are extended where a load step needs it."""
     regions: tuple[RegionSection, ...] = ()
     """Further faces of the contact, each with a sample of its own."""
     crown: tuple[Radius, Radius] | None = None

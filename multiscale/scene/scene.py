@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, get_origin
@@ -14,6 +14,7 @@ from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
+from multiscale.scene.sections import NAMES_A_FILE, Section
 
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
 """Names of types that stand at the end of a key's place where it may have several."""
@@ -109,6 +110,11 @@ class Scene(SceneSections):
         """The file the scene was read from."""
         return str(self._source) if self._source else None
 
+    def files(self) -> dict[str, Path]:
+        """Return the paths of all files that the scene names, by dotted key."""
+        named = dict(_named_files(self, ""))
+        return {key: path for key, name in named.items() if (path := self.path_of(name))}
+
     @property
     def surface_path(self) -> Path | None:
         """Path of the heights, relative paths taken from the scene's folder."""
@@ -123,6 +129,20 @@ class Scene(SceneSections):
         if file is None:
             return None
         return (self._source.parent if self._source else Path()) / file
+
+
+def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:
+    """Yield dotted keys below a value of a scene that name files, with what they name."""
+    if isinstance(value, Section):
+        for name, field in type(value).model_fields.items():
+            key = f"{place}{field.alias or name}"
+            if NAMES_A_FILE in field.metadata:
+                yield key, getattr(value, name)
+            else:
+                yield from _named_files(getattr(value, name), f"{key}.")
+    elif isinstance(value, tuple):
+        for number, one in enumerate(value):
+            yield from _named_files(one, f"{place}{number}.")
 
 
 def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError:

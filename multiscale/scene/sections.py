@@ -22,6 +22,10 @@ Number = Annotated[float, Field(strict=True)]
 Count = Annotated[int, Field(ge=1, le=1_000_000_000, strict=True)]
 
 
+NAMES_A_FILE = "names a file"
+"""Marks keys whose value is the name of a file that results depend on."""
+
+
 class Section(BaseModel):
     """A section of a scene: unknown keys are refused, and the text below a key describes it."""
 
@@ -127,7 +131,7 @@ class SurfaceSection(Section):
     spectrum: SpectrumSection | None = None
     """Recipe of a synthesised surface; it needs ``lengths``, and ``grid`` unless an ``accuracy``
     chooses it."""
-    file: str | None = None
+    file: Annotated[str | None, NAMES_A_FILE] = None
     """File of a measured map: .npy, text, .xyz, or an instrument's format. A relative path starts
     in the folder of the scene."""
     heights: SkipJsonSchema[HeightsOfArray] = None

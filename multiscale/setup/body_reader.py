@@ -5,7 +5,6 @@ Theory: demos/theory.md, section 11.
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from geometry import InputError, Material
 from geometry.collective import on_root
 from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.scene.body_sections import CounterBodySection
+from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies, SceneBody
 
@@ -150,7 +150,7 @@ class _Reader:
             materials=tuple(self._at_face(body, part) for part in facets),
             poisson_ratio=body.poisson_ratio,
             above=highest > _SAME_PLANE * max(face.lengths),
-            digest=on_root(self._comm, lambda: _digest(self._path)),
+            digest=on_root(self._comm, lambda: content_digest(self._path)),
             notes=(*filter(None, [note]), *self._curved(face)),
         )
 
@@ -261,12 +261,3 @@ def _opposed(first: FaceFrame, second: FaceFrame, key: str) -> FaceFrame:
         )
     height = float(first.height(second.origin[None])[0])
     return replace(first, origin=first.in_space([[0.0, 0.0]], height)[0])
-
-
-def _digest(path: Path) -> str:
-    """Return the SHA-256 of a mesh's files."""
-    whole = hashlib.sha256(path.read_bytes())
-    arrays = path.with_suffix(".h5")
-    if path.suffix.lower() == ".xdmf" and arrays.is_file():
-        whole.update(arrays.read_bytes())
-    return whole.hexdigest()

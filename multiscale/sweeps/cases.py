@@ -7,9 +7,11 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, overload
 
 from geometry.errors import InputError
+from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import parsed
 
@@ -18,6 +20,7 @@ MOST_CASES = 1_000_000
 
 _RANGE = re.compile(r"(-?\d+)\.\.(-?\d+)")
 _LINEAR = "block.young_modulus"
+_FILE_KEYS = ("file", "mesh")  # last parts of their names; sections may hold them too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,6 +73,11 @@ class SweepCases(Sequence[Case]):
             key: {_text(value): place for place, value in enumerate(each)}
             for key, each in self.values.items()
         }
+        self._digests: dict[Path, str] = {}
+        self._varies_files = any(
+            key.rpartition(".")[2] in _FILE_KEYS or isinstance(each[0], dict | list)
+            for key, each in self.values.items()
+        )
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -101,6 +109,20 @@ class SweepCases(Sequence[Case]):
                 return None
             number = number * len(each) + place
         return number
+
+    def files(self, case: Case) -> dict[str, str]:
+        """Return what stands for the content of files as a case names them, by their keys.
+
+        Args:
+            case: The case. Where no varied key can name a file, the answer is empty.
+        """
+        if not self._varies_files:
+            return {}
+        named = case.scene.files()
+        for path in named.values():
+            if path not in self._digests:
+                self._digests[path] = content_digest(path)
+        return {key: self._digests[path] for key, path in named.items()}
 
     def where(self, chosen: Mapping[str, Any]) -> SweepCases:
         """Return the cases whose keys have given values."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
+from geometry.checked_store import START, Record, append, end_of, unsealed
 from geometry.errors import InputError
-from multiscale.storage import written
+from geometry.whole_files import written
+from multiscale.scene.identity import changes, told
+
+_SUFFIX = ".cases"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -22,54 +25,66 @@ class CaseResult:
         rows: The rows of its ``history.csv``: a value for every column.
         notes: Remarks of the run on its own approximations.
         failure: Why the case ended early; empty when it did not.
+        files: What stands for the content of files that varied keys name, by these keys.
     """
 
     case: str
     rows: Sequence[Sequence[Any]]
     notes: Sequence[str] = ()
     failure: str = ""
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 class Journal:
-    """Files with a line for every case that is done; every process appends to its own.
+    """Files with a record for every case that is done; every process appends to its own.
 
     Any number of processes and of jobs may so work on one sweep without waiting for each other.
 
     Args:
         folder: Folder of the files; made with the first case. None stores nothing.
-        scene: Text that identifies the scene that all cases start from.
+        identity: Identity of the scene that all cases start from.
     """
 
-    def __init__(self, folder: Path | None, scene: str) -> None:
-        self._folder, self._header = folder, {"scene": scene}
+    def __init__(self, folder: Path | None, identity: Mapping[str, Any]) -> None:
+        self._folder, self._identity = folder, dict(identity)
 
     def files(self) -> list[Path]:
         """Return the files that are there, in the order of their names."""
-        return sorted(self._folder.glob("*.jsonl")) if self._folder else []
+        return sorted(self._folder.glob(f"*/*{_SUFFIX}")) if self._folder else []
 
     def read(self, paths: Iterable[Path]) -> Iterator[CaseResult]:
         """Yield the cases that are done, from some of the files.
 
         Raises:
-            InputError: When they are cases of another scene.
+            InputError: When they are cases of another scene, or a file is damaged.
         """
         for path in paths:
-            with path.open("rb") as file:
-                # A process that was killed leaves its last line without an end.
-                contents = (json.loads(line) for line in file if line.endswith(b"\n"))
-                if next(contents, self._header) != self._header:
+            yield from self._results(path)
+
+    def _results(self, path: Path) -> Iterator[CaseResult]:
+        try:
+            for record, mark in unsealed(path.read_bytes()):
+                if mark.records > 1:
+                    yield CaseResult(**record.facts)
+                elif found := list(changes(self._identity, record.facts)):
                     raise InputError(
-                        "holds the cases of another scene", key="--out",
-                        value=str(path.parent.parent), allowed="another folder, or --overwrite",
+                        f"holds the cases of another scene, where {told(found)}", key="--out",
+                        value=str(path.parents[2]), allowed="another folder, or --overwrite",
                     )  # fmt: skip
-                yield from (CaseResult(**content) for content in contents)
+        except InputError as error:
+            if error.key:
+                raise
+            raise InputError(
+                f"{error.problem}; remove it, and its cases are computed again", file=str(path)
+            ) from None
 
     @contextmanager
-    def appending(self, process: str) -> Iterator[Callable[[CaseResult], None]]:
+    def appending(self, part: str, process: str) -> Iterator[Callable[[CaseResult], None]]:
         """Open the file of a process.
 
         Args:
-            process: Name of the process, different for all that work on the sweep.
+            part: Name of the part of the sweep.
+            process: Name of the process, different for all that work on the part.
 
         Yields:
             The function that stores a result.
@@ -77,21 +92,14 @@ class Journal:
         if self._folder is None:
             yield lambda result: None
             return
-        path = self._folder / f"{process}.jsonl"
+        path = self._folder / part / f"{process}{_SUFFIX}"
         with written(path):
-            self._folder.mkdir(parents=True, exist_ok=True)
-            with path.open("ab") as file:
-                whole = path.read_bytes().rfind(b"\n") + 1
-                file.truncate(whole)
-                if not whole:
-                    file.write(_line(self._header))
-                yield lambda result: _append(file, result)
+            path.parent.mkdir(parents=True, exist_ok=True)
+        mark = end_of(path.read_bytes()) if path.exists() else START
 
+        def store(result: CaseResult) -> None:
+            nonlocal mark
+            head = [Record(self._identity)] if mark == START else []
+            mark = append(path, [*head, Record(asdict(result))], mark)
 
-def _append(file: BinaryIO, result: CaseResult) -> None:
-    file.write(_line(asdict(result)))
-    file.flush()
-
-
-def _line(content: dict[str, Any]) -> bytes:
-    return json.dumps(content).encode() + b"\n"
+        yield store

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from geometry.errors import InputError, NotConverged
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.history import COLUMNS
 from multiscale.run import Run
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.sweeps.cases import Case, SweepCases, sweep_cases
 from multiscale.sweeps.journal import CaseResult, Journal
@@ -62,17 +63,19 @@ def sweep(
         raise InputError("is no part of a sweep", value=f"{which}/{parts}", allowed="1/n … n/n")
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
     cases = together(comm, lambda: _checked_cases(scene, vary, rank, size))
-    journal = Journal(None if folder is None else Path(folder) / JOURNAL, _identity(scene))
+    base = on_root(comm, lambda: identity(scene))
+    journal = Journal(None if folder is None else Path(folder) / JOURNAL, base)
     mine, done = _read(journal, cases, comm)
     own = cases.groups()[which - 1 :: parts]
     ahead = [group for group in own if not done.issuperset(group)]
     counter = TaskCounter(comm, len(ahead))
 
     def work() -> None:
-        with journal.appending(f"{which}-of-{parts}-rank-{rank}") as store:
+        with journal.appending(part_name(part), f"rank-{rank}") as store:
             for task in counter:
                 group = [cases[number] for number in ahead[task]]
-                for case, result in _run_group(group, done, counter.progress):
+                for case, found in _run_group(group, done, counter.progress):
+                    result = replace(found, files=cases.files(case))
                     store(result)
                     mine[case.number] = result
                     if observe is not None:
@@ -113,8 +116,17 @@ def _read(journal: Journal, cases: SweepCases, comm: Any) -> tuple[dict[int, Cas
         found: dict[int, CaseResult] = {}
         for result in journal.read(files[rank::size]):
             number = cases.number_of(result.case)
-            if number is not None:
-                found.setdefault(number, result)
+            if number is None:
+                continue
+            now = cases.files(cases[number])
+            for key in now:
+                if now[key] != result.files.get(key):
+                    raise InputError(
+                        f"has another content than when case {number} was computed; begin anew "
+                        "with --overwrite or in another folder", key=key,
+                        value=str(cases[number].scene.files()[key]),
+                    )  # fmt: skip
+            found.setdefault(number, result)
         return found
 
     mine = together(comm, read)
@@ -161,10 +173,10 @@ def _load_steps(
     return list(history.steps), history.notes, failure
 
 
-def _identity(scene: Scene) -> str:
-    """Return a short text that differs between scenes whose load steps may differ."""
-    drawn = {"output": {"figures", "report", "fields"}}
-    return hashlib.sha256(scene.model_dump_json(by_alias=True, exclude=drawn).encode()).hexdigest()
+def part_name(part: tuple[int, int]) -> str:
+    """Return the name of a part of a sweep, the k-th of n, in the folder of its cases."""
+    which, parts = part
+    return f"{which}-of-{parts}"
 
 
 def _modulus(scene: Scene) -> float:

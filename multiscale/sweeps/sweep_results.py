@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,8 +31,8 @@ Array = NDArray[np.float64]
 
 _COLUMNS = tuple(column.name for column in COLUMNS)
 _BAND = (0.05, 0.95)  # quantiles
-_DRAWN = ("surface.spectrum.seed", "surface.file", "counter_surface.shift")
-"""Keys over whose values statistics are taken."""
+_DRAWN = ("surface.spectrum.seed", "counter_surface.spectrum.seed", "counter_surface.shift")
+"""Keys over whose values statistics are taken: draws of one roughness. Files are compared."""
 _BLOCK = 256
 """Cases whose rows rank 0 gathers at a time."""
 
@@ -101,9 +102,9 @@ class SweepResults:
         return SweepResults(chosen, self._mine, self._comm)
 
     def ensembles(self) -> list[tuple[dict[str, Any], SweepResults]]:
-        """Return the parts of a sweep that differ in seed or file alone, and their other values.
+        """Return the parts of a sweep that differ in seed alone, and their other values.
 
-        Where neither is varied every case is a part of its own: a mean over other keys says little.
+        Where none is varied every case is a part of its own: a mean over other keys says little.
         """
         return [
             (values, SweepResults(SweepCases(self.cases.base, self.cases.values, numbers),
@@ -298,7 +299,9 @@ class SweepResults:
 
 
 def _label(values: Mapping[str, Any]) -> str:
-    """Return the values of keys as a legend shows them, without the sections of the keys."""
+    """Return the values of keys as a legend shows them, without sections and folders."""
+    names = {key: key.rpartition(".")[2].replace("_", " ") for key in values}
     return ", ".join(
-        f"{key.rpartition('.')[2].replace('_', ' ')} {value}" for key, value in values.items()
+        Path(value).name if names[key] in ("file", "mesh") else f"{names[key]} {value}"
+        for key, value in values.items()
     )

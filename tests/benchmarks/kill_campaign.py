@@ -1,4 +1,4 @@
-"""Kills runs of all couplings at random moments, or tells them to stop, resumes and compares."""
+"""Kills runs, sweeps, laws and comparisons at random moments, goes on with them and compares."""
 
 import argparse
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "parallel")]
 
-from killed_runs import SCENES, Runs, campaign  # noqa: E402
+from killed_runs import COMMANDS, SCENES, Runs, campaign, command_campaign  # noqa: E402
 
 
 def main():
@@ -31,6 +31,10 @@ def main():
             flush=True,
         )
         assert worst <= 1e-10
+    for command in COMMANDS:
+        with tempfile.TemporaryDirectory() as folder:
+            calls = command_campaign(runs, command, choice.kills, Path(folder), seed=choice.seed)
+        print(f"{command}: {choice.kills} kills, {calls} calls, the same files", flush=True)
 
 
 if __name__ == "__main__":

@@ -20,8 +20,8 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "geometry": [
         "blocked_spline cores errors legendre_modes slope_search small_caches",
-        "checks collective interpolant materials missing packages regions",
-        "face_frame filters spectrum surface",
+        "checks collective interpolant materials missing packages regions whole_files",
+        "checked_store face_frame filters spectrum surface",
         "mirroring patches statistics summits synthesis zero",
         "plausibility",
         "facing preparation rigid_plane",

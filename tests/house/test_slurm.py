@@ -207,11 +207,11 @@ def test_a_cancelled_job_loses_no_load_step(slurm, reference):
     words = (SCRIPTS / "run.sbatch", SCENE, out, "--resume", "--set", *SMALL, "load.steps=40")
     slurm.environment["PATCHLAW"] = f"{sys.executable} {slow}"
     job = slurm.submit(*words)
-    slurm.wait(lambda: (out / "checkpoint.h5").is_file(), 60)
+    slurm.wait(lambda: (out / "checkpoint.state").is_file(), 60)
     time.sleep(3.0)  # some load steps
     slurm.say("scancel", job)
     assert slurm.finish(job, 60) == {"CANCELLED"}, slurm.logs()
-    assert (out / "checkpoint.h5").is_file()
+    assert (out / "checkpoint.state").is_file()
     slurm.environment["PATCHLAW"] = f"{sys.executable} -m multiscale"
     job = slurm.submit("--output=again.log", *words)
     assert slurm.finish(job, 120) == {"COMPLETED"}, slurm.logs()
@@ -233,7 +233,7 @@ def test_a_run_longer_than_the_limit_goes_on_after_it(slurm, reference):
         *limit, SCRIPTS / "requeue.sbatch", SCENE, out, "--set", *SMALL, changes
     )  # fmt: skip
     slurm.wait(lambda: slurm.show(job, "RestartCnt").lstrip("0").isdigit(), 100)
-    assert (out / "checkpoint.h5").is_file()
+    assert (out / "checkpoint.state").is_file()
     assert slurm.finish(job, 300) == {"COMPLETED"}, slurm.logs()
     log = (slurm.folder / f"patchlaw-long-{job}.log").read_text(encoding="utf-8")
     assert "go on with --resume" in log

@@ -36,6 +36,14 @@ SCENES = {
         "load.approach=['8 um', '3 um']", "load.steps=150",
     ],
 }  # fmt: skip
+COMMANDS = {
+    "sweep": ["--vary", "surface.spectrum.seed=0..7"],
+    "laws": [],
+    "compare": ["--budget", "20s", "--against", "half-space"],
+}
+"""Commands beside ``run``, with their own words."""
+TABLES = {"sweep": ("cases.csv", "history.csv"), "laws": ("laws.h5",), "compare": ()}
+"""Files that a command leaves, whoever killed it before."""
 SIGNALS = (signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGHUP)
 UNCOMPARED = {"newton_iterations", "linear_iterations", "wall_s", "reason"}
 
@@ -205,7 +213,7 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         elif dice.random() < 0.5:
             over = after(dice.uniform(0.0, lasts))
         else:
-            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.h5")
+            over = after(dice.uniform(0.0, 0.2 * lasts), out / "checkpoint.state")
         sessions += 1
         if sessions % every == 0:
             code = runs.on_two_ranks(words_of(out, scene, *words), log, over)
@@ -220,3 +228,44 @@ def campaign(runs, scene, kills, folder, *, seed, every=2):
         assert not list(out.glob("checkpoint*")), "a finished run keeps none"
         worst, out = max(worst, largest_difference(out, folder / "whole")), None
     return worst, resumed
+
+
+def command_campaign(runs, command, kills, folder, *, seed):
+    """Kill calls of a command at random moments and call it again until enough were killed.
+
+    A folder without a lock and without half-written files is left by each call that came to its
+    end, with the tables of one that nobody disturbed. Returns the number of calls.
+    """
+    dice, log = random.Random(seed), folder / "log"
+    scene = "condensed, laws of the block" if command == "laws" else "half-space alone, balanced"
+
+    def words(out):
+        return [command, PAPER, "--out", str(out), *COMMANDS[command], "--set", *SCENES[scene],
+                "load.steps=6", *QUIET]  # fmt: skip
+
+    began = time.monotonic()
+    assert runs.forked(words(folder / "whole"), log, never) in (0, 3), log.read_text()
+    lasts, done, calls, out = time.monotonic() - began, 0, 0, None
+    while done < kills or out is not None:
+        out = out or folder / f"killed_after_{done}"
+        over = after(dice.uniform(0.0, lasts)) if done < kills else never
+        calls += 1
+        code = runs.forked(words(out), log, over, dice.choice(SIGNALS))
+        assert not list(out.rglob(".lock")), log.read_text()
+        if code is None:
+            done += 1
+            continue
+        assert code in (0, 3), log.read_text()
+        assert not list(out.rglob(".*partial*")), "half-written files"
+        for name in TABLES[command]:
+            assert timeless(out / name) == timeless(folder / "whole" / name), name
+        out = None
+    return calls
+
+
+def timeless(path):
+    """Return the content of a file without columns that are times."""
+    if path.suffix != ".csv":
+        return path.read_bytes()
+    with path.open(encoding="utf-8") as file:
+        return [{k: v for k, v in row.items() if k != "wall_s"} for row in csv.DictReader(file)]

@@ -24,8 +24,8 @@ def originals(base, folder):
     """Return the bytes of a law file and of a checkpoint of a small run."""
     run = Run(Scene.from_dict(base | {"coupling": {"kind": "isolated"}}))
     write_laws(folder / "whole.laws", run.make_laws())
-    write_checkpoint(folder / "whole.h5", checkpoint_of(run, {}))
-    return (folder / "whole.laws").read_bytes(), (folder / "whole.h5").read_bytes()
+    write_checkpoint(folder / "whole.state", checkpoint_of(run, {}))
+    return (folder / "whole.laws").read_bytes(), (folder / "whole.state").read_bytes()
 
 
 @st.composite

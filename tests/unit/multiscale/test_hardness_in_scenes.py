@@ -99,7 +99,7 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
     for step in first.load_steps():
         if step.step == 2:
             break
-    path = tmp_path / "checkpoint.h5"
+    path = tmp_path / "checkpoint.state"
     write_checkpoint(path, checkpoint_of(first, first.state()))
     kept, again = read_checkpoint(path), Run(scene())
     again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)

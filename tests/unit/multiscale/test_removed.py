@@ -1,4 +1,4 @@
-"""What is gone is refused in one sentence: in scenes, laws, results and checkpoints."""
+"""What is gone is refused in one sentence: in scenes, laws and results."""
 
 import json
 import re
@@ -14,9 +14,6 @@ from multiscale import Scene, read_history, read_laws
 from multiscale.cli.command_line import main
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_file import write_laws
-from multiscale.restart.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
-from multiscale.restart.results_folder import find_checkpoint
-from multiscale.run import Run
 
 INSTEAD = "(allowed: micro.model = 'half-space', on a coarser surface.grid where speed matters)"
 LEAVE_OUT = "(allowed: leave it out)"
@@ -93,20 +90,6 @@ def test_results_of_what_is_gone_are_refused_and_others_are_read(scene_file, cap
     assert "holds results of another scene, where micro.model was 'islands'" in (
         capsys.readouterr().err
     )
-
-
-def test_runs_with_what_is_gone_do_not_go_on_and_others_do(scene_file, tmp_path):
-    scene = Scene.load(scene_file)
-    begun = Run(scene)
-    next(begun.load_steps())
-    found = checkpoint_of(begun, begun.state())
-    path = tmp_path / FILE_NAME
-    write_checkpoint(path, replace(found, scene=recorded(found.scene)))
-    assert len(find_checkpoint(tmp_path, scene).steps) == 1
-    write_checkpoint(path, replace(found, scene=recorded(found.scene, border="include")))
-    text = f"{path}: micro.border = 'include': is gone, and so is what was computed with it"
-    with pytest.raises(InputError, match=re.escape(f"{text} {INSTEAD}")):
-        find_checkpoint(tmp_path, scene)
 
 
 @pytest.mark.parametrize("model", ["islands", "elliptic, curvature contact, border ignore"])

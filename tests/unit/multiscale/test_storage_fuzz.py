@@ -29,7 +29,7 @@ def whole(tmp_path_factory):
 @given(st.data())
 def test_damaged_files(tmp_path_factory, whole, data):
     which = data.draw(st.integers(0, 1))
-    damage = data.draw(st.sampled_from([flipped, rewritten]))
+    damage = data.draw(st.sampled_from([flipped, rewritten][: 2 - which]))  # laws alone are HDF5
     path = tmp_path_factory.getbasetemp() / "stored.h5"
     path.write_bytes(data.draw(damage(whole[which])))
     read(path, READERS[which])
@@ -75,5 +75,5 @@ def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is not a readable law file: there is no such file"):
         read_laws(tmp_path / "pipe")
-    with pytest.raises(InputError, match="pipe: is no file; remove it, or run without --resume"):
+    with pytest.raises(InputError, match="pipe: is no file; remove it, or begin anew"):
         read_checkpoint(tmp_path / "pipe")

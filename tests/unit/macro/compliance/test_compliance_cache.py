@@ -7,8 +7,9 @@ import pytest
 from mpi4py import MPI
 
 from geometry import PatchGrid
+from geometry.checked_store import Record, read_record, sealed
 from macro.compliance import cache as compliance_cache
-from macro.compliance.cache import cache_directory, cached
+from macro.compliance.cache import cache_directory, cached, is_cached
 
 
 @pytest.fixture
@@ -131,12 +132,69 @@ def test_any_damaged_byte_costs_no_more_than_computing_anew(counted):
     cached("kind", (), compute, MPI.COMM_SELF)
     (path,) = cache_directory().iterdir()
     whole = path.read_bytes()
-    for at in range(0, len(whole), 3):
+    before = len(calls)
+    for done, at in enumerate(range(len(whole)), 1):
         path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x41]) + whole[at + 1 :])
         np.testing.assert_array_equal(
             cached("kind", (), compute, MPI.COMM_SELF)["c"], wanted, err_msg=f"byte {at}"
         )
-    assert len(calls) > 2 + len(whole) // 12  # much of the damage is seen
+        assert len(calls) == before + done, f"byte {at} was believed"
+
+
+def test_sound_file_of_another_key_is_not_believed(counted):
+    """A file that is renamed, as by a copy into the wrong place, fits its checksum."""
+    calls, compute = counted
+    cached("kind", (1,), compute, MPI.COMM_SELF)
+    (one,) = cache_directory().iterdir()
+    cached("kind", (2,), lambda: {"c": np.full(3, 9.0)}, MPI.COMM_SELF)
+    (other,) = set(cache_directory().iterdir()) - {one}
+    other.replace(one)
+    before = len(calls)
+    np.testing.assert_array_equal(cached("kind", (1,), compute, MPI.COMM_SELF)["c"], compute()["c"])
+    assert len(calls) == before + 2
+
+
+@pytest.mark.parametrize("mode", [0o620, 0o602, 0o666])
+def test_file_that_others_can_write_is_not_believed(counted, mode):
+    _, compute = counted
+    cached("kind", (), compute, MPI.COMM_SELF)
+    (path,) = cache_directory().iterdir()
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert cache_directory().stat().st_mode & 0o022 == 0
+    path.write_bytes(sealed([Record(read_record(path.read_bytes()).facts, {"c": np.ones(9)})])[0])
+    assert cached("kind", (), compute, MPI.COMM_SELF)["c"].shape == (9,)  # the user's own
+    path.chmod(mode)
+    assert not is_cached("kind", ())
+    np.testing.assert_array_equal(cached("kind", (), compute, MPI.COMM_SELF)["c"], compute()["c"])
+    assert path.stat().st_mode & 0o777 == 0o600 and is_cached("kind", ())
+
+
+@pytest.mark.parametrize(("owner", "believed"), [(0, True), (12345, False)])
+def test_only_own_files_and_those_of_root_are_believed(counted, monkeypatch, owner, believed):
+    _, compute = counted
+    cached("kind", (), compute, MPI.COMM_SELF)
+    fstat = os.fstat
+
+    def owned(number):
+        facts = list(fstat(number))
+        facts[4] = owner
+        return os.stat_result(facts)
+
+    monkeypatch.setattr(compliance_cache.os, "fstat", owned)
+    monkeypatch.setattr(compliance_cache.os, "geteuid", lambda: 777)
+    assert is_cached("kind", ()) == believed
+
+
+def test_pipes_and_folders_in_the_cache_are_passed_over(counted):
+    _, compute = counted
+    cached("kind", (), compute, MPI.COMM_SELF)
+    (path,) = cache_directory().iterdir()
+    path.unlink()
+    os.mkfifo(path)
+    assert not is_cached("kind", ())  # nor waited for
+    path.unlink()
+    path.mkdir()
+    np.testing.assert_array_equal(cached("kind", (), compute, MPI.COMM_SELF)["c"], compute()["c"])
 
 
 def test_other_sources_find_nothing(counted, monkeypatch):

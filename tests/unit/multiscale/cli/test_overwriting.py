@@ -81,5 +81,9 @@ def test_a_killed_run_of_another_scene_is_kept(scene, capsys):
         checkpoints.write()
     assert (folder / FILE_NAME).is_file()
     assert main(["run", "scene.toml", "--set", STIFFER]) == 2
-    assert "block.young_modulus was 4000.0" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "block.young_modulus = 5000.0: is not what the run in results/scene began with" in error
+    assert "--overwrite (allowed: 4000.0)" in error
     assert main(["run", "scene.toml"]) == 0
+    assert "goes on after load step 0" in capsys.readouterr().out
+    assert not (folder / FILE_NAME).exists()

@@ -156,7 +156,7 @@ def test_configurations_of_a_changed_scene_are_run_again(some, tmp_path):
 
 def test_torn_files_are_run_again(some, tmp_path):
     Fake().all(some, tmp_path)
-    path = tmp_path / f"{some[0].key}.json"
+    path = tmp_path / f"{some[0].key}.result"
     path.write_text(path.read_text(encoding="utf-8")[:-20], encoding="utf-8")
     fake = Fake()
     fake.all(some, tmp_path)

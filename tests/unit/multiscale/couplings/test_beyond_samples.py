@@ -1,9 +1,11 @@
-"""A face that is pressed beyond the rows of its law says so, and which key helps."""
+"""A face that is pressed beyond the rows of its laws gets longer ones, as far as there are any."""
 
+import numpy as np
 import pytest
 
 from geometry import NotConverged
-from multiscale import Scene, run
+from multiscale import Run, Scene, run
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 
 SCENE = {
     "surface": {
@@ -23,11 +25,51 @@ SCENE = {
 }
 
 
-def test_a_larger_pressure_is_asked_for():
+def test_laws_that_end_too_early_are_extended():
+    """The laws that were made long enough from the start are the witness."""
     scene = Scene.from_dict(SCENE)
-    with pytest.raises(NotConverged, match="closure beyond the end of the patch law") as caught:
-        run(scene.with_({"law.largest_pressure": "5 MPa"}))
-    assert "law.largest_pressure" in str(caught.value)
-    (step,) = run(scene)
+    whole = Run(scene)
+    (wanted,) = whole.load_steps()
+    assert wanted.newton_iterations <= 4  # from a uniform pressure; from zero it would be ten
+    short = Run(scene.with_({"law.largest_pressure": "5 MPa", "load.steps": 4}))
+    early = short.make_laws()
+    *_, step = short.load_steps()
+    assert early.largest_pressure < 7.0 and short.table.largest_pressure > 20.0
+    # both laws are right to the tolerance of their rows, 1e-3 of the pressure
+    assert step.approach_mm == pytest.approx(wanted.approach_mm, rel=2e-3)
     assert step.force_N == pytest.approx(2000.0, rel=1e-9)
-    assert step.newton_iterations <= 4  # from a uniform pressure; from zero it would be ten
+    (kept,), (longer,) = early.laws, short.table.laws
+    for name, column in kept.rows.columns():  # earlier load steps stay what they were
+        np.testing.assert_array_equal(getattr(longer.rows, name)[: len(kept.rows)], column)
+    (other,) = whole.table.laws
+    closures = np.linspace(0.1, 0.95, 50) * min(longer.range[1], other.range[1])
+    off = longer.pressure(closures) - other.pressure(closures)
+    least = 0.03 * other.rows.pressure[-1]  # smaller loads count as this much, see `refinement`
+    assert np.all(np.abs(off) <= 5e-3 * np.maximum(other.pressure(closures), least))
+    assert any("the laws were extended to" in note for note in short.history().notes)
+
+
+def test_a_run_goes_on_with_the_extended_laws(tmp_path):
+    scene = Scene.from_dict(SCENE).with_({"law.largest_pressure": "5 MPa", "load.steps": 4})
+    first = Run(scene)
+    steps = first.load_steps()
+    for _ in range(3):
+        next(steps)
+    path = write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(first, first.state()))
+    last = next(steps)
+    kept, again = read_checkpoint(path), Run(scene)
+    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    (resumed,) = again.load_steps()
+    # Newton's iteration ends at 1e-9 of the load
+    assert resumed.approach_mm == pytest.approx(last.approach_mm, rel=1e-8)
+    np.testing.assert_allclose(
+        again.table.laws[0].rows.pressure, first.table.laws[0].rows.pressure, rtol=1e-12
+    )
+
+
+def test_what_no_law_bears_is_refused_with_a_remedy_that_helps():
+    soft = Scene.from_dict(SCENE).with_(
+        {"micro.hardness": "25 MPa", "law.largest_pressure": "5 MPa"}
+    )
+    with pytest.raises(NotConverged, match=r"LAW_RANGE.*almost the hardness.*take a smaller load"):
+        run(soft)

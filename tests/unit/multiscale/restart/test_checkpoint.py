@@ -8,24 +8,24 @@ import tomllib
 from dataclasses import fields
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 
-from geometry.errors import InputError, NotWritten
+from geometry.checked_store import read_record, write_record
+from geometry.errors import InputError, NotConverged, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
 from multiscale.planning import auto_keys
 from multiscale.restart.checkpoint import (
+    FORMAT,
     CheckpointWriter,
     checkpoint_of,
     read_checkpoint,
     write_checkpoint,
 )
-from multiscale.restart.results_folder import FolderLock, find_checkpoint, go_on
+from multiscale.restart.results_folder import FolderLock, find_checkpoint
 from multiscale.scene.sections import MicroSection
-from multiscale.storage import checksum
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
@@ -101,7 +101,7 @@ def test_checkpoint_keeps_every_bit(tmp_path):
     list(run.load_steps())
     kept = checkpoint_of(run, run.state())
     found = read_checkpoint(write_checkpoint(tmp_path / "c.h5", kept))
-    assert (found.scene, found.heights) == (kept.scene, kept.heights)
+    assert (found.identity, found.resolved) == (kept.identity, kept.resolved)
     assert (found.position, found.laws) == (kept.position, kept.laws)
     for one, other in zip(found.steps, kept.steps, strict=True):
         for field in fields(one):
@@ -132,7 +132,7 @@ def interrupted(folder, ended, steps=2):
             if step.step == steps:
                 break
     lock.release()
-    return folder / "checkpoint.h5"
+    return folder / "checkpoint.state"
 
 
 def resumed(folder, changed):
@@ -141,13 +141,13 @@ def resumed(folder, changed):
     if found is None:
         return None
     run = Run(changed, resolved=found.resolved)
-    go_on(run, found, folder)
+    run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
     return run
 
 
 def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, ended):
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
-    path = tmp_path / "out" / "checkpoint.h5"
+    path = tmp_path / "out" / "checkpoint.state"
     with (
         pytest.raises(RuntimeError, match="a bug"),
         CheckpointWriter(path.parent, run, lock.hold) as w,
@@ -178,10 +178,11 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
 @pytest.mark.parametrize(
     ("damage", "text"),
     [
-        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its checksum does not fit its"),
-        (lambda path: path.write_bytes(b"nothing of the kind"), "has no checksum before its conte"),
-        (lambda path: path.write_bytes(checksum(b"no HDF5")), "cannot be read: "),
-        (lambda path: flip(path), "its checksum does not fit its content"),
+        (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its bytes do not fit their"),
+        (lambda path: path.write_bytes(b"nothing of the kind\n"), "its bytes do not fit their"),
+        (lambda path: write_record(path, ["a list"]), "None: was written by another pa"),
+        (lambda path: write_record(path, {"format": FORMAT}), "is not understood: "),
+        (lambda path: flip(path), "its bytes do not fit their"),
         (lambda path: relabel(path), "'patchlaw checkpoint 2': was written by another pa"),
         (lambda path: path.with_suffix(".steps").unlink(), "cannot be read: .*No such file"),
         (lambda path: change_log(path, lambda log: log[:-1]), "checkpoint.steps beside it does no"),
@@ -190,7 +191,8 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
     ids=[
         "cut",
         "foreign",
-        "no HDF5",
+        "no checkpoint",
+        "empty",
         "a bit flipped",
         "another format",
         "no log",
@@ -205,7 +207,7 @@ def test_damaged_checkpoint_is_refused_and_stays(tmp_path, ended, capsys, damage
     with pytest.raises(InputError, match=text) as error:
         resumed(path.parent, ended.scene)
     assert str(path) in str(error.value)
-    assert "remove it, or run without --resume" in str(error.value)
+    assert "remove it, or begin anew with --overwrite" in str(error.value)
     assert {each.name: each.read_bytes() for each in path.parent.iterdir()} == before
 
 
@@ -215,14 +217,64 @@ def change_log(path, change):
 
 
 def flip(path):
-    with h5py.File(path, "r+") as file:
-        file["run/structure"][3] ^= 1
+    content = bytearray(path.read_bytes())
+    content[-3] ^= 1
+    path.write_bytes(content)
 
 
 def relabel(path):
-    with h5py.File(path, "r+") as file:
-        file.attrs["format"] = "patchlaw checkpoint 2"
-    path.write_bytes(checksum(path.read_bytes()))
+    facts, arrays = read_record(path.read_bytes())
+    write_record(path, facts | {"format": "patchlaw checkpoint 2"}, arrays)
+
+
+def test_checkpoints_of_earlier_versions_are_neither_read_nor_lost(tmp_path, ended, capsys):
+    (tmp_path / "checkpoint.h5").write_bytes(b"earlier")
+    words = ["run", *WORDS[1:2], "--out", str(tmp_path), *WORDS[2:]]
+    for more in ([], ["--resume"]):
+        assert main([*words, *more]) == 2
+        assert "checkpoint.h5: was written by another patchlaw" in capsys.readouterr().err
+    assert (tmp_path / "checkpoint.h5").read_bytes() == b"earlier"
+    assert main([*words, "--overwrite"]) == 0
+    assert not list(tmp_path.glob("checkpoint*"))
+
+
+def test_an_interrupted_run_goes_on_unless_it_is_to_begin_anew(tmp_path, ended, capsys):
+    path = interrupted(tmp_path / "out", ended, steps=3)
+    (tmp_path / "scene.toml").write_text(PAPER.read_text(encoding="utf-8"), encoding="utf-8")
+    words = ["run", str(tmp_path / "scene.toml"), "--out", str(path.parent), "--set",
+             "surface.grid=[48, 48]", "coupling.kind=analytic", "micro.model=half-space",
+             "load.approach=['8 um', '4 um']", "load.steps=2", "output.figures=false"]  # fmt: skip
+    shutil.copytree(path.parent, tmp_path / "copy")
+    assert main(words) == 0
+    assert "goes on after load step 3" in capsys.readouterr().out
+    words[words.index(str(path.parent))] = str(tmp_path / "copy")
+    assert main([*words, "--overwrite"]) == 0
+    assert "replaces the interrupted run in" in capsys.readouterr().out
+    tables = [(each / "patches.csv").read_text() for each in (path.parent, tmp_path / "copy")]
+    assert tables[0] == tables[1]
+
+
+def test_results_of_a_run_to_the_end_outlive_one_that_ends_early(tmp_path, monkeypatch, capsys):
+    words = ["run", *WORDS[1:2], "--out", str(tmp_path), *WORDS[2:]]
+    assert main(words) == 0
+    before = (tmp_path / "history.csv").read_bytes()
+    capsys.readouterr()
+    whole = Run.load_steps
+
+    def failing(run):
+        yield next(whole(run))
+        raise NotConverged("load step 2", reason="LOST", iterations=3, remedy="smaller steps")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Run, "load_steps", failing)
+        assert main(words) == 3
+    told = capsys.readouterr()
+    assert "the results of an earlier run to the end stay in" in told.out
+    # a remedy is to change the scene, whose results then stand in the way
+    assert "smaller steps; a changed scene needs --overwrite, or another folder than" in told.err
+    assert (tmp_path / "history.csv").read_bytes() == before
+    assert main(words) == 0
+    assert "goes on after load step 1" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -266,7 +318,7 @@ def test_changed_heights_are_refused(tmp_path):
     run = Run(Scene.from_dict(data))
     interrupted(tmp_path / "out", run, steps=1)
     np.save(tmp_path / "h.npy", heights * 1.01)
-    with pytest.raises(InputError, match=r"surface.file = '.*h.npy': the heights are not those"):
+    with pytest.raises(InputError, match=r"content of surface.file = .*: is not what the run"):
         resumed(tmp_path / "out", run.scene)
 
 
@@ -316,12 +368,12 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     monkeypatch.setattr(Path, "write_bytes", full)
     run = Run(ended.scene)
     with pytest.raises(
-        NotWritten, match=r"checkpoint.h5: cannot be written: No space left"
+        NotWritten, match=r"checkpoint.state: cannot be written: No space left"
     ) as error:
         CheckpointWriter(path.parent, run, FolderLock(path.parent).hold).write()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
-    names = {".lock", "checkpoint.h5", "checkpoint.steps"}
+    names = {"checkpoint.state", "checkpoint.steps"}
     assert {each.name for each in path.parent.iterdir()} == names
     assert len(read_checkpoint(path).steps) == 2
 
@@ -370,7 +422,7 @@ LIMITED = (
 @pytest.mark.parametrize(
     ("size", "file", "left"),
     [
-        (8_000, "checkpoint.h5", set()),
+        (2_000, "checkpoint.state", set()),
         pytest.param(
             25_000, "overview.png", {"history.csv", "patches.csv"}, marks=pytest.mark.long
         ),
@@ -390,7 +442,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert done.stderr == f"patchlaw: {out / file}: cannot be written: File too large\n"
     assert done.returncode == 5
     kept = {path.name for path in out.iterdir()} if out.exists() else set()
-    kept_of_run = {"checkpoint.h5", "checkpoint.steps"}
+    kept_of_run = {"checkpoint.state", "checkpoint.steps"}
     assert kept == (left | kept_of_run if left else set())
     assert main(words) == 0
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
@@ -410,7 +462,7 @@ def test_fields_on_a_full_disk_end_with_5_and_leave_nothing_half_written(tmp_pat
     assert done.returncode == 5, done.stderr
     assert f"patchlaw: {out}/fields.xdmf: cannot be written: " in done.stderr
     assert {path.name for path in out.iterdir()} == {
-        "history.csv", "patches.csv", "provenance.json", "checkpoint.h5", "checkpoint.steps",
+        "history.csv", "patches.csv", "provenance.json", "checkpoint.state", "checkpoint.steps",
         "contacts.csv", "contact.h5",
     }  # fmt: skip
 

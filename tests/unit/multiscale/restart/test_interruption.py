@@ -11,7 +11,9 @@ import pytest
 
 from geometry.errors import InputError
 from multiscale import Run
-from multiscale.cli.command_line import Ended, main, signals_raise
+from multiscale.cli import describe
+from multiscale.cli.command_line import main
+from multiscale.cli.signals import Ended, signals_raise
 from multiscale.restart.interruption import Interruption, Stopped
 from multiscale.scene.quantities import parse_duration
 
@@ -73,7 +75,7 @@ def test_signal_stops_after_the_load_step(
     assert f"{text}: stopped after load step 2; go on with --resume" in shown.err
     assert "report.html" in shown.out
     assert rows(tmp_path)[0] == undisturbed[0][:3]
-    assert (tmp_path / "checkpoint.h5").exists()
+    assert (tmp_path / "checkpoint.state").exists()
     assert [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)] == handlers
     assert main([*words[:2], "--resume", *words[2:]]) == 0
     assert "goes on after load step 2" in capfd.readouterr().out
@@ -104,7 +106,7 @@ def test_no_time_at_all_keeps_what_there_is(capfd, tmp_path):
     words = ["run", PAPER, "--out", str(tmp_path), "--max-time", "1 s", *SMALL]
     assert main(words) == 4
     assert "stopped before the block was made" in capfd.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.h5"]  # no load step yet
+    assert [path.name for path in tmp_path.iterdir()] == ["checkpoint.state"]  # no load step yet
 
 
 @pytest.mark.parametrize(
@@ -187,6 +189,49 @@ def test_petsc_does_not_take_the_signals(root):
         [sys.executable, "-c", HUNG_UP], cwd=root, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stdout, done.stderr) == (129, "", "")
+
+
+TOLD_WHILE_IMPORTING = """
+import os, signal, sys
+from multiscale.cli import command_line, describe
+
+def importing(choice, options, comm):
+    def told(event, arguments):
+        if event == "import" and arguments[0] == sys.argv[1]:
+            os.kill(os.getpid(), signal.SIGTERM)
+
+    sys.addaudithook(told)
+    import macro
+    print("went on")
+
+describe.print_schema = importing
+sys.exit(command_line.main(["schema"]))
+"""
+
+
+@pytest.mark.parametrize("module", ["dolfinx.cpp", "basix._basixcpp", "petsc4py.PETSc", "cffi.api"])
+def test_a_signal_while_finite_elements_are_imported_ends_with_its_code(root, module):
+    """Compiled modules turn what interrupts their import into an ImportError of their own."""
+    done = subprocess.run(
+        [sys.executable, "-c", TOLD_WHILE_IMPORTING, module],
+        cwd=root, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", "")
+
+
+def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, capsys):
+    def converted(choice, options, comm):
+        try:
+            os.kill(os.getpid(), signal.SIGTERM)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed", name="dolfinx") from None
+
+    monkeypatch.setattr(describe, "print_schema", converted)
+    assert main(["schema"]) == 143
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(describe, "print_schema", lambda *_: 1 / 0)
+    assert main(["schema"]) == 1  # a signal of an earlier command is no excuse
+    assert "ZeroDivisionError" in capsys.readouterr().err
 
 
 def test_a_signal_is_seen_though_standard_error_is_full():

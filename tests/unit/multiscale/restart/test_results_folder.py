@@ -1,6 +1,10 @@
 """One run at a time writes to a folder, and a lock leaves nothing behind."""
 
+import errno
+import fcntl
+import os
 import signal
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -32,7 +36,7 @@ def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
     lock.hold()
     assert main([command, str(PAPER), "--out", str(out), "--set", "surface.grid=[32, 32]"]) == 2
     assert "another run is writing to this folder" in capsys.readouterr().err
-    assert [path.name for path in out.iterdir()] == [".lock"]
+    assert not list(out.iterdir())
     lock.release()
 
 
@@ -43,6 +47,33 @@ def test_empty_folder_that_was_there_stays(tmp_path):
     assert tmp_path.is_dir() and not list(tmp_path.iterdir())
 
 
+@pytest.fixture
+def network(monkeypatch):
+    """Let folders be without locks, as on NFS, where flock wants a file that is open to write."""
+    flock = fcntl.flock
+
+    def of_files(handle, operation):
+        if stat.S_ISDIR(os.fstat(handle).st_mode):
+            raise OSError(errno.EBADF, "Bad file descriptor")
+        return flock(handle, operation)
+
+    monkeypatch.setattr(fcntl, "flock", of_files)
+
+
+@pytest.mark.usefixtures("network")
+def test_a_file_is_locked_where_folders_cannot_be(tmp_path):
+    one, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
+    one.hold()
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [".lock"]
+    with pytest.raises(InputError, match="another run is writing to this folder"):
+        other.hold()
+    one.release()
+    other.hold()
+    other.release()
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("network")
 def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
     def refused(path, missing_ok=False):
         raise PermissionError(13, "Permission denied", str(path))
@@ -55,6 +86,19 @@ def test_lock_is_lifted_where_its_file_must_stay(tmp_path, monkeypatch):
     other.hold()
     other.release()
     assert not (tmp_path / ".lock").exists()
+
+
+def test_nothing_is_locked_where_there_are_no_locks(tmp_path, monkeypatch):
+    def none(handle, operation):
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr(fcntl, "flock", none)
+    lock, other = FolderLock(tmp_path / "out"), FolderLock(tmp_path / "out")
+    lock.hold()
+    other.hold()
+    (tmp_path / "out" / "result").touch()
+    other.release()
+    lock.release()
 
 
 def test_folder_of_a_file_cannot_be_locked(tmp_path):
@@ -72,7 +116,7 @@ def test_folder_that_cannot_be_made_is_refused():
 def test_folders_above_are_removed_as_well(tmp_path):
     lock = FolderLock(tmp_path / "results" / "scene")
     lock.hold()
-    assert (tmp_path / "results" / "scene" / ".lock").exists()
+    assert not list((tmp_path / "results" / "scene").iterdir())
     lock.release()
     assert not list(tmp_path.iterdir())
 
@@ -86,8 +130,7 @@ def test_lock_of_a_killed_process_is_lifted(tmp_path, root):
     )
     words = [sys.executable, "-c", code, str(tmp_path / "out")]
     assert subprocess.run(words, cwd=root, check=False).returncode == -signal.SIGKILL
-    assert (tmp_path / "out" / ".lock").exists()
+    assert not list((tmp_path / "out").iterdir())  # not even a file of the lock
     lock = FolderLock(tmp_path / "out")
     lock.hold()
     lock.release()
-    assert not (tmp_path / "out" / ".lock").exists()

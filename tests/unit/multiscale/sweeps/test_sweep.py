@@ -2,11 +2,15 @@
 
 import csv
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.legend import Legend
 from small_scene import SMALL_SCENE
 
+from geometry.checked_store import START, unsealed
 from geometry.errors import InputError, NotConverged
 from multiscale import run, sweep
 from multiscale.cli.command_line import main
@@ -148,13 +152,119 @@ def test_means_are_not_over_keys_that_are_set(scene):
 def test_a_sweep_goes_on_after_the_cases_that_are_done(scene, tmp_path):
     first, again = [], []
     whole = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: first.append(case))
-    (journal,) = (tmp_path / "cases").glob("*.jsonl")
-    lines = journal.read_bytes().splitlines(keepends=True)
-    journal.write_bytes(b"".join(lines[:4]) + lines[4][:20])  # as a killed process leaves it
+    journal = tmp_path / "cases" / "1-of-1" / "rank-0.cases"
+    whole_file = journal.read_bytes()
+    marks = [mark for _, mark in unsealed(whole_file)]
+    journal.write_bytes(whole_file[: marks[3].size + 20])  # as a killed process leaves it
     rest = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: again.append(case))
     assert (len(first), len(again)) == (6, 3)
     np.testing.assert_allclose(rest.force_N, whole.force_N, rtol=1e-12)
-    assert [json.loads(line)["case"] for line in journal.read_text().splitlines()[1:]]
+    assert len(list(unsealed(journal.read_bytes()))) == 7  # the scene, and six cases
+
+
+def test_damaged_journals_give_no_wrong_number(scene, tmp_path):
+    """Bytes changed, cut off, put in, records in another order: refused by name, or run again."""
+    whole = sweep(scene, VARY, folder=tmp_path / "whole").force_N
+    journal = tmp_path / "out" / "cases" / "1-of-1" / "rank-0.cases"
+    journal.parent.mkdir(parents=True)
+    content = (tmp_path / "whole" / "cases" / "1-of-1" / "rank-0.cases").read_bytes()
+    marks = [START, *(mark for _, mark in unsealed(content))]
+    records = [content[a.size : b.size] for a, b in pairwise(marks)]
+    dice, ends = np.random.default_rng(8), {"refused": 0, "run again": 0}
+    for number in range(40):
+        at, damaged = int(dice.integers(len(content))), bytearray(content)
+        if number % 4 == 0:
+            damaged[at] ^= 1 << int(dice.integers(8))
+        elif number % 4 == 1:
+            del damaged[at:]
+        elif number % 4 == 2:
+            damaged[at:at] = dice.bytes(int(dice.integers(1, 90)))
+        else:
+            one, other = dice.choice(len(records), 2, replace=False)
+            order = list(range(len(records)))
+            order[one] = order[other]  # one record is lost, and one there twice
+            damaged = bytearray(b"".join(records[k] for k in order))
+        journal.write_bytes(damaged)
+        try:
+            found = sweep(scene, VARY, folder=tmp_path / "out").force_N
+        except InputError as error:
+            assert str(error).startswith(f"{journal}: is damaged") and "computed again" in str(
+                error
+            )
+            ends["refused"] += 1
+        else:
+            np.testing.assert_array_equal(found, whole)
+            ends["run again"] += 1
+    assert min(ends.values()) >= 5, ends
+
+
+def drawn(figure):
+    """Return how many pixels of each of the two diagrams have a colour, neither grey nor white."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    pixels = np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+    coloured = np.ptp(pixels, axis=2) > 40
+    return [int(half.sum()) for half in np.array_split(coloured, 2, axis=1)]
+
+
+def legend(figure):
+    """Return the texts of a figure's legend; a title stands for one alone."""
+    texts = [text.get_text() for one in figure.findobj(Legend) for text in one.get_texts()]
+    return texts or [
+        line.get_label() for line in figure.axes[0].lines if line.get_label()[0] != "_"
+    ]
+
+
+@pytest.mark.parametrize("load", [{"load.approach": "1 um"}, {"load.force": "0.5 N"}])
+@pytest.mark.parametrize("vary", [{SEED: range(3)}, {MODULUS: ["1 GPa", "4 GPa"]}])
+def test_one_load_step_is_drawn_as_points(scene, load, vary):
+    found = sweep(scene.with_(load | {"load.steps": 1}), vary)
+    # a point of 4 pt is some 30 pixels at 100 dpi; lines through one point are none
+    assert min(drawn(found.plot())) >= 40
+
+
+def test_scatter_is_drawn_under_forces_too(scene):
+    found = sweep(scene.with_({"load.force": "0.5 N", "load.steps": 3}), {SEED: range(4)})
+    force, _ = found.plot().axes
+    (band,) = force.collections
+    low, high = 1e3 * found.band("approach_mm")
+    (path,) = band.get_paths()
+    assert path.vertices[:, 0].min() == pytest.approx(low.min(), rel=1e-12)
+    assert path.vertices[:, 0].max() == pytest.approx(high.max(), rel=1e-12)
+
+
+def test_files_are_compared_and_seeds_averaged(file, tmp_path):
+    dice = np.random.default_rng(2)
+    for name in ("scan.npy", "worn.npy"):
+        np.save(file.with_name(name), dice.normal(scale=1e-3, size=(8, 8)))
+    base = Scene.load(file).with_({"surface": {"file": "scan.npy", "lengths": [1.0, 1.0]}})
+    found = sweep(base, {"surface.file": ["scan.npy", str(file.with_name("worn.npy"))]})
+    assert [len(part) for _, part in found.ensembles()] == [1, 1]
+    records = [one for one in found.statistics_records() if one["column"] == "force_N"]
+    assert {one["cases"] for one in records} == {1}
+    assert legend(found.plot()) == ["scan.npy", "worn.npy"]
+    seeds = sweep(Scene.load(file), {SEED: range(3)})
+    assert [len(part) for _, part in seeds.ensembles()] == [3]
+    assert legend(seeds.plot()) == ["mean of 3"]
+
+
+@pytest.mark.parametrize("varied", [False, True])
+def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path, varied):
+    dice = np.random.default_rng(2)
+    heights = dice.normal(scale=1e-3, size=(8, 8))
+    for name in ("one.npy", "other.npy"):
+        np.save(file.with_name(name), heights)
+    base = Scene.load(file).with_({"surface": {"file": "one.npy", "lengths": [1.0, 1.0]}})
+    vary = {"surface.file": ["one.npy", "other.npy"]} if varied else {MODULUS: ["1 GPa", "2 GPa"]}
+    first = sweep(base, vary, folder=tmp_path / "out")
+    np.save(file.with_name("other.npy" if varied else "one.npy"), 2.0 * heights)
+    problem = r"other.npy': has another content" if varied else "content of surface.file was '"
+    with pytest.raises(InputError, match=problem) as error:
+        sweep(base, vary, folder=tmp_path / "out")
+    assert "surface.file" in str(error.value) and "--overwrite" in str(error.value)
+    np.save(file.with_name("other.npy" if varied else "one.npy"), heights)
+    again = sweep(base, vary, folder=tmp_path / "out", observe=lambda *_: pytest.fail("run again"))
+    np.testing.assert_array_equal(again.force_N, first.force_N)
 
 
 def test_cases_of_another_scene_are_not_mixed_in(scene, tmp_path):

@@ -1,0 +1,98 @@
+"""Identity of a scene: its keys, the content of every file that it names, the version."""
+
+import numpy as np
+import pytest
+
+from multiscale.scene import identity as module
+from multiscale.scene.identity import changes, content_digest, identity
+from multiscale.scene.scene import Scene
+from multiscale.scene.sections import NAMES_A_FILE, Section
+
+SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}
+BODY = {
+    "mesh": "part.msh", "contact": "top", "supports": [{"surface": "bottom"}],
+    "young_modulus": 4e3, "poisson_ratio": 0.3,
+}  # fmt: skip
+LAW = {"kind": "representative", "regions": [{"surface": "rim", **SURFACE, "file": "rim.npy"}]}
+DATA = {
+    "surface": SURFACE,
+    "body": BODY,
+    "counter_body": {**BODY, "mesh": "plate.xdmf"},
+    "law": LAW,
+    "load": {"force": 1.0},
+}
+KEYS = {
+    "surface.file": "scan.npy", "law.regions.0.file": "rim.npy", "body.mesh": "part.msh",
+    "counter_body.mesh": "plate.xdmf",
+}  # fmt: skip
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in KEYS.values():
+        (tmp_path / name).write_bytes(name.encode())
+    (tmp_path / "plate.xdmf").write_text("<DataItem>numbers.h5:/mesh/x</DataItem>")
+    (tmp_path / "numbers.h5").write_bytes(b"1 2 3")
+    return tmp_path
+
+
+def scene(folder):
+    return Scene.from_dict(DATA, source=folder / "scene.toml")
+
+
+def test_every_file_counts_by_its_content(folder):
+    before = identity(scene(folder))
+    for key, name in KEYS.items():
+        path, content = folder / name, (folder / name).read_bytes()
+        path.write_bytes(content + b"!")
+        assert [change[0] for change in changes(identity(scene(folder)), before)] == [
+            f"content of {key}"
+        ]
+        path.write_bytes(content)
+    assert identity(scene(folder)) == before
+    (folder / "numbers.h5").write_bytes(b"1 2 4")  # which the XDMF file names
+    assert [change[0] for change in changes(identity(scene(folder)), before)] == [
+        "content of counter_body.mesh"
+    ]
+    assert content_digest(folder / "nothing") == ""
+
+
+def test_keys_and_version_count_and_what_is_drawn_does_not(folder, monkeypatch):
+    before = identity(scene(folder))
+    other = scene(folder).with_({"load.force": 2.0, "output.figures": False})
+    assert list(changes(identity(other), before)) == [("load.force", [2.0], [1.0])]
+    monkeypatch.setattr(module, "version", lambda name: "0.0.1")
+    assert [key for key, _, _ in changes(identity(scene(folder)), before)] == [module.VERSION]
+
+
+def test_heights_in_memory_count_by_their_numbers():
+    heights = np.arange(16.0).reshape(4, 4)
+    block = {"young_modulus": 4e3, "poisson_ratio": 0.3, "height": 1.0}
+    one, other = (
+        Scene.from_dict({"surface": {"heights": each, "lengths": [1.0, 1.0]}, "block": block,
+                         "load": {"force": 1.0}})
+        for each in (heights, 2.0 * heights)
+    )  # fmt: skip
+    assert [key for key, _, _ in changes(identity(one), identity(other))] == ["surface.heights"]
+
+
+def test_no_key_that_names_a_file_is_forgotten():
+    """Fields whose text speaks of a file are marked; a new one must not slip past."""
+
+    def sections(kind):
+        return [kind, *(one for below in kind.__subclasses__() for one in sections(below))]
+
+    named = {
+        (kind.__name__, name)
+        for kind in sections(Section)
+        for name, field in kind.model_fields.items()
+        if (field.description or "").startswith("File of")
+    }
+    marked = {
+        (kind.__name__, name)
+        for kind in sections(Section)
+        for name, field in kind.model_fields.items()
+        if NAMES_A_FILE in field.metadata
+    }
+    assert named == marked
+    assert {name for _, name in marked} == {"file", "mesh"}
