@@ -3,10 +3,13 @@
 Run by hand, ten minutes on an idle core: `.venv/bin/python tests/benchmarks/error_study.py
 [measured] [accuracy] [--first N] [--last N]`.
 
-Scenes are random: hurst, waves, slopes up to 0.25, blocks 0.3, 1 and 3 mm high, tilts, loads; every
-fourth has its roughness meshed as its truth, which all causes are measured against. The truth of
-the others is the contact problem on four times as many cells along a side with four more modes of
-the body: it has the same finite slopes, and what was measured for them is left out.
+Scenes are random: hurst, waves, slopes, blocks 0.3, 1 and 3 mm high, tilts, loads; every fourth is
+plateau-honed, with grooves that meet the border, on 6 to 10 heights per shortest wave, and every
+tenth is steep, with an rms gradient of 0.25 to 0.6. Every fourth has its roughness meshed as its
+truth, which all causes are measured against, and so have the steep ones. The truth of the others is
+the contact problem on four times as many cells along a side with four more modes of the body: it
+has the same finite slopes, and what was measured for them is left out. Approaches count from first
+touch of the true surface, so that the error of this zero is part of what is measured.
 """
 
 import argparse
@@ -18,39 +21,79 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
+from geometry import Spectrum, Surface, synthesise
 from geometry.rigid_plane import Control
-from geometry.synthesis import synthesise
 from multiscale import Run, Scene
 from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import SLOPES, on_body
 
-SCENES, MESHED = 40, 4
+SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
+"""Every so many scenes; honed ones are those that leave 1 when divided."""
 MORE_MODES, FINER, MOST_CELLS = 4, 4, 512
 BANDS = ((2, 10), (1, 6), (2, 8), (3, 12), (2, 14))
 KINDS = ("concurrent", "concurrent", "analytic", "concurrent", "consistent", "concurrent")
 
 
-def scene(number):
-    """Return one scene of the study as nested dictionaries."""
+def is_meshed(number):
+    """Tell whether the truth of a scene is its meshed roughness."""
+    return number % MESHED == 0 or number % STEEP == 0
+
+
+def is_honed(number):
+    """Tell whether a scene is plateau-honed."""
+    return number % HONED == 1
+
+
+def spectrum_of(number):
+    """Return the spectrum of a scene's roughness."""
     random = np.random.default_rng(77_000 + number)
-    meshed = number % MESHED == 0
-    band = BANDS[random.integers(3 if meshed else len(BANDS))]
-    spectrum = {
+    band = BANDS[random.integers(3 if is_meshed(number) else len(BANDS))]
+    slopes = (0.25, 0.6) if number % STEEP == 0 else (0.08, 0.25)
+    return {
         "hurst": float(random.uniform(0.5, 1.0)),
         "waves": list(band),
-        "rms_slope": float(random.uniform(0.08, 0.25)),
+        "rms_slope": float(random.uniform(*slopes)),
         "seed": 500 + number,
     }
-    load = {"approach": float(random.uniform(3e-3, 9e-3)), "steps": 2}
+
+
+def surface_of(number, count):
+    """Return the surface of a scene on a grid of count × count heights."""
+    spectrum = Spectrum(**spectrum_of(number) | {"waves": tuple(spectrum_of(number)["waves"])})
+    surface = synthesise(spectrum, grid=(count, count), lengths=(1.0, 1.0))
+    if not is_honed(number):
+        return surface
+    random = np.random.default_rng(78_000 + number)
+    x, y, heights = surface.x[:, None], surface.y, np.array(surface.heights)
+    level = float(random.uniform(0.0, 1.0)) * 5e-3  # of the plateau, which the summits lose
+    worn = -2e-3 * np.logaddexp(0.0, (level - heights) / 2e-3)
+    width = 0.35 / spectrum.waves[1]
+    for angle in (32.0, -32.0):
+        across = x * np.sin(np.radians(angle)) + y * np.cos(np.radians(angle))
+        for at in random.uniform(-0.4, 1.3, 4):
+            worn -= float(random.uniform(2e-3, 1e-2)) * np.exp(-(((across - at) / width) ** 2))
+    return Surface(heights=worn, lengths=(1.0, 1.0))
+
+
+def scene(number):
+    """Return one scene of the study as nested dictionaries."""
+    random = np.random.default_rng(79_000 + number)
+    spectrum = spectrum_of(number)
+    deepest = 9e-3 * max(1.0, spectrum["rms_slope"] / 0.25)
+    load = {"approach": float(random.uniform(3e-3, deepest)), "steps": 2}
     if random.random() < 0.4:
         load["tilt"] = [float(random.uniform(-3e-3, 3e-3)) for _ in range(2)]
-    kind = "concurrent" if meshed else KINDS[random.integers(len(KINDS))]
+    kind = "concurrent" if is_meshed(number) else KINDS[random.integers(len(KINDS))]
+    surface = {"lengths": [1.0, 1.0]}
+    if is_honed(number):
+        count = round(float(random.uniform(6.0, 10.0)) * spectrum["waves"][1])
+        surface |= {"heights": surface_of(number, count).heights}
+        load["approach"] = float(random.uniform(1e-3, 4e-3))
+    else:
+        count = int(random.choice([64, 96, 128]))
+        surface |= {"spectrum": spectrum, "grid": [count, count]}
     return {
-        "surface": {
-            "spectrum": spectrum,
-            "grid": [int(random.choice([64, 96, 128]))] * 2,
-            "lengths": [1.0, 1.0],
-        },
+        "surface": surface,
         "block": {
             "young_modulus": 4000.0,
             "poisson_ratio": float(random.choice([0.15, 0.3])),
@@ -64,9 +107,8 @@ def scene(number):
 
 def meshed_force(data):
     """Return the force of the meshed roughness at the last load step, and its error bar [N]."""
-    heights = {"grid": [192, 192]}
     whole = data | {
-        "surface": data["surface"] | heights,
+        "surface": data["surface"] | {"grid": [192, 192]},
         "coupling": {"kind": "reference"},
         "load": data["load"] | {"steps": 1},
     }
@@ -77,15 +119,13 @@ def meshed_force(data):
     return float(record.force.value[-1]), float(record.force.error[-1])
 
 
-def finer_force(run):
+def finer_force(run, number):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.setup, run.steps[-1]
     block = scene_body(setup) if setup.has_block else None
     face = block and block.face(None, modes=block.modes + MORE_MODES)
     body = on_body(setup, None, half_space=block is None, face=face)
-    grid = [min(FINER * count, MOST_CELLS) for count in setup.model.surface.grid]
-    spectrum = setup.scene.surface.spectrum.spectrum()
-    surface = synthesise(spectrum, grid=tuple(grid), lengths=setup.surface.lengths)
+    surface = surface_of(number, min(FINER * setup.model.surface.grid[0], MOST_CELLS))
     model = replace(setup.model, surface=surface, highest=surface.highest)
     order = SLOPES if setup.finite_slopes else 0
     return body(model, order).equilibrium(Control(approach=step.approach_mm, tilt=step.tilt)).force
@@ -98,7 +138,7 @@ def measured(numbers):
         data, began = scene(number), time.perf_counter()
         run = Run(Scene.from_dict(data))
         list(run.load_steps())
-        step, meshed = run.steps[-1], number % MESHED == 0
+        step, meshed = run.steps[-1], is_meshed(number)
         if not step.force_N > 0.0:
             print(f"{number:3d} no contact")
             continue
@@ -107,12 +147,13 @@ def measured(numbers):
             true, bar = meshed_force(data)
             stated = step.force_error_N
         else:
-            true, bar = finer_force(run), 0.0
+            true, bar = finer_force(run, number), 0.0
             stated = step.force_error_N - parts["slopes"]
         rows.append((abs(step.force_N - true), bar, stated, meshed, true))
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
-            f"{number:3d} {data['coupling']['kind']:10s} {run.setup.surface.grid[0]:3d}² height "
+            f"{number:3d} {data['coupling']['kind']:10s} {run.setup.surface.grid[0]:3d}² "
+            f"{'honed ' if is_honed(number) else ''}{'steep ' if number % STEEP == 0 else ''}height "
             f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
             f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
             f"({told}) {time.perf_counter() - began:.0f} s{' meshed' if meshed else ''}",
@@ -136,6 +177,8 @@ def accuracies(numbers):
     rows = []
     for number in numbers:
         data, began = scene(number), time.perf_counter()
+        if is_honed(number):
+            continue  # maps are not refined: an accuracy asks for a spectrum
         random = np.random.default_rng(number)
         wanted = float(random.choice([0.01, 0.02, 0.05]))
         asked = {key: value for key, value in data.items() if key not in ("micro", "coupling")}
@@ -146,10 +189,10 @@ def accuracies(numbers):
         own = time.perf_counter() - began
         if not step.force_N > 0.0:
             continue
-        if number % MESHED == 0:
+        if is_meshed(number):
             true, bar = meshed_force(data)
         elif kind != "reference":
-            true, bar = finer_force(run), 0.0
+            true, bar = finer_force(run, number), 0.0
         else:
             continue
         off = step.force_N / true - 1.0

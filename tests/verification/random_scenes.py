@@ -11,8 +11,10 @@ KINDS = ("isolated", "consistent", "concurrent", "analytic")
 MODELS = (
     {"model": "half-space"},
     {"model": "half-space"},
+    {"model": "half-space"},
     {"model": "elliptic"},
     {"model": "circular-independent"},
+    {"model": "elliptic-independent"},
 )
 PLACES = ("anywhere", "anywhere", "middle", "border", "beside a side", "side", "corner")
 
@@ -31,6 +33,8 @@ class Case:
         approach: Largest approach.
         tilt: Slopes of the plane.
         story: What the heights are.
+        hardness: Hardness; None for elastic contacts.
+        free_tilt: Whether the plane turns without moment instead of keeping its slopes.
         units: Units that lengths and pressures are written in, with their size in mm and MPa;
             bare numbers without.
     """
@@ -44,25 +48,35 @@ class Case:
     approach: float
     tilt: tuple
     story: str
+    hardness: float | None = None
+    free_tilt: bool = False
     units: tuple = ()
 
     def __str__(self):
         micro, sides = ", ".join(self.micro.values()), self.block["sides"]
+        tilt = "free" if self.free_tilt else self.tilt
         return (
             f"{self.kind}, {micro}, {self.story}, heights {self.heights.shape}, patches"
-            f" {self.patches}, height {self.block['height']}, {sides}, tilt {self.tilt}"
+            f" {self.patches}, height {self.block['height']}, {sides}, tilt {tilt}, hardness"
+            f" {self.hardness}"
         )
 
-    def history(self, folder, **load):
+    @property
+    def nominal_area(self):
+        """Area of the surface [mm²]."""
+        return self.lengths[0] * self.lengths[1]
+
+    def history(self, folder, output=None, **load):
         """Run the scene.
 
         Args:
             folder: Where the heights are written.
+            output: Keys of the output beside the check, which is off.
             load: Keys of the load other than the tilt, whose lengths are in mm, forces in N.
         """
         path = folder / "heights.npy"
         np.save(path, self.heights)
-        load = {"tilt": list(self.tilt)} | load
+        load = {"tilt": "free" if self.free_tilt else list(self.tilt)} | load
         if "approach" in load:
             load["approach"] = [self._length(value) for value in load["approach"]]
         block = self.block | {
@@ -76,11 +90,13 @@ class Case:
             },
             "block": block,
             "patches": {"grid": list(self.patches)},
-            "micro": self.micro,
+            "micro": dict(self.micro),
             "coupling": {"kind": self.kind},
             "load": load,
-            "output": {"check": "none"},
+            "output": {"check": "none"} | (output or {}),
         }
+        if self.hardness is not None:
+            data["micro"]["hardness"] = self._pressure(self.hardness)
         return run(Scene.from_dict(data))
 
     def mirrored(self):
@@ -111,6 +127,7 @@ class Case:
             lengths=tuple(side * length for side in self.lengths),
             block=block,
             approach=self.approach * length,
+            hardness=None if self.hardness is None else self.hardness * modulus,
         )
 
     def _length(self, value):
@@ -133,36 +150,50 @@ def drawn(seed):
     heights, story = _heights(random, grid, lengths, patches)
     tilted = random.random() < 0.3
     depth = float(np.ptp(heights))
+    micro = dict(MODELS[random.integers(len(MODELS))])
+    kind = KINDS[random.integers(len(KINDS))]
+    poisson_ratio = float(random.uniform(0.0, 0.45))
+    modulus = float(10 ** random.uniform(0, 5))
+    hardness = None
+    if micro["model"] == "half-space" and kind != "isolated" and random.random() < 0.5:
+        slopes = np.gradient(heights, lengths[0] / grid[0], lengths[1] / grid[1])
+        steepness = float(np.sqrt(np.mean(np.square(slopes)))) or 0.1
+        hardness = float(10 ** random.uniform(-2.0, 0.0)) * steepness * modulus
+        hardness /= 1.0 - poisson_ratio**2
     cells = [max(4, patches[0]), max(4, patches[1]), 4]
     return Case(
         heights=heights,
         lengths=lengths,
         block={
-            "young_modulus": round(float(10 ** random.uniform(0, 5)), 3),
-            "poisson_ratio": round(float(random.uniform(0.0, 0.45)), 3),
-            "height": round(float(random.choice([1.0, random.uniform(0.2, 3.0)])), 3),
+            "young_modulus": modulus,
+            "poisson_ratio": poisson_ratio,
+            "height": float(random.choice([1.0, random.uniform(0.2, 3.0)])),
             "sides": str(random.choice(["free", "free", "roller"])),
             "cells": cells,
         },
         patches=patches,
-        micro=dict(MODELS[random.integers(len(MODELS))]),
-        kind=KINDS[random.integers(len(KINDS))],
+        micro=micro,
+        kind=kind,
         approach=float(random.uniform(0.02, 0.2)) * depth,
         tilt=tuple(float(t) for t in random.uniform(-0.1, 0.1, 2) * depth)
         if tilted
         else (0.0, 0.0),
         story=story,
+        hardness=hardness,
+        free_tilt=bool(random.random() < 0.15),
     )
 
 
 def _heights(random, grid, lengths, patches):
-    story = str(random.choice(["spectrum", "spectrum", "spectrum", "caps", "steps"]))
+    story = str(random.choice(["spectrum", "spectrum", "spectrum", "caps", "steps", "honed"]))
     if story == "caps":
         return _caps(random, grid, lengths, patches)
+    if story == "honed":
+        return _honed(random, grid, lengths), story
     spectrum = Spectrum(
         hurst=float(random.uniform(0.3, 1.0)),
         waves=(float(random.choice([1, 2])), float(random.uniform(3, min(grid) / 3))),
-        rms_slope=float(10 ** random.uniform(-2, -0.5)),
+        rms_slope=float(10 ** random.uniform(-2, 0.5)),
         seed=int(random.integers(1 << 30)),
     )
     heights = synthesise(spectrum, grid=grid, lengths=lengths).heights
@@ -170,6 +201,23 @@ def _heights(random, grid, lengths, patches):
         step = np.ptp(heights) / random.integers(8, 60)
         heights = np.round(heights / step) * step
     return np.array(heights), story
+
+
+def _honed(random, grid, lengths):
+    """Return a plateau crossed by grooves that meet the border, sampled 6 to 10 times a wave."""
+    waves = min(grid) / float(random.uniform(6.0, 10.0))
+    spectrum = Spectrum(
+        hurst=0.8, waves=(1.0, waves), rms_slope=0.02, seed=int(random.integers(1 << 30))
+    )
+    plateau = synthesise(spectrum, grid=grid, lengths=lengths)
+    x, y = plateau.x[:, None], plateau.y
+    depth, heights = float(10 ** random.uniform(-3.0, -1.5)), np.array(plateau.heights)
+    width = 0.5 * min(lengths) / waves
+    for angle in (30.0, -30.0):
+        across = x * np.sin(np.radians(angle)) + y * np.cos(np.radians(angle))
+        for at in random.uniform(across.min(), across.max(), 3):
+            heights -= depth * np.exp(-(((across - at) / width) ** 2))
+    return heights
 
 
 def _caps(random, grid, lengths, patches):

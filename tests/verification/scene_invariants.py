@@ -39,7 +39,7 @@ def checks(case, folder):
         folder: Where heights are written.
     """
     half, whole = 0.5 * case.approach, case.approach
-    points = {"approach": [TINY * whole, half, whole, half], "steps": 1}
+    points = {"approach": [TINY * whole, half, whole, half, whole], "steps": 1}
     base = case.history(folder, **points)
     yield from _alone(case, base)
     solved = _solved(case)
@@ -59,10 +59,15 @@ def checks(case, folder):
         yield from _same(
             "scaled", case, base, found, lambda f: f, solved, solved, (length, modulus)
         )
+    raised = replace(case, heights=case.heights + 0.37 * case.approach + 1e-3)
+    found = raised.history(folder, **points)
+    yield from _same("raised", case, base, found, lambda f: f, solved, solved)
     force = 0.6 * float(base.force_N.max())
     if force > 0.0:
-        reached = case.history(folder, force=[force], steps=1).force_N[-1]
-        yield Found("force hit", abs(reached / force - 1.0), 1e-8)
+        cycled = case.history(folder, force=[force, 0.5 * force], steps=1, cycles=2)
+        yield Found("force hit", abs(cycled.force_N[0] / force - 1.0), 1e-8)
+        yield Found("force hit again", abs(cycled.force_N[2] / force - 1.0), 1e-8)
+        yield Found("force cycles", float(len(cycled) != 4), 0.0)
     if case.kind == "consistent":
         together = replace(case, kind="concurrent").history(folder, **points)
         largest = together.force_N.max() or 1.0
@@ -81,13 +86,50 @@ def _alone(case, history):
     most = history.contact_area_fraction.max() or 1.0
     apart = np.abs(fractions - history.contact_area_fraction).max() / most
     yield Found("patch areas", float(apart), 1e-12)
-    yield Found("up and down", float(abs(force[3] - force[1]) / (largest or 1.0)), 1e-8)
+    scale = largest or 1.0
+    if case.hardness is None:
+        yield Found("up and down", float(abs(force[3] - force[1]) / scale), 1e-8)
+    else:
+        yield from _yielding(case, history)
+    yield Found("reloaded", float(abs(force[4] - force[2]) / scale), 1e-8)
+    yield Found("unloading is below loading", float((force[3] - force[1]) / scale), 1e-8)
+    energies = history.elastic_energy_mJ
+    if np.isfinite(energies).all():
+        yield Found("elastic energy", float(-energies.min()), 0.0)
     yield Found("force rises", float(max(force[0] - force[1], force[1] - force[2])), 0.0)
     if case.tilt == (0.0, 0.0):
         modulus = case.block["young_modulus"] / (1.0 - case.block["poisson_ratio"] ** 2)
         # a punch over a circle around the face; a patch alone, or a flat block, may be stiffer
         punch = modulus * np.hypot(*case.lengths) * history.approach_mm[0] * (1.0 + 4.0 * count)
         yield Found("touch", float(force[0] / punch), 1.0)
+
+
+def _yielding(case, history):
+    """Yield what must hold of one history under a hardness."""
+    force, nominal = history.force_N, case.nominal_area
+    area = history.contact_area_fraction
+    yield Found(
+        "area bears the force", float((force / (case.hardness * nominal) - area).max()), 1e-12
+    )
+    if case.kind not in ("analytic", "concurrent"):
+        return
+    yielding = history.yielding_area_fraction
+    yield Found("area yields", float((yielding - area).max()), 1e-12)
+    yield Found(
+        "yielding area bears",
+        float((case.hardness * yielding * nominal / np.maximum(force, 1e-300) - 1.0).max()),
+        1e-10,
+    )
+    peak = history.peak_pressure_MPa
+    yield Found("peak", float(peak.max() / case.hardness - 1.0), 1e-10)
+    # reached once, the hardness is borne by some cell, and what it leaves is a depth
+    reached = bool((peak >= case.hardness * (1.0 - 1e-9)).any())
+    yield Found(
+        "depth where it yields", float(reached and not history.plastic_depth_mm.max() >= 0.0), 0.0
+    )
+    yield Found("yielding is told", float(reached and not yielding.max() > 0.0), 0.0)
+    work = history.plastic_work_mJ
+    yield Found("plastic work grows", float(-np.diff(work).min() / (work.max() or 1.0)), 1e-9)
 
 
 def _same(name, case, base, other, change, solved, shared, scale=(1.0, 1.0)):

@@ -86,9 +86,7 @@ def test_tiny_approach(surface):
 def test_nan_is_refused_where_it_enters(surface):
     heights = surface.heights.copy()
     heights[3, 5] = np.nan
-    with pytest.raises(
-        InputError, match=r"1 of 1600 heights are masked.*index \(3, 5\)"
-    ):
+    with pytest.raises(InputError, match=r"1 of 1600 heights are masked.*index \(3, 5\)"):
         Surface(heights=heights, lengths=(1.0, 1.0))
     asperities = find_asperities(surface, periodic=False)
     for name in ("x", "z", "angle", "border_z"):
