@@ -153,7 +153,7 @@ def measured(numbers):
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
             f"{number:3d} {data['coupling']['kind']:10s} {run.setup.surface.grid[0]:3d}² "
-            f"{'honed ' if is_honed(number) else ''}{'steep ' if number % STEEP == 0 else ''}height "
+            f"{'honed ' * is_honed(number)}{'steep ' * (number % STEEP == 0)}height "
             f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
             f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
             f"({told}) {time.perf_counter() - began:.0f} s{' meshed' if meshed else ''}",

@@ -155,7 +155,11 @@ def drawn(seed):
     poisson_ratio = float(random.uniform(0.0, 0.45))
     modulus = float(10 ** random.uniform(0, 5))
     hardness = None
-    if micro["model"] == "half-space" and kind != "isolated" and random.random() < 0.5:
+    if (
+        micro["model"] == "half-space"
+        and kind in ("analytic", "concurrent")
+        and random.random() < 0.6
+    ):
         slopes = np.gradient(heights, lengths[0] / grid[0], lengths[1] / grid[1])
         steepness = float(np.sqrt(np.mean(np.square(slopes)))) or 0.1
         hardness = float(10 ** random.uniform(-2.0, 0.0)) * steepness * modulus
