@@ -202,8 +202,9 @@ class _FreeMotions(Generic[T]):
                 if self._final:
                     raise
                 return np.inf
-            lost = bool(self._control.force) and now.force > 0.0 and found.force == 0.0
-            return np.inf if lost else float(found.residual @ step)
+            # less than the tolerance is lost by rounding alone, and is no support to be kept
+            held = now.force > TOLERANCE * (self._control.force or np.inf)
+            return np.inf if held and found.force == 0.0 else float(found.residual @ step)
 
         longest = self._half / float(np.abs(step).max())
         share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))

@@ -121,28 +121,32 @@ class ContactForces:
         Raises:
             NotConverged: When nothing can hold the plane.
         """
+        matrix, weight = self.levers.matrix, self._sampling.weight
+
+        def closure(plane: Array) -> Array:
+            # no other order of the sums: first touch is found to the last digit of closures
+            return matrix @ plane - self._gap - displacement
 
         def respond(plane: Array) -> PlaneResponse[Array]:
-            closure = self.levers.matrix @ plane - self._gap - displacement
-            weight = self._sampling.weight
+            closed = closure(plane)
             return PlaneResponse(
-                loads=self.loads(self.pressure(closure)),
-                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closure)),
-                state=closure,
+                loads=self.loads(self.pressure(closed)),
+                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closed)),
+                state=closed,
             )
 
         if self._unloaded:
-            rest = self.levers.matrix[:, 1:] @ self.plane[1:] - self._gap - displacement
+            slopes = self.plane[1:]
             approach = first_touch(
-                lambda at: float(self.loads(self.pressure(rest + at))[0]) > 0.0,
+                lambda at: float(respond(np.array([at, *slopes])).loads[0]) > 0.0,
                 self.control,
                 self.levers.half,
             )
-            self.plane = np.array([approach, *self.plane[1:]])
+            self.plane = np.array([approach, *slopes])
         if not self.control.free.any():
-            return self.levers.matrix @ self.plane - self._gap - displacement
-        self.plane, closure = find_equilibrium(respond, self.control, self.plane, self.levers.half)
-        return closure
+            return closure(self.plane)
+        self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
+        return closed
 
     def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
         """Write the forces B p(c(u)) at a displacement u.

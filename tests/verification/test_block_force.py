@@ -113,6 +113,26 @@ def test_way_down_is_the_way_up(mode):
         np.testing.assert_allclose(states[one].tilt, states[other].tilt, rtol=1e-8)
 
 
+@pytest.mark.parametrize("mode", MODES)
+def test_a_touch_that_is_rounding_holds_no_plane(mode):
+    """From a few units of the last digit past first touch, the plane is that from any other."""
+    pressed = uneven_block(mode)
+    pressed.solve(Control(force=1.0, tilt=None))  # turned
+    released = pressed.solve(Control(force=0.0, tilt=None))
+    forces, rest = pressed.forces, np.zeros(len(pressed._sampling.weight))
+    touched, ends = [], []
+    for units in range(-2, 9):
+        approach = released.approach + units * np.spacing(released.approach)
+        forces.prescribe(Control(force=8.0, tilt=None), np.array([approach, *released.tilt]))
+        touched.append(forces.loads(forces.pressure(forces.levers.matrix @ forces.plane))[0])
+        forces.closure_of(rest)
+        ends.append(forces.plane)
+    assert (touched[2], touched[-1] > 0.0) == (0.0, True)
+    assert max(touched) < 1e-20  # of 8 N
+    # residuals of 1e-10 of the load are accepted
+    np.testing.assert_allclose(ends, np.broadcast_to(ends[0], (11, 3)), rtol=1e-9)
+
+
 def test_one_patch_under_a_force_is_one_linear_solve():
     """Its pressure is the force over its area, wherever the block goes."""
     interface = interface_of(block_of(), (1, 1))
