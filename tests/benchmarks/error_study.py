@@ -21,7 +21,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from geometry import Spectrum, Surface, synthesise
+from geometry import InputError, Spectrum, Surface, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene
 from multiscale.couplings.body import scene_body
@@ -144,7 +144,11 @@ def measured(numbers):
             continue
         parts = dict(step.errors)
         if meshed:
-            true, bar = meshed_force(data)
+            try:
+                true, bar = meshed_force(data)
+            except InputError as error:
+                print(f"{number:3d} is not meshed: {error}")
+                continue
             stated = step.force_error_N
         else:
             true, bar = finer_force(run, number), 0.0
