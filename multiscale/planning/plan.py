@@ -267,4 +267,4 @@ def _error(setup: ProblemSetup) -> str:
         return "the meshes of the reference tell it, at every load step"
     which = "every load step" if setup.scene.output.check == "all" else "the last load step"
     body = ", body" if setup.has_block else "; there is no block"
-    return f"measured at {which}, by cause: grid, slopes{body}{' and laws' * setup.uses_laws}"
+    return f"measured at {which}, by cause: grid, zero, slopes{body}{' and laws' * setup.uses_laws}"
