@@ -58,6 +58,16 @@ class ContactState(NamedTuple):
         return self.start.plane
 
     @property
+    def iterations(self) -> int:
+        """Iterations of the solver."""
+        return self.start.solution.iterations
+
+    @property
+    def residual(self) -> float:
+        """Complementarity error relative to the largest interference."""
+        return self.start.solution.residual
+
+    @property
     def touching(self) -> EllipticContacts:
         """The contacts that carry force."""
         return self.contacts.subset(np.flatnonzero(self.contacts.force > 0.0))

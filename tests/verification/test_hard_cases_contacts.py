@@ -19,7 +19,7 @@ def test_two_summits_that_nearly_coincide(name, apart):
     found = pair.solve(0.02)
     # the gap between the summits changes the force by its square over the radius
     assert found.contacts.force.sum() == pytest.approx(one.contacts.force[0], rel=1e-6)
-    assert found.start.solution.residual <= 1e-10 and found.start.solution.iterations <= 30
+    assert found.residual <= 1e-10 and found.iterations <= 30
 
 
 @pytest.mark.parametrize("name", ["circular", "elliptic"])
@@ -29,7 +29,7 @@ def test_a_twin_a_little_lower_overlaps(name):
     for lower in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
         twins = summits([0.5, 0.5 + 1e-9], 0.5, z=[0.0, -lower])
         state = AsperityModel(name, twins, contact_modulus=E_STAR).solve(0.02)
-        assert state.start.solution.residual <= 1e-10
+        assert state.residual <= 1e-10
         forces.append(state.contacts.force.sum())
     np.testing.assert_allclose(forces[:3], forces[0], rtol=1e-6)
     assert np.all(np.isfinite(forces))
@@ -65,7 +65,7 @@ def test_needles_side_by_side():
     model = AsperityModel("elliptic", two, contact_modulus=E_STAR)
     state = model.solve(1e-4)
     alone = AsperityModel("elliptic-independent", two, contact_modulus=E_STAR).solve(1e-4)
-    assert state.start.solution.residual <= 1e-10
+    assert state.residual <= 1e-10
     assert state.contacts.force[0] == pytest.approx(state.contacts.force[1], rel=1e-9)
     assert (
         0.3 < state.contacts.force.sum() / alone.contacts.force.sum() < 1.0
