@@ -5,7 +5,7 @@ import pytest
 from random_scenes import KINDS, drawn
 from scene_invariants import Found, checks
 
-SEEDS = (3, 12, 42, 56, 74, 1040)
+SEEDS = (3, 12, 42, 56, 74, 126)
 
 
 @pytest.mark.parametrize(
