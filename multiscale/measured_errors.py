@@ -84,7 +84,7 @@ class MeasuredErrors:
     @property
     def approach(self) -> float:
         """Error of the approach under the force [mm]; 0 without contact, infinite if not known."""
-        if self.stiffness:
+        if self.stiffness > 0.0:  # which NaN is not
             others = self.force - self.parts.get(ZERO, 0.0)
             return others / self.stiffness + self.zero
         return math.inf if self.force else 0.0

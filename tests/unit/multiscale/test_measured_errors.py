@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -210,3 +211,14 @@ def test_report_and_provenance_hold_the_errors(tmp_path):
 )
 def test_values_are_rounded_to_their_errors(value, error, stated):
     assert with_error(value, error, 6) == stated
+
+
+@pytest.mark.parametrize("stiffness", [0.0, math.nan])
+def test_an_approach_whose_stiffness_is_not_known_has_no_stated_error(stiffness):
+    found = MeasuredErrors(parts={"grid": 1.0, "zero": 0.5}, stiffness=stiffness, zero=1e-4)
+    assert found.approach == math.inf
+
+
+def test_the_zero_counts_in_full_in_an_approach_under_a_force():
+    found = MeasuredErrors(parts={"grid": 1.0, "zero": 0.5}, stiffness=2e3, zero=1e-4)
+    assert found.approach == pytest.approx(1.0 / 2e3 + 1e-4, rel=1e-14)
