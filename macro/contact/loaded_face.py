@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from geometry.checks import real_array
 from geometry.errors import InputError
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
@@ -137,9 +138,9 @@ def crown_depth(crown: Any, x: Array, y: Array) -> Array:
 def _one_each(values: Any, points: Array, what: str) -> Array:
     """Return what a user's function gives at points as numbers, one for each."""
     try:
-        found = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} gives no numbers", value=values) from None
+        found = real_array(values)  # what is masked is not a number
+    except InputError as error:
+        raise InputError(f"{what} gives no numbers: {error.problem}", value=values) from None
     if found.shape not in ((), points.shape):
         raise InputError(
             f"{what} does not give one value for each of {len(points)} points",

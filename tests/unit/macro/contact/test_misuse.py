@@ -78,7 +78,9 @@ def test_a_facet_inside_the_body_is_refused(body):
         (law(lambda c: np.zeros((len(c), 1))), "law 0 does not give one value for each"),
         (law(lambda c: 0.0 * c, lambda c: [1.0, 2.0]), "law 0 does not give one value for each"),
         (law(lambda c: "stiff"), "'stiff': law 0 gives no numbers"),
-        (law(lambda c: None), "the laws give values that are not finite"),
+        (law(lambda c: None), "law 0 gives no numbers"),
+        (law(lambda c: 1j * c), "law 0 gives no numbers: not an array of real numbers"),
+        (law(lambda c: np.ma.masked_all(c.shape)), "the laws give values that are not finite"),
         (law(lambda c: np.full(c.shape, np.nan)), "the laws give values that are not finite"),
     ],
 )
@@ -93,6 +95,7 @@ def test_laws_of_wrong_shape_are_named(body, wrong, problem, mode):
     [
         (lambda x, y: np.zeros(3), r"the crown does not give one value for each of \d+ points"),
         (lambda x, y: "deep", "the crown gives no numbers"),
+        (lambda x, y: np.ma.masked_all(x.shape), "the crown has depths that are not finite"),
         (lambda x, y: np.inf * x, "the crown has depths that are not finite"),
         (3.0, "the crown is no function"),
     ],
