@@ -60,7 +60,7 @@ __all__ = ["main", *_HOMES]
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        from geometry.packages import optional_packages  # loads numpy
+        from support.packages import optional_packages  # loads numpy
 
         with optional_packages():
             return getattr(import_module(_HOMES[name]), name)

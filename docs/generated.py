@@ -14,7 +14,7 @@ from multiscale.results.history import COLUMNS
 from multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry")
+PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry", "support")
 """Packages with public names, from the top down; a name is described in the first that has it."""
 
 

@@ -6,7 +6,6 @@ contact modulus, and block shapes the mesh of the body under the surface.
 """
 
 from geometry.asperities import Asperities, find_asperities
-from geometry.errors import InputError, NotConverged, NotInstalled, PatchlawError
 from geometry.facing import facing, laid_on, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
@@ -22,6 +21,7 @@ from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
 from geometry.synthesis import synthesise
+from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 
 __all__ = [
     "Asperities",

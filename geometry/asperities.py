@@ -7,11 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import frozen_array, positive_lengths
-from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
 from geometry.summits import coincident, constrained_summits, grid_maxima
 from geometry.surface import Surface
+from support.checks import frozen_array, positive_lengths
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

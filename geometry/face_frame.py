@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import frozen_array
-from geometry.errors import InputError
+from support.checks import frozen_array
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

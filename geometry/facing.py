@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.plausibility import check_slopes
 from geometry.surface import Surface
+from support.errors import InputError
 
 _ROUNDING = 1e-9
 """Relative difference of two sides that is rounding."""

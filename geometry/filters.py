@@ -10,9 +10,9 @@ import scipy.fft
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from geometry.checks import is_level
 from geometry.interpolant import Interpolant
 from geometry.missing import filled
+from support.checks import is_level
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.optimize import minimize
 
 from geometry.blocked_spline import BlockedSpline
-from geometry.errors import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import cell_counts, finite_pair, positive_lengths, real_array
-from geometry.errors import InputError
 from geometry.surface import Surface
+from support.checks import cell_counts, finite_pair, positive_lengths, real_array
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
 from geometry.rigid_plane import Control, motion_units, plane_failure
 from geometry.slope_search import slope_search
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 T = TypeVar("T")

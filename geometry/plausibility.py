@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from geometry.checks import is_level
-from geometry.errors import InputError
 from geometry.statistics import roughness
 from geometry.surface import Surface
+from support.checks import is_level
+from support.errors import InputError
 
 STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 """Rms gradients of the steepest heights that are accepted, a slope of 63°, and that finite slopes

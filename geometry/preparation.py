@@ -9,12 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, cells_between
-from geometry.errors import InputError
 from geometry.filters import regridded, smoothed, spikes
 from geometry.missing import filled
 from geometry.plausibility import check_slopes
 from geometry.surface import Surface
+from support.checks import cell_counts, cells_between
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Interval = tuple[float, float]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from difflib import get_close_matches
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,8 +14,8 @@ from typing import Any, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import InputError, NotConverged
 from geometry.patches import Partition
+from support.errors import InputError, NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

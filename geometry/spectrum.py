@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from geometry.checks import finite_pair
-from geometry.errors import InputError
+from support.checks import finite_pair
+from support.errors import InputError
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""

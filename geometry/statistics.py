@@ -9,9 +9,9 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from geometry.cores import cores
-from geometry.errors import InputError
 from geometry.surface import Surface
+from support.cores import cores
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -10,15 +10,15 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.checks import (
+from geometry.interpolant import Interpolant
+from support.checks import (
     LARGEST,
     cells_between,
     frozen_array,
     is_level,
     positive_lengths,
 )
-from geometry.errors import InputError
-from geometry.interpolant import Interpolant
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

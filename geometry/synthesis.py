@@ -9,10 +9,10 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, check_scale, positive_lengths
-from geometry.errors import InputError
 from geometry.spectrum import Spectrum
 from geometry.surface import Surface
+from support.checks import cell_counts, check_scale, positive_lengths
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator, RectBivariateSpline
 
-from geometry.errors import InputError
 from geometry.interpolant import bordered
 from geometry.surface import Surface
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Axis = tuple[NDArray[np.intp], NDArray[Any], NDArray[Any]]

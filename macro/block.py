@@ -15,7 +15,6 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import InputError
 from geometry.materials import Material
 from macro import compat
 from macro.elastic_body import ElasticBody
@@ -23,6 +22,7 @@ from macro.elasticity import stiffness_form
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.linear_solvers.selection import block_solver
 from macro.mesh.block import BlockMesh
+from support.errors import InputError
 
 Sides = Literal["free", "roller"]
 

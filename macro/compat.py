@@ -24,9 +24,9 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import InputError
 from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
+from support.errors import InputError
 
 _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form
 HAS_VTX = hasattr(io, "VTXWriter")

@@ -15,12 +15,12 @@ from dolfinx import fem, io
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import on_root
 from geometry.materials import von_mises
 from macro import compat
 from macro.contact.loaded_face import LoadedFace
 from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
 from macro.elastic_body import ElasticBody
+from support.collective import on_root
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 TIMEOUT = 60
 """Seconds that a process waits for another one that compiles the same form."""

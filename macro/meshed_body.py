@@ -16,8 +16,6 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import together
-from geometry.errors import InputError
 from geometry.materials import Material
 from macro import compat
 from macro.elastic_body import ElasticBody
@@ -26,6 +24,8 @@ from macro.linear_solvers.options import solve_linear
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.stiffened import Stiffened
 from macro.mesh.tagged import TaggedMesh
+from support.collective import together
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from geometry import Surface, find_asperities
-from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contact_problem import Solution
 from micro.asperities.contacts import Equilibrium
 from micro.asperities.model import MODELS, AsperityModel
 from micro.half_space.model import HalfSpaceModel
 from micro.model import MicroModel
+from support.errors import InputError
 
 MODEL_NAMES = (*MODELS, "half-space")
 """Names of all micro models."""

@@ -24,7 +24,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
-from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane
 from micro.contact_detail import ContactDetail
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]

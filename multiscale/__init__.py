@@ -32,7 +32,7 @@ def __getattr__(name: str) -> Any:
         return sorted(_homes())
     if name not in _homes():
         raise AttributeError(f"module 'multiscale' has no attribute '{name}'")
-    from geometry.packages import optional_packages  # loads numpy
+    from support.packages import optional_packages  # loads numpy
 
     with optional_packages():
         return getattr(import_module(_homes()[name]), name)

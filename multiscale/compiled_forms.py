@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from multiscale.doctor import CheckResult, gathered
+from support.collective import on_root
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

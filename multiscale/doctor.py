@@ -19,11 +19,11 @@ from typing import Any
 
 import threadpoolctl
 
-from geometry.cores import place
-from geometry.errors import InputError, PatchlawError
-from geometry.packages import optional_packages
 from multiscale.installation import removal, shadows, versions
 from multiscale.machine import control_group_memory, cores_statement, detached_processes
+from support.cores import place
+from support.errors import InputError, PatchlawError
+from support.packages import optional_packages
 
 _SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
 _LAUNCHERS = {"Open MPI": "Open MPI", "HYDRA": "MPICH", "MPICH": "MPICH", "Intel": "Intel"}

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from geometry.checks import PROGRAM, address_space
-from geometry.cores import lendable, place
-from geometry.errors import InputError
+from support.checks import PROGRAM, address_space
+from support.cores import lendable, place
+from support.errors import InputError
 
 _LEAST_DATA = 0.5e9
 """Address space that a small run takes beside the program: 64 × 64 heights do with 0.3 GB [B]."""

@@ -29,13 +29,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from geometry import Control
-from geometry.collective import on_root_alone
-from geometry.errors import InputError
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
 from multiscale.couplings.contact import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent, quantity
 from multiscale.setup.problem import ProblemSetup
+from support.collective import on_root_alone
+from support.errors import InputError
 
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""

@@ -11,9 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
-from geometry.checked_store import Arrays
-from geometry.collective import on_root
-from geometry.packages import optional_packages
 from micro import HalfSpaceModel, MicroModel
 from multiscale.contact_recorder import ContactRecorder
 from multiscale.couplings import assembly
@@ -39,6 +36,9 @@ from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import digest
+from support.checked_store import Arrays
+from support.collective import on_root
+from support.packages import optional_packages
 
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "

@@ -26,9 +26,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checked_store import Arrays
-from geometry.errors import InputError
-from geometry.whole_files import write_whole
+from support.checked_store import Arrays
+from support.errors import InputError
+from support.whole_files import write_whole
 
 _STRUCTURE = "structure"
 _HEAD = 512  # bytes before the content, the least that HDF5 leaves to users

@@ -11,7 +11,7 @@ import pytest
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from mpi_environment import MPI_ENVIRONMENT
+from helpers.mpi_environment import MPI_ENVIRONMENT
 
 # a test computes what it tests, and leaves nothing in the home of who runs it
 os.environ["PATCHLAW_CACHE"] = "off"

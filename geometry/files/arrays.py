@@ -9,8 +9,8 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.files.content import BYTES_PER_HEIGHT, FileContent, check_memory
+from support.errors import InputError
 
 
 def read_array(file: Path) -> FileContent:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import process_memory, real_array
-from geometry.errors import InputError, did_you_mean
+from support.checks import process_memory, real_array
+from support.errors import InputError, did_you_mean
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.files.arrays import first_line
 from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
+from support.errors import InputError
 
 _BYTES_PER_BYTE = 20
 """Memory that readers and the surface take per byte of a file, roughly; heights take 2 to 8 [B]."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import LARGEST
-from geometry.errors import InputError
 from geometry.files.content import FileContent
+from support.checks import LARGEST
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

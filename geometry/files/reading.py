@@ -10,8 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.checks import cell_counts, check_scale, is_level, positive_lengths, real_array
-from geometry.errors import InputError
 from geometry.files.arrays import read_array
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
 from geometry.files.instruments import UnknownFormat, read_instrument
@@ -19,6 +17,8 @@ from geometry.files.text import load_text, read_text
 from geometry.plausibility import reading_notes, surface_notes
 from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
+from support.checks import cell_counts, check_scale, is_level, positive_lengths, real_array
+from support.errors import InputError
 
 
 def read_surface(

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.files.content import BYTES_PER_HEIGHT, check_memory
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Line = tuple[int, str]

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
-from geometry.errors import InputError
 from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
 from geometry.files.points import heights_of_points, lists_points
 from geometry.files.table import Line, is_number, number_table, words_of
+from support.errors import InputError
 
 _BYTES_PER_CHARACTER = 8
 """Memory that a text takes per character while it is read, roughly [B]."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import cell_counts, positive_lengths
-from geometry.errors import InputError
 from geometry.meshes.lattice import Segment
 from geometry.patches import PatchGrid
+from support.checks import cell_counts, positive_lengths
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -22,11 +22,11 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.expected_contact import contact_radius, places_in_reach
 from geometry.meshes.refined_block import RefinedShape
 from geometry.surface import Surface
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape

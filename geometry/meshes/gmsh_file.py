@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.msh_sections import KINDS, MshContent, msh_content
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
 
-from geometry.packages import optional_packages
+from support.packages import optional_packages
 
 _OPTIONS = {
     "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]

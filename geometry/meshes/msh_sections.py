@@ -16,8 +16,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.msh_numbers import ByteNumbers, Numbers, TextNumbers, whole
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Table = NDArray[np.int64]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from geometry.checks import positive_lengths
-from geometry.errors import InputError
 from geometry.meshes.gmsh_session import gmsh_session
+from support.checks import positive_lengths
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.refined_block import RefinedShape, refined_solid
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

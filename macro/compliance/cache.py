@@ -22,8 +22,8 @@ import numpy as np
 from mpi4py.util import pkl5
 from numpy.typing import NDArray
 
-from geometry.checked_store import read_record, write_record
-from geometry.errors import InputError, NotWritten
+from support.checked_store import read_record, write_record
+from support.errors import InputError, NotWritten
 
 Arrays = Mapping[str, NDArray[np.float64]]
 

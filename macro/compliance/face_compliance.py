@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import shared
-from geometry.errors import InputError
 from geometry.materials import Material
 from macro.block import Sides
 from macro.compliance.cache import cached
 from macro.compliance.elements import block_lines
 from macro.compliance.parity_block import Parity, ParityBlock, Response
+from support.collective import shared
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from geometry.materials import Material
 from geometry.patches import PatchGrid
@@ -38,6 +37,7 @@ from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver,
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.outer_facets import OuterFacets, outer_facets
 from macro.meshed_body import MeshedBody
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

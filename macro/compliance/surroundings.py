@@ -12,7 +12,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from geometry.materials import Material
 from geometry.patches import PatchGrid
@@ -20,6 +19,7 @@ from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.outer_facets import OuterFacets, outer_facets
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]

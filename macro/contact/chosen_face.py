@@ -10,14 +10,14 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
-from geometry.collective import together
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from macro import compat
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facet_nodes import facet_indices
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
+from support.collective import together
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import together
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers, plane_failure
 from macro.contact.loaded_face import Loadable, Sampling
+from support.collective import together
 
 Array = NDArray[np.float64]
 

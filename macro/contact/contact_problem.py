@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import InputError, NotConverged
 from macro import compat
 from macro.contact.contact_tangent import ContactTangent
 from macro.contact.interface import Interface
@@ -29,6 +28,7 @@ from macro.linear_solvers.options import (
     reason_name,
     weakly,
 )
+from support.errors import InputError, NotConverged
 
 Array = NDArray[np.float64]
 

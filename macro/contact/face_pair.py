@@ -19,13 +19,13 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, vstack
 from scipy.spatial import cKDTree
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.body_pair import BodyPair
 from macro.contact.loaded_face import LoadedFace, Mode, Sampling, normal_rows
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

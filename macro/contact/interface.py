@@ -14,8 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import together
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
@@ -27,6 +25,8 @@ from macro.contact.interface_laws import InterfaceLaws, laws_on_face
 from macro.contact.interface_state import InterfaceResults, InterfaceState
 from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
 from macro.linear_solvers.stiffened import springs_at
+from support.collective import together
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

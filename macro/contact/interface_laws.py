@@ -9,10 +9,10 @@ from typing import Any, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.loaded_face import Mode
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import together
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.loaded_face import Sampling
+from support.collective import together
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -15,9 +15,9 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from macro.contact.interface import Interface
 from macro.mesh.facet_nodes import facet_nodes
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

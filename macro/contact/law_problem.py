@@ -12,8 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.collective import together
-from geometry.errors import InputError
 from geometry.rigid_plane import Control
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactLaw
@@ -21,6 +19,8 @@ from macro.contact.equilibrium import Equilibrium
 from macro.contact.loaded_face import Loadable, Mode
 from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
 from macro.linear_solvers.options import solve_linear
+from support.collective import together
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

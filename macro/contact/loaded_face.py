@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from geometry.checks import real_array
-from geometry.errors import InputError
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
@@ -30,6 +28,8 @@ from macro.mesh.contact_face import (
     facet_quadrature,
     top_facets,
 )
+from support.checks import real_array
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 _ALONG_AXIS = 1e-14

@@ -18,7 +18,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.loaded_face import Sampling
@@ -32,6 +31,7 @@ from macro.linear_solvers.options import (
     set_own_preconditioner,
     weakly,
 )
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

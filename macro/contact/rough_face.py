@@ -11,7 +11,6 @@ from typing import Self
 import numpy as np
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro.block import Block
@@ -19,6 +18,7 @@ from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import TOP
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from support.errors import InputError
 
 _UPRIGHT = 1e-12
 """Deviation of a face's normal from the z axis that is rounding."""

@@ -12,7 +12,6 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
@@ -24,6 +23,7 @@ from macro.contact.face_nodes import TopNodes
 from macro.contact.node_contact import ContactSolution, PlaneOverNodes
 from macro.contact.rough_face import RoughFace
 from macro.elastic_body import ElasticBody
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Method = Literal["active-set", "augmented-lagrangian"]

@@ -10,9 +10,9 @@ import ufl
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.errors import InputError
 from macro import compat
 from macro.elasticity import rigid_body_modes
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from geometry.errors import NotConverged
 from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
 from macro.linear_solvers.options import PREFIX, WeakContext, reason_name
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

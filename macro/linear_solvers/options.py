@@ -11,8 +11,8 @@ from typing import Any, TypeVar
 
 from petsc4py import PETSc
 
-from geometry.errors import InputError, NotConverged
 from macro.compat import call
+from support.errors import InputError, NotConverged
 
 T = TypeVar("T")
 

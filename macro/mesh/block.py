@@ -10,7 +10,6 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
-from geometry.collective import on_root
 from geometry.meshes.block import BlockShape
 from geometry.meshes.lattice import (
     cells_beyond,
@@ -21,6 +20,7 @@ from geometry.meshes.lattice import (
 )
 from geometry.meshes.refined_block import RefinedShape
 from macro import compat
+from support.collective import on_root
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.neighbours import facets_between_ranks, inner_facets, parts
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from macro import compat
+from support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from macro import compat
 from macro.mesh.checks import check_cells, check_connected
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.tagging import cell_tags, facet_tags
 from macro.mesh.xdmf import read_xdmf
+from support.collective import on_root
+from support.errors import InputError
 
 
 def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:

@@ -8,11 +8,11 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
 from macro import compat
 from macro.mesh.facet_nodes import facet_nodes
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -12,12 +12,12 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
 from geometry.surface import Surface
 from macro import compat
 from macro.mesh.block import BlockMesh, block_mesh
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from dolfinx import mesh as dmesh
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from geometry.meshes.stepped import SteppedShape
 from geometry.surface import Surface
 from macro import compat
 from macro.mesh.rough_surface import MeshQuality, check_cover, move_onto
 from macro.mesh.tagged import TaggedMesh
+from support.collective import on_root
+from support.errors import InputError
 
 ROUGH = "rough"
 """Name of the contact face."""

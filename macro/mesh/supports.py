@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from macro.mesh.facet_nodes import facet_nodes
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

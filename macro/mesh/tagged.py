@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

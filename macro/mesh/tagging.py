@@ -8,9 +8,9 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
 from geometry.meshes.gmsh_file import NO_GROUP
 from macro import compat
+from support.errors import InputError
 
 Table = NDArray[np.int64]
 

@@ -11,11 +11,11 @@ import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.xdmf import NAMES
+from support.collective import on_root
+from support.errors import InputError
 
 
 def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:

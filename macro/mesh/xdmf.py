@@ -12,11 +12,11 @@ import numpy as np
 from dolfinx import io
 from dolfinx import mesh as dmesh
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.tagging import filled, of_owned_cells
+from support.collective import on_root
+from support.errors import InputError
 
 _CELLS = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
 """Names of the cells' topology, without capitals, and of their facets'."""

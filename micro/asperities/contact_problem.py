@@ -33,8 +33,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.checks import process_memory
-from geometry.errors import InputError, NotConverged
+from support.checks import process_memory
+from support.errors import InputError, NotConverged
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Asperities, Control
-from geometry.errors import InputError
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane
 from micro.asperities.contact_problem import (
@@ -37,6 +36,7 @@ from micro.asperities.plane_on_peaks import Peaks, contact_stiffness
 from micro.asperities.truncated_newton import truncated_newton
 from micro.closed_forms.hertz import HertzContact
 from micro.compliance.body_modes import BodyModes
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Asperities, Control, Partition, PatchGrid
-from geometry.errors import InputError
 from geometry.rigid_plane import RigidPlane, normal_stiffness
 from micro.asperities.contacts import SOLVERS, AsperityContacts, Equilibrium, ModelKind
 from micro.asperities.hertz_pairs import BodyPoints
@@ -24,6 +23,7 @@ from micro.closed_forms.hertz import checked_modulus
 from micro.compliance.body_modes import BodyModes
 from micro.contact_detail import ContactDetail
 from micro.model import Pressed, Response, Stiffness, checked_approaches, checked_patches
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

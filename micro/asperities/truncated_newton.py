@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
-from geometry.errors import NotConverged
 from micro.asperities.contact_problem import (
     TOLERANCE,
     ContactProblem,
@@ -23,6 +22,7 @@ from micro.asperities.contact_problem import (
     Solution,
     damped_step,
 )
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import elliprd, elliprf
 
-from geometry.errors import InputError
 from micro.closed_forms.hertz_field import elliptic_field
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

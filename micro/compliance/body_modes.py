@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Partition
-from geometry.checks import positive_lengths
-from geometry.errors import InputError
 from geometry.legendre_modes import mode_means, mode_values
+from support.checks import positive_lengths
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

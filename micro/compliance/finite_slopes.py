@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from geometry import Material, Surface
-from geometry.errors import InputError
 from geometry.plausibility import check_finite_slopes
 from micro.compliance.waves import Around, Spectrum, surface_waves
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from geometry import Partition
-from geometry.errors import InputError
 from micro.compliance.quarter_space import side_compliance, side_stresses
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from geometry.cores import BLOCK, blocks, cores, in_threads
 from micro.closed_forms.love import corner_integral
+from support.cores import BLOCK, blocks, cores, in_threads
 
 Array = NDArray[np.float64]
 Field = NDArray[Any]

@@ -34,10 +34,10 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-from geometry.checks import positive_lengths
 from geometry.legendre_modes import mode_values
 from geometry.materials import Material
 from micro.compliance.rectangle_modes import half_space_modes, half_space_stress_modes
+from support.checks import positive_lengths
 
 Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]

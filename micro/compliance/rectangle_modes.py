@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_slopes, mode_values
-from geometry.small_caches import cached_where_small
 from micro.compliance.free_sides import FreeSides, distance_nodes, gauss_points, values_at
+from support.small_caches import cached_where_small
 
 Array = NDArray[np.float64]
 Part = Callable[[Array, float, int], Array]

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy import fft
 from scipy.sparse import csr_array, hstack
 
-from geometry.cores import in_threads
 from micro.compliance.free_sides import FreeSides, distance_nodes, means_over
+from support.cores import in_threads
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from geometry.cores import BLOCK, blocks, in_threads
-from geometry.small_caches import cached_where_small
+from support.cores import BLOCK, blocks, in_threads
+from support.small_caches import cached_where_small
 
 Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]

@@ -16,12 +16,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.cores import blocks, in_threads
-from geometry.errors import NotConverged
 from micro.compliance.half_space_grid import Cells
 from micro.contact.conjugate_gradients import ContactCells
 from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.start import admissible_start
+from support.cores import blocks, in_threads
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
 from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.solver import solve_on_surface
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 

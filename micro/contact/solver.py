@@ -19,10 +19,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import NotConverged
 from micro.contact.active_set import solve
 from micro.contact.problem import ContactPressures, ContactProblem
 from micro.contact.rigid_motions import Box
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
-from geometry.errors import NotConverged
 from micro.contact.problem import ContactProblem
 from micro.contact.rigid_motions import Motions
+from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 

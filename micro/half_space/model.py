@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Control, Partition, PatchGrid, Surface
-from geometry.errors import InputError
 from geometry.plausibility import check_slopes
 from micro.compliance.body_modes import BodyModes
 from micro.compliance.free_sides import FreeSides
@@ -28,6 +27,7 @@ from micro.model import (
     checked_patches,
     whole_patch,
 )
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, Partition, Surface, overlaps, patch_means
-from geometry.cores import blas_threads
-from geometry.errors import InputError, NotConverged
 from geometry.rigid_plane import RigidPlane, motion_units
 from micro.compliance.grid_compliance import Compliance
 from micro.contact.problem import ContactPressures, ContactProblem
@@ -24,6 +22,8 @@ from micro.contact.tangent import approach_stiffness
 from micro.contact_detail import ContactDetail
 from micro.half_space.contact_spots import Contacts, find_contacts
 from micro.model import Stiffness
+from support.cores import blas_threads
+from support.errors import InputError, NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -64,8 +64,8 @@ def _run(words: list[str]) -> int:
 
     if not works_together():
         return _WRONG_INPUT
-    from geometry.errors import NotInstalled
-    from geometry.packages import optional_packages
+    from support.errors import NotInstalled
+    from support.packages import optional_packages
 
     try:
         with optional_packages():

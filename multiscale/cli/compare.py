@@ -10,7 +10,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING
 from multiscale.comparison import errors
@@ -26,6 +25,7 @@ from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_csv, write_text
+from support.errors import InputError, NotConverged
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

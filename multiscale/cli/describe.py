@@ -10,10 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from geometry.collective import on_root, on_root_alone
-from geometry.errors import InputError
 from geometry.statistics import roughness
-from geometry.whole_files import write_whole
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings.assembly import check_has_laws, load_finite_elements
 from multiscale.couplings.body import scene_body
@@ -34,6 +31,9 @@ from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import write_text
+from support.collective import on_root, on_root_alone
+from support.errors import InputError
+from support.whole_files import write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -12,10 +12,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root
-from geometry.cores import hold_blas
-from geometry.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from geometry.packages import optional_packages
 from multiscale.cli.signals import ended_if_told
 from multiscale.machine import (
     check_address_space,
@@ -25,6 +21,10 @@ from multiscale.machine import (
 )
 from multiscale.output import terminal
 from multiscale.scene.scene import Scene
+from support.collective import on_root
+from support.cores import hold_blas
+from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
+from support.packages import optional_packages
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _OPTION_FILES = ("-options_file", "-options_file_yaml")

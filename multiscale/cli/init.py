@@ -7,8 +7,6 @@ import os
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from geometry.surface import Surface
 from multiscale.machine import refuse_detached_processes
 from multiscale.output import terminal
@@ -25,6 +23,8 @@ from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
 from multiscale.setup.surface_and_block import block_material, block_section, make_surface
 from multiscale.storage import write_text
+from support.collective import on_root
+from support.errors import InputError
 
 _KEYS = {
     "force": "load.force",

@@ -6,9 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged, NotInstalled, PatchlawError
-from geometry.packages import optional_packages
 from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
@@ -24,6 +21,9 @@ from multiscale.restart.results_folder import (
 from multiscale.run import Run
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
+from support.collective import on_root
+from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
+from support.packages import optional_packages
 
 
 def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root
-from geometry.errors import InputError, NotConverged
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
@@ -23,6 +21,8 @@ from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, part_name, sweep
 from multiscale.sweeps.sweep_results import SweepResults
+from support.collective import on_root
+from support.errors import InputError, NotConverged
 
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""

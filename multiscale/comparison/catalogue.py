@@ -14,7 +14,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from geometry.errors import InputError, NotConverged
 from geometry.meshes.families import suggested_fine
 from micro import MODELS
 from multiscale.comparison.configuration import OWN, Configuration
@@ -41,6 +40,7 @@ from multiscale.setup.surface_and_block import (
     make_surface,
     patch_grid,
 )
+from support.errors import InputError, NotConverged
 
 LAW_HEIGHTS = 128
 """Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""

@@ -10,8 +10,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from geometry.checked_store import read_record, write_record
-from geometry.errors import InputError
 from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
@@ -22,6 +20,8 @@ from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
+from support.checked_store import read_record, write_record
+from support.errors import InputError
 
 Launch: TypeAlias = Callable[[Configuration, float | None], RunResult]
 """Runs a configuration, and stops it after so many seconds if they are not None."""

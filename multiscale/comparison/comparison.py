@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison import AGAINST
 from multiscale.comparison.configuration import RunResult
@@ -24,6 +23,7 @@ from multiscale.comparison.measure import ranked, refinements
 from multiscale.comparison.scene_content import pressure_grid
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 BUSY = 0.7
 """A machine is called busy when the processes worked less than this share of their wall time."""

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import PlainSerializer, PlainValidator, TypeAdapter
 
-from geometry.checked_store import read_record, write_record
-from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
 from multiscale.comparison.scene_content import Content, Grid
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
+from support.checked_store import read_record, write_record
+from support.errors import PatchlawError
 
 Array = Annotated[
     NDArray[np.float64],

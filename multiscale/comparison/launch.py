@@ -15,10 +15,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from geometry.errors import InputError
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 from multiscale.readable import duration
 from multiscale.restart.interruption import ENDING
+from support.errors import InputError
 
 MPI_JOB = ("OMPI_COMM_WORLD_SIZE", "PMIX_RANK", "PMI_SIZE", "PMI_RANK", "SLURM_STEP_TASKS_PER_NODE")
 """Environment variables that exist inside an MPI job only."""

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from geometry.collective import on_root
-from geometry.errors import PatchlawError
 from geometry.patches import PatchGrid
 from multiscale.comparison.configuration import (
     Configuration,
@@ -27,6 +25,8 @@ from multiscale.machine import peak_memory, world
 from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
+from support.collective import on_root
+from support.errors import PatchlawError
 
 STATUS_OF_EXIT: dict[int, Status] = {0: "done", 2: "refused", 3: "not converged"}
 """Status by exit code of the process; every other exit code means ``failed``."""

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from geometry import InputError, Material
-from geometry.checks import process_memory
 from micro import FreeSides, HalfSpaceModel
 from multiscale.couplings.face_terms import (
     CUBE_MODES,
@@ -23,6 +22,7 @@ from multiscale.couplings.face_terms import (
 from multiscale.couplings.mesh_body import MeshTerms, PairTerms
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_section
+from support.checks import process_memory
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, NotConverged, PatchGrid
-from geometry.checked_store import Arrays
 from geometry.plane_equilibrium import UNSUPPORTED
 from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
@@ -23,6 +22,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.storage import packed, unpacked
+from support.checked_store import Arrays
 
 Array = NDArray[np.float64]
 

@@ -13,8 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
-from geometry.checked_store import Arrays
-from geometry.collective import on_root, on_root_alone
 from micro import (
     START_KINDS,
     FiniteSlopes,
@@ -29,6 +27,8 @@ from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import packed, unpacked
+from support.checked_store import Arrays
+from support.collective import on_root, on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceCompliance

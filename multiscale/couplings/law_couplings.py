@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid, RigidPlane
-from geometry.checked_store import Arrays
 from micro.model import Stiffness
 from multiscale.couplings.patch_compliance import Displacements
 from multiscale.laws.interpolation import LawPoint
@@ -20,6 +19,7 @@ from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
 from multiscale.storage import packed, unpacked
+from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LawContactState, LoadedFace

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
-from geometry.checked_store import Arrays
 from micro.contact_detail import ContactDetail, peaks_of
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_material, block_section, located
 from multiscale.storage import packed, unpacked
+from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ElasticBody, MeshQuality, UnilateralContactProblem, UnilateralContactState

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from geometry import InputError
-from geometry.whole_files import written
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import abaqus_text, calculix_text
 from multiscale.exports.law_module import law_modules
@@ -13,6 +12,7 @@ from multiscale.exports.sampling import Conducts
 from multiscale.exports.tables import csv_text
 from multiscale.laws.law_table import LawTable
 from multiscale.storage import remove, write_text
+from support.whole_files import written
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

@@ -14,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from geometry.collective import on_root_alone, shared
 from micro import HalfSpaceModel, MicroModel, Pressed, Response, RigidPlane, influence_matrix
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import PlanePath, SolvedRows
 from multiscale.readable import Observer
+from support.collective import on_root_alone, shared
 
 Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]

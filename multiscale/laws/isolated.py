@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import PatchGrid
-from geometry.collective import shared
 from micro import MicroModel
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.law_table import LawTable
@@ -20,6 +19,7 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import SolvedRows
 from multiscale.readable import Observer
+from support.collective import shared
 
 Array = NDArray[np.float64]
 

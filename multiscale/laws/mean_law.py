@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import bisect
 
-from geometry.collective import shared
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample, SampleRow
 from multiscale.laws.refinement import refined
 from multiscale.laws.rows import SolvedRows
+from support.collective import shared
 
 Array = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 
 from geometry import Control, NotConverged
-from geometry.checked_store import Arrays
 from micro.contact_detail import ContactDetail
 from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
+from support.checked_store import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""

@@ -13,11 +13,11 @@ from xml.etree import ElementTree
 
 import h5py
 
-from geometry.collective import on_root
-from geometry.errors import NotWritten, PatchlawError
-from geometry.whole_files import written
 from multiscale.run import Run
 from multiscale.storage import remove
+from support.collective import on_root
+from support.errors import NotWritten, PatchlawError
+from support.whole_files import written
 
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""

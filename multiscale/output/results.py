@@ -9,10 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.collective import on_root, shared
-from geometry.errors import NotInstalled
-from geometry.packages import optional_packages
-from geometry.whole_files import write_bytes, write_whole, written
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.provenance import provenance
@@ -21,6 +17,10 @@ from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecor
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
 from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
+from support.collective import on_root, shared
+from support.errors import NotInstalled
+from support.packages import optional_packages
+from support.whole_files import write_bytes, write_whole, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

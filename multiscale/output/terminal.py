@@ -12,7 +12,6 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
-from geometry.errors import PatchlawError
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import cores_statement, peak_memory
@@ -21,6 +20,7 @@ from multiscale.planning.work import Work
 from multiscale.readable import Caution, Observer, duration, quantity
 from multiscale.results.history import History
 from multiscale.setup.problem import ProblemSetup
+from support.errors import PatchlawError
 
 MOST_ROWS = 60
 """Load steps that are printed; the files hold all of them."""

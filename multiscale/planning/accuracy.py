@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from geometry.errors import InputError, NotConverged
 from micro import HalfSpaceModel
 from multiscale.couplings.contact import SLOPES, OnBody, on_body
 from multiscale.measured_errors import ZERO, error_probe
@@ -30,6 +29,7 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.memory import MemoryLacking
 from multiscale.setup.problem import Decision, ProblemSetup
 from multiscale.setup.surface_and_block import make_surface
+from support.errors import InputError, NotConverged
 
 _TRIALS = 6
 """Most trials of a grid."""

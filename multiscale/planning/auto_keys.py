@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.surface import Surface
 from micro import HalfSpaceModel
 from multiscale.planning.memory_costs import step_count
@@ -18,6 +17,7 @@ from multiscale.scene.scene import Scene
 from multiscale.scene.sections import SpectrumSection
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import PROVISIONAL_PATCHES, patch_limits
+from support.errors import InputError
 
 DEFAULT_ACCURACY = 0.02
 """Relative error of the force that is kept unless the scene says."""

@@ -9,7 +9,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid, patch_means
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
@@ -44,6 +43,7 @@ from multiscale.setup.surface_and_block import (
     make_surfaces,
     patch_grid,
 )
+from support.errors import InputError
 
 _ESTIMATE_CELLS = 96
 """Cells along a side, at most, of the half-space that estimates the plane at the largest load. On

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from geometry.collective import on_root_alone
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.machine import ClusterNodes, large_object_comm
 from multiscale.planning.problem_setup import make_setup
@@ -17,6 +15,8 @@ from multiscale.scene.scene import Scene
 from multiscale.setup.body_reader import scene_bodies
 from multiscale.setup.mesh_bodies import SceneBodies, SceneBody
 from multiscale.setup.problem import ProblemSetup
+from support.collective import on_root_alone
+from support.errors import InputError
 
 _COVERED = 1e-6
 """Part of the surface's rectangle beside the contact face that is rounding."""

@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from geometry.checked_store import Arrays, Mark, read_record, write_record
-from geometry.collective import on_root
-from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition
 from multiscale.restart.step_log import StepLog, read_steps
 from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
 from multiscale.storage import packed, remove_partial, unpacked
+from support.checked_store import Arrays, Mark, read_record, write_record
+from support.collective import on_root
+from support.errors import InputError, NotWritten
 
 FORMAT = "patchlaw checkpoint 8"
 FILE_NAME = "checkpoint.state"

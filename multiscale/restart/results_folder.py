@@ -12,8 +12,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from multiscale.removed import without_removed
 from multiscale.restart.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
 from multiscale.scene.identity import (
@@ -26,6 +24,8 @@ from multiscale.scene.identity import (
     told,
 )
 from multiscale.scene.scene import Scene
+from support.collective import on_root
+from support.errors import InputError
 
 _NAME = ".lock"
 _PATIENCE = 0.2  # for another run that is just ending, or others that remove the folder [s]

@@ -11,9 +11,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from geometry.checked_store import START, Mark, Record, append, unsealed
-from geometry.errors import InputError
 from multiscale.loading.load_step import LoadStep, PatchState
+from support.checked_store import START, Mark, Record, append, unsealed
+from support.errors import InputError
 
 _COLUMNS = [one.name for one in fields(LoadStep) if one.name != "patches"]
 _PATCH_COLUMNS = [one.name for one in fields(PatchState)]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.packages import optional_packages
 from micro.contact_detail import ContactDetail
 from multiscale.loading.load_step import LoadStep
+from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 

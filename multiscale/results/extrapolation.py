@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,6 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.packages import optional_packages
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.laws.law_table import LawTable
@@ -19,6 +18,7 @@ from multiscale.results.accuracy_verdict import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.reference_record import ReferenceRecord
+from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.regions import Regions
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
+from support.errors import InputError
 
 _TEXT = "reason"
 _COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations"}

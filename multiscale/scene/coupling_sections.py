@@ -7,11 +7,11 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from geometry.errors import InputError
 from geometry.zero import ALLOWED, FIRST_TOUCH, Zero
 from multiscale.loading.stepper import LoadHistory
 from multiscale.scene.quantities import Approaches, Forces, Length, Tilt, check_from_zero
 from multiscale.scene.sections import Cells, Number, Section
+from support.errors import InputError
 
 
 def _zero(name: str) -> str:

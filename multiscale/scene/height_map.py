@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import PlainSerializer, PlainValidator
 
-from geometry.checks import real_array
+from support.checks import real_array
 
 
 class HeightMap:

@@ -9,12 +9,12 @@ from typing import Any, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from geometry.errors import InputError, did_you_mean
 from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 from multiscale.scene.sections import NAMES_A_FILE, Section
+from support.errors import InputError, did_you_mean
 
 _OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
 """Names of types that stand at the end of a key's place where it may have several."""

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 MOST_BYTES = 64 * 1024
 """Size of the largest scene file [B]; a scene with every key takes 2 kB."""

@@ -7,12 +7,12 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from geometry.errors import InputError, did_you_mean
 from geometry.files.content import LENGTH_UNITS, length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import LARGEST_SEED, Spectrum
 from multiscale.scene.height_map import HeightsOfArray
 from multiscale.scene.quantities import Angle, Length, Pressure, Slope, SpectralAmplitude
+from support.errors import InputError, did_you_mean
 
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""

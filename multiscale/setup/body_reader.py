@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from geometry import InputError, Material
-from geometry.collective import on_root
 from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.scene.body_sections import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies, SceneBody
+from support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody, TaggedMesh

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, overload
 
-from geometry.errors import InputError
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import parsed
+from support.errors import InputError
 
 MOST_CASES = 1_000_000
 """Most cases of a sweep; a longer list is a slip of the pen, and would fill the memory."""

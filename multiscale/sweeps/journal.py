@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from geometry.checked_store import START, Record, append, end_of, unsealed
-from geometry.errors import InputError
-from geometry.whole_files import written
 from multiscale.scene.identity import changes, told
+from support.checked_store import START, Record, append, end_of, unsealed
+from support.errors import InputError
+from support.whole_files import written
 
 _SUFFIX = ".cases"
 

@@ -7,8 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from geometry.collective import on_root, together
-from geometry.errors import InputError, NotConverged
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.history import COLUMNS
 from multiscale.run import Run
@@ -18,6 +16,8 @@ from multiscale.sweeps.cases import Case, SweepCases, sweep_cases
 from multiscale.sweeps.journal import CaseResult, Journal
 from multiscale.sweeps.sweep_results import SweepResults
 from multiscale.sweeps.tasks import TaskCounter
+from support.collective import on_root, together
+from support.errors import InputError, NotConverged
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a sweep."""

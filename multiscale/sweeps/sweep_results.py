@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
-from geometry.packages import optional_packages
 from multiscale.results.history import COLUMNS, data_frame
 from multiscale.sweeps.cases import SweepCases
 from multiscale.sweeps.journal import CaseResult
@@ -26,6 +24,8 @@ from multiscale.sweeps.statistics import (
     column_statistics,
     numbers_of,
 )
+from support.errors import InputError
+from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 

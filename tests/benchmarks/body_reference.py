@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from l_shape import Reference, reach, scene, write_foot
+from helpers.l_shape import Reference, reach, scene, write_foot
 
 from geometry.face_frame import UPWARD
 from macro import compat, contact_facets, nodal_contact

@@ -26,7 +26,7 @@ from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from machine_parts import STEEL, Part, part_body, read_part
+from helpers.machine_parts import STEEL, Part, part_body, read_part
 
 from geometry import PatchGrid
 from geometry.rigid_plane import Control

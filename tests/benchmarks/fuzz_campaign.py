@@ -17,18 +17,20 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "unit" / name) for name in ("geometry", "macro", "multiscale")]
+sys.path.insert(0, str(ROOT / "tests"))
 
-import command_words  # noqa: E402
-import compared_inputs  # noqa: E402
-import height_files  # noqa: E402
-import map_round_trips  # noqa: E402
-import mesh_files  # noqa: E402
-import misspellings  # noqa: E402
-import mutated_scenes  # noqa: E402
-import scene_inputs  # noqa: E402
-import shell_lines  # noqa: E402
-import stored_inputs  # noqa: E402
+from helpers import (  # noqa: E402
+    command_words,
+    compared_inputs,
+    height_files,
+    map_round_trips,
+    mesh_files,
+    misspellings,
+    mutated_scenes,
+    scene_inputs,
+    shell_lines,
+    stored_inputs,
+)
 
 from geometry.meshes.gmsh_file import read_gmsh_file  # noqa: E402
 

@@ -7,9 +7,9 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "parallel")]
+sys.path.insert(0, str(ROOT / "tests"))
 
-from killed_runs import COMMANDS, SCENES, Runs, campaign, command_campaign  # noqa: E402
+from helpers.killed_runs import COMMANDS, SCENES, Runs, campaign, command_campaign  # noqa: E402
 
 
 def main():
@@ -19,7 +19,7 @@ def main():
     parser.add_argument("--seed", type=int, default=0)
     choice = parser.parse_args()
     os.environ["PATCHLAW_CACHE"] = "off"
-    from mpi_environment import MPI_ENVIRONMENT
+    from helpers.mpi_environment import MPI_ENVIRONMENT
 
     runs = Runs(ROOT, MPI_ENVIRONMENT)
     for scene in SCENES:

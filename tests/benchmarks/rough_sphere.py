@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in ("", "verification")]
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from rough_sphere_oracle import gaussian, rough_sphere  # noqa: E402
-from test_rough_sphere import forces_on_strips  # noqa: E402
+from helpers.rough_sphere_oracle import gaussian, rough_sphere
+from test_rough_sphere import forces_on_strips
 
 HEIGHTS = gaussian()
 MESHES = (15, 25, 35)

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from random_scenes import drawn
-from scene_invariants import checks
+from helpers.random_scenes import drawn
+from helpers.scene_invariants import checks
 
 from geometry import InputError, NotConverged
 

@@ -9,7 +9,7 @@ from itertools import groupby
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("geometry", "micro", "macro", "multiscale")
+PACKAGES = ("support", "geometry", "micro", "macro", "multiscale")
 CODES = {"InputError": 2, "NotConverged": 3, "Stopped": 4, "NotWritten": 5, "OutOfMemory": 5}
 PROBLEMS = ("problem", "text", "message")  # names that the texts of errors are bound to
 GAP = "…"  # stands for what depends on the case

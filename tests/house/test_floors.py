@@ -10,18 +10,24 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 BELOW = {
-    "geometry": set(),
-    "micro": {"geometry"},
-    "macro": {"geometry"},
-    "multiscale": {"geometry", "micro", "macro"},
+    "support": set(),
+    "geometry": {"support"},
+    "micro": {"support", "geometry"},
+    "macro": {"support", "geometry"},
+    "multiscale": {"support", "geometry", "micro", "macro"},
 }
 FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
+    "support": [
+        "cores errors small_caches",
+        "checks collective packages whole_files",
+        "checked_store",
+    ],
     "geometry": [
-        "blocked_spline cores errors legendre_modes slope_search small_caches",
-        "checks collective interpolant materials missing packages regions whole_files",
-        "checked_store face_frame filters spectrum surface",
+        "blocked_spline legendre_modes slope_search",
+        "interpolant materials missing regions",
+        "face_frame filters spectrum surface",
         "mirroring patches statistics summits synthesis zero",
         "plausibility",
         "facing preparation rigid_plane",
@@ -62,6 +68,7 @@ FLOORS = {
     ],
 }
 HEAVY = {
+    "support": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
     "geometry": FINITE_ELEMENTS | {"h5py", "matplotlib", "pydantic"},
     "micro": FINITE_ELEMENTS | {"gmsh", "h5py", "matplotlib", "pydantic"},
     "macro": {"gmsh", "h5py", "matplotlib", "pydantic"},

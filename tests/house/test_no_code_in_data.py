@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 MODULES = [
     path
-    for package in ("geometry", "micro", "macro", "multiscale")
+    for package in ("support", "geometry", "micro", "macro", "multiscale")
     for path in sorted((ROOT / package).rglob("*.py"))
 ]
 RUNS_TEXT = {"eval", "exec", "compile", "__import__"}

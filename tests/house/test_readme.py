@@ -102,7 +102,7 @@ def test_every_name_in_the_floor_plan_is_a_folder_or_a_module():
         for name in named[2].split(" · "):
             place = ROOT / package / name.strip()
             assert place.is_dir() or place.with_suffix(".py").is_file(), name
-    assert packages == ["multiscale/", "micro/", "macro/", "geometry/"]
+    assert packages == ["multiscale/", "micro/", "macro/", "geometry/", "support/"]
 
 
 def test_every_folder_is_in_the_floor_plan():
@@ -117,6 +117,6 @@ def test_packages_are_found():
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     wanted = settings["tool"]["setuptools"]["packages"]["find"]["include"]
     found = find_packages(str(ROOT), include=wanted)
-    made = {path.parent for name in ("geometry", "micro", "macro", "multiscale")
+    made = {path.parent for name in ("support", "geometry", "micro", "macro", "multiscale")
             for path in (ROOT / name).rglob("__init__.py")}  # fmt: skip
     assert {ROOT / name.replace(".", "/") for name in found} == made

@@ -15,7 +15,7 @@ import pytest
 pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("geometry", "macro", "micro", "multiscale")
+PACKAGES = ("geometry", "macro", "micro", "multiscale", "support")
 CONTACTS = """
 import sys
 from micro import MODEL_NAMES, micro_model
@@ -27,8 +27,8 @@ for name in MODEL_NAMES:
     print(micro_model(name, surface, contact_modulus=4000.0).respond([2e-3]).force[0])
 """
 EVERY_MODULE = """
-import importlib, pkgutil, geometry, micro
-for package in (geometry, micro):
+import importlib, pkgutil, geometry, micro, support
+for package in (geometry, micro, support):
     for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
         importlib.import_module(module.name)
 """
@@ -117,7 +117,7 @@ def test_contacts_are_those_of_the_repository(bare):
     assert there == pytest.approx(here, rel=1e-10)
 
 
-def test_every_module_of_geometry_and_micro_is_imported(bare):
+def test_every_module_of_geometry_micro_and_support_is_imported(bare):
     call(bare / "bin" / "python", "-c", EVERY_MODULE, cwd=bare)
 
 
@@ -140,9 +140,7 @@ def test_what_is_missing_is_named(bare, code, missing, remedy):
     line = f"import patchlaw, multiscale; from geometry.meshes.gmsh_session import *; {code}"
     done = call(bare / "bin" / "python", "-c", line, cwd=bare, check=False)
     last = done.stderr.splitlines()[-1]
-    assert last.startswith(
-        f"geometry.errors.NotInstalled: {missing} is not installed, and {remedy}"
-    )
+    assert last.startswith(f"support.errors.NotInstalled: {missing} is not installed, and {remedy}")
 
 
 def test_the_command_names_what_is_missing(bare):

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-from geometry.errors import InputError, NotConverged
 from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, block_mesh
+from support.errors import InputError, NotConverged
 
 COMM = MPI.COMM_WORLD
 SHAPES = {

@@ -9,8 +9,7 @@ import petsc4py
 petsc4py.init(["direct", *sys.argv[1:]])
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mpi4py import MPI  # noqa: E402
-from user_problems import (  # noqa: E402
+from helpers.user_problems import (  # noqa: E402
     BOTTOM,
     HEXAHEDRA,
     PATCHES,
@@ -20,6 +19,7 @@ from user_problems import (  # noqa: E402
     box,
     marked,
 )
+from mpi4py import MPI  # noqa: E402
 
 from geometry.face_frame import UPWARD  # noqa: E402
 from geometry.meshes.block import BlockShape  # noqa: E402

@@ -10,11 +10,11 @@ from itertools import count
 
 from mpi4py import MPI
 
-from geometry.errors import NotConverged
 from multiscale.cli import main
 from multiscale.couplings import assembly
 from multiscale.couplings.condensed import CondensedCoupling
 from multiscale.planning import set_up
+from support.errors import NotConverged
 
 command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function

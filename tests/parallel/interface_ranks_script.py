@@ -11,9 +11,18 @@ from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from user_problems import HEXAHEDRA, LAWS, PATCHES, TETRAHEDRA, TOP, box, clamped, elastic, marked
+from helpers.user_problems import (
+    HEXAHEDRA,
+    LAWS,
+    PATCHES,
+    TETRAHEDRA,
+    TOP,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
 
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.rigid_plane import Control, RigidPlane
 from macro import (
@@ -26,6 +35,7 @@ from macro import (
     block_mesh,
     compat,
 )
+from support.errors import InputError
 
 COMM = MPI.COMM_WORLD
 CONTROLS = {

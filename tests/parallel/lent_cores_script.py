@@ -9,9 +9,9 @@ os.environ["OMP_NUM_THREADS"] = sys.argv[1]
 from mpi4py import MPI
 
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
-from geometry.cores import cores
 from micro import micro_model
 from multiscale.couplings.contact import ContactCoupling
+from support.cores import cores
 
 COMM = MPI.COMM_WORLD
 

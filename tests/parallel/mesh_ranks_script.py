@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "macro"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mesh_facts import cells_of, faces_of, measures_of
+from helpers.mesh_facts import cells_of, faces_of, measures_of
 
 from geometry import BlockShape, PatchGrid
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat

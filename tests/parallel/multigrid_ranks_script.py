@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from machine_parts import Part, part_body, read_part
+from helpers.machine_parts import Part, part_body, read_part
 
 from geometry import BlockShape, RefinedShape
 from macro import Block, Material, block_mesh

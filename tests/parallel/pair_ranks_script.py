@@ -11,7 +11,7 @@ from geometry.rigid_plane import Control
 from macro import BodyPair, FacePair, LawContactProblem, Material
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from body_meshes import box, hanging, standing
+from helpers.body_meshes import box, hanging, standing
 
 COMM = MPI.COMM_WORLD
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from l_shape import LENGTHS, SPECTRUM, Reference
+from helpers.l_shape import LENGTHS, SPECTRUM, Reference
 
 from geometry import Spectrum, synthesise
 

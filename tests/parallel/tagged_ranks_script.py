@@ -11,12 +11,10 @@ from dolfinx import io
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "macro"))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from mesh_files import tagged_box, write_boxes, write_msh2
+from helpers.mesh_files import tagged_box, write_boxes, write_msh2
 
-from geometry.collective import on_root
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.checks import check_cells
 from macro.mesh.from_file import read_mesh
@@ -25,6 +23,8 @@ from macro.mesh.planar_face import planar_face
 from macro.mesh.supports import free_motions
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.to_file import write_mesh
+from support.collective import on_root
+from support.errors import InputError
 
 COMM = MPI.COMM_WORLD
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -8,8 +8,8 @@ import sys
 import time
 
 import pytest
-from killed_runs import largest_difference, members
-from mpi_environment import MPI_ENVIRONMENT
+from helpers.killed_runs import largest_difference, members
+from helpers.mpi_environment import MPI_ENVIRONMENT
 
 SCRIPT = "tests/parallel/fault_script.py"
 WORDS = (

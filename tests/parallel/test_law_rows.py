@@ -1,7 +1,7 @@
 """The contact problems that laws are made of are shared by the ranks."""
 
 import pytest
-from on_ranks import RANKS, OnRanks
+from helpers.on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")

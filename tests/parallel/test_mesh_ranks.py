@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from on_ranks import OnRanks
+from helpers.on_ranks import OnRanks
 from scipy import ndimage
 
 CASES = {  # volume, bottom, sides; areas of the top and the patches follow

@@ -1,7 +1,7 @@
 """The solvers of blocks are the same methods on 1, 2 and 3 ranks."""
 
 import pytest
-from on_ranks import RANKS, OnRanks
+from helpers.on_ranks import RANKS, OnRanks
 
 pytestmark = pytest.mark.long
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from on_ranks import RANKS, OnRanks
+from helpers.on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from on_ranks import RANKS
+from helpers.on_ranks import RANKS
 
 from multiscale.cli import main
 from multiscale.results.contact_record import SPOT_COLUMNS

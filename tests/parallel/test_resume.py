@@ -1,8 +1,8 @@
 """Runs that are killed go on as if nothing had happened, on any number of ranks."""
 
 import pytest
-from killed_runs import Runs, campaign
-from mpi_environment import MPI_ENVIRONMENT
+from helpers.killed_runs import Runs, campaign
+from helpers.mpi_environment import MPI_ENVIRONMENT
 
 
 @pytest.mark.long

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from on_ranks import OnRanks
+from helpers.on_ranks import OnRanks
 
 
 @pytest.mark.long

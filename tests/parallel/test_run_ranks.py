@@ -6,7 +6,7 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
-from on_ranks import RANKS
+from helpers.on_ranks import RANKS
 
 from multiscale.cli import main
 from multiscale.results.contact_record import SPOT_COLUMNS

@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from box_msh import write_box
+from helpers.box_msh import write_box
 
 from geometry import BlockShape
 

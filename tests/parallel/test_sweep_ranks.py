@@ -3,11 +3,11 @@
 import csv
 
 import pytest
-from on_ranks import RANKS
-from small_scene import SMALL_SCENE
+from helpers.on_ranks import RANKS
+from helpers.small_scene import SMALL_SCENE
 
-from geometry.checked_store import unsealed
 from multiscale.cli import main
+from support.checked_store import unsealed
 
 CHEAP = ("--set", "coupling.kind=analytic", "output.check=none", "load.steps=2")
 """Cases do not know their sweep: what they solve does not matter here."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from on_ranks import OnRanks
+from helpers.on_ranks import OnRanks
 
 CASES = ("2.2", "4.1", "written", "xdmf")
 MORE = [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 4))]

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 from petsc4py import PETSc
 from scipy.optimize import brentq
 

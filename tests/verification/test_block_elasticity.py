@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import ufl
-from block_cases import block_of, interface_of
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.block_cases import block_of, interface_of
 
 from macro import Material, compat
 from macro.elasticity import stiffness_form, stress

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from block_cases import PowerLaw, block_of, interface_of, uneven_laws
+from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 from petsc4py import PETSc
 from scipy.optimize import brentq, root
 
-from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, LoadedFace
+from support.errors import NotConverged
 
 MODES = ["patchwise", "pointwise"]
 HALF = 0.5 * np.sqrt(2.0)

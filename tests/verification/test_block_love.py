@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from block_cases import block_of, interface_of
+from helpers.block_cases import block_of, interface_of
 
 from micro.closed_forms.love import love_mutual
 

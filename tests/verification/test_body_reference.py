@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
+from helpers.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
 
 from geometry import Spectrum, synthesise
 from multiscale import run

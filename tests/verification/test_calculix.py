@@ -9,11 +9,11 @@ tolerances of its Newton iteration.
 
 import tomllib
 
-import calculix
 import numpy as np
 import pytest
-from block_cases import block_of
-from small_scene import SMALL_SCENE
+from helpers import calculix
+from helpers.block_cases import block_of
+from helpers.small_scene import SMALL_SCENE
 
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, LoadedFace

@@ -4,9 +4,9 @@ import os
 import re
 import subprocess
 
-import calculix
 import numpy as np
 import pytest
+from helpers import calculix
 
 from geometry import PatchGrid
 from multiscale.exports.export import export_laws

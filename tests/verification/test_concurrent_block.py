@@ -5,7 +5,7 @@ Pancakes are stiffer than the half-space, columns softer.
 
 import numpy as np
 import pytest
-from reference_cases import on_block
+from helpers.reference_cases import on_block
 
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.rigid_plane import Control

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from concurrent_cases import CELLS, coupling, dense_forces
+from helpers.concurrent_cases import CELLS, coupling, dense_forces
 
 from geometry.rigid_plane import Control
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from box_msh import write_box
+from helpers.box_msh import write_box
 
 from multiscale import Scene
 from multiscale.run import Run

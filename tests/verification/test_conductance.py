@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from geometry import Control, Spectrum, Surface, synthesise
-from geometry.errors import InputError
 from micro import HalfSpaceModel
 from micro.conductance import (
     conductance_per_area,
@@ -13,6 +12,7 @@ from micro.conductance import (
     radiation_conductance,
     total_conductance,
 )
+from support.errors import InputError
 
 MODULUS = 3000.0
 

@@ -6,7 +6,7 @@ is 2 E* r δ on a half-space; a block as high as it is wide does not change that
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, history, scene
+from helpers.hard_cases import KINDS, history, scene
 
 from geometry import PatchGrid, patch_means
 from micro import MODEL_NAMES

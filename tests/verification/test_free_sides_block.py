@@ -6,9 +6,9 @@ force of a ball that a side cuts in half.
 
 import numpy as np
 import pytest
-from boussinesq import displacements
-from free_side_points import side_displacements
-from reference_cases import COMM, MATERIAL, MODULUS, on_block
+from helpers.boussinesq import displacements
+from helpers.free_side_points import side_displacements
+from helpers.reference_cases import COMM, MATERIAL, MODULUS, on_block
 from scipy.interpolate import RectBivariateSpline
 
 from geometry import (

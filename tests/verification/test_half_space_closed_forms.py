@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from half_space_cases import wave
+from helpers.half_space_cases import wave
 from scipy.integrate import trapezoid
 
 from geometry import Spectrum, Surface, synthesise

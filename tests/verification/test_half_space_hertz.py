@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from half_space_cases import paraboloid
+from helpers.half_space_cases import paraboloid
 
 from micro import HalfSpaceModel, HertzContact
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from block_cases import block_of
-from hard_cases import coarse_tables, history, scene
+from helpers.block_cases import block_of
+from helpers.hard_cases import coarse_tables, history, scene
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, Surface

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from interaction_cases import E_STAR, summits
+from helpers.interaction_cases import E_STAR, summits
 from scipy.optimize import brentq
 
 from micro import MODELS, AsperityModel

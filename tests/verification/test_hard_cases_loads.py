@@ -6,11 +6,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
+from helpers.hard_cases import KINDS, centred, coarse_tables, from_file, history, scene
 from scipy.optimize import brentq
 
 from geometry import Material
-from geometry.errors import NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
@@ -18,6 +17,7 @@ from multiscale.couplings.condensed import equilibrium
 from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from multiscale.laws.rows import LawRows
 from multiscale.run import Run
+from support.errors import NotConverged
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
 

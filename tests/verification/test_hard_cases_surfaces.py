@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from hard_cases import centred, from_file, history, scene
+from helpers.hard_cases import centred, from_file, history, scene
 
-from geometry.errors import InputError
 from geometry.files.reading import read_surface
 from geometry.missing import filled
 from multiscale import make_setup, run
 from multiscale.planning.plan import statements, warnings
+from support.errors import InputError
 
 X, Y = centred(32)
 DOME = -(X**2 + Y**2) / 0.8

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from interaction_cases import E_STAR, PATCHES, summits
+from helpers.interaction_cases import E_STAR, PATCHES, summits
 
 from micro import AsperityModel
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from asperity_states import displacement, surface_displacement
-from interaction_cases import E_STAR, PATCHES, set_1
+from helpers.asperity_states import displacement, surface_displacement
+from helpers.interaction_cases import E_STAR, PATCHES, set_1
 
 from geometry import PatchGrid
 from micro import MODELS, SOLVERS, AsperityModel

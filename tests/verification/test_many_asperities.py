@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from asperity_states import displacement, interference
-from interaction_cases import E_STAR
+from helpers.asperity_states import displacement, interference
+from helpers.interaction_cases import E_STAR
 
 from geometry import Asperities
 from micro import AsperityModel, HertzContact

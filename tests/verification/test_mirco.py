@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from random_midpoint import random_midpoint
+from helpers.random_midpoint import random_midpoint
 
 from geometry import Surface
 from micro import HalfSpaceModel

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from interaction_cases import E_STAR, PATCHES, set_1
+from helpers.interaction_cases import E_STAR, PATCHES, set_1
 
 from micro import MODELS, AsperityModel
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from random_scenes import KINDS, drawn
-from scene_invariants import Found, checks
+from helpers.random_scenes import KINDS, drawn
+from helpers.scene_invariants import Found, checks
 
 SEEDS = (3, 12, 42, 56, 74, 126)
 

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from reference_cases import (
+from helpers.reference_cases import (
     MODULUS,
     body,
     ellipsoid,

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
+from helpers.reference_cases import COMM, MATERIAL, MODULUS, body, give, on_block, pressed
 
 from geometry import BlockShape, Control, PatchGrid, RefinedShape, Surface
 from macro import Block, UnilateralContactProblem, rough_block_mesh

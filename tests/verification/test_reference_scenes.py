@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from reference_cases import COMM, ellipsoid
+from helpers.reference_cases import COMM, ellipsoid
 
 from geometry import Control, Spectrum, reference_shapes, synthesise
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from reference_cases import COMM, MATERIAL, on_block
+from helpers.reference_cases import COMM, MATERIAL, on_block
 
 from geometry import (
     Control,

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from block_cases import block_of, interface_of
-from half_space_cases import wave
+from helpers.block_cases import block_of, interface_of
+from helpers.half_space_cases import wave
 from scipy.integrate import quad
 from scipy.optimize import brentq
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers.reference_cases import on_block
+from helpers.slope_effect import slope_effect
 from mpi4py import MPI
-from reference_cases import on_block
-from slope_effect import slope_effect
 
 from geometry import (
     BlockShape,

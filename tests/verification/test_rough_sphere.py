@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from block_cases import block_of
-from rough_sphere_oracle import EXPONENTIAL, gaussian, moment, rough_sphere
+from helpers.block_cases import block_of
+from helpers.rough_sphere_oracle import EXPONENTIAL, gaussian, moment, rough_sphere
 from scipy.integrate import quad
 
 from geometry import Control, PatchGrid

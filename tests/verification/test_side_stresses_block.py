@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
-from love_stresses import love_stresses
-from reference_cases import COMM
+from helpers.love_stresses import love_stresses
+from helpers.reference_cases import COMM
 from scipy.interpolate import RectBivariateSpline
 
 from geometry import RefinedShape

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bump_oracle import cosine_bump, slope_effect
+from helpers.bump_oracle import cosine_bump, slope_effect
 from mpi4py import MPI
 
 from geometry import RefinedShape, Surface, places_in_reach, roughness

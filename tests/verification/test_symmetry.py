@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hard_cases import KINDS, coarse_tables, from_file, history
+from helpers.hard_cases import KINDS, coarse_tables, from_file, history
 
 from geometry import Spectrum, synthesise
 

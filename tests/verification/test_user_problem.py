@@ -7,11 +7,8 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
-from petsc4py import PETSc
-from scipy.optimize import brentq
-from small_scene import SMALL_SCENE
-from user_problems import (
+from helpers.small_scene import SMALL_SCENE
+from helpers.user_problems import (
     BOTTOM,
     HEXAHEDRA,
     LAWS,
@@ -24,6 +21,9 @@ from user_problems import (
     elastic,
     marked,
 )
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.optimize import brentq
 
 from geometry.face_frame import FaceFrame
 from geometry.meshes.block import BlockShape

@@ -4,12 +4,12 @@ import re
 
 import numpy as np
 import pytest
-from map_round_trips import came_back, damage_was_told
+from helpers.map_round_trips import came_back, damage_was_told
 
 from geometry import InputError, Spectrum, Surface, read_surface, synthesise
-from geometry.checks import real_array
 from geometry.files.reading import surface_of
 from geometry.filters import spikes
+from support.checks import real_array
 
 
 @pytest.mark.parametrize("seed", range(120))

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from geometry.face_frame import FaceFrame
+from support.errors import InputError
 
 ANGLE = np.pi / 6.0
 

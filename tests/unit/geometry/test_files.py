@@ -3,7 +3,7 @@ import pickle
 
 import numpy as np
 import pytest
-from height_files import Bomb, header
+from helpers.height_files import Bomb, header
 
 from geometry import InputError, read_surface
 

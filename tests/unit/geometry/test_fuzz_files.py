@@ -2,7 +2,7 @@
 
 import warnings
 
-from height_files import anything, read, sides
+from helpers.height_files import anything, read, sides
 from hypothesis import HealthCheck, given, settings
 
 

@@ -1,8 +1,8 @@
 import sys
 
-import instrument_files as files
 import numpy as np
 import pytest
+from helpers import instrument_files as files
 
 from geometry import InputError, read_surface
 

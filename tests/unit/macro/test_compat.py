@@ -8,8 +8,8 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from geometry.errors import InputError
 from macro import compat
+from support.errors import InputError
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])

@@ -7,8 +7,8 @@ import time
 
 import pytest
 
-from geometry.errors import InputError
 from macro import form_cache as jit
+from support.errors import InputError
 
 
 def age(path, seconds):

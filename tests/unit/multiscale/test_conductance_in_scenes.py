@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from micro import HalfSpaceModel
 from micro.conductance import STEFAN_BOLTZMANN
 from multiscale import Run, Scene, make_setup, run
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
+from support.errors import InputError
 
 HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}
 PAIR = 1.0 / (1.0 / 50.0 + 1.0 / 0.2)

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from geometry.errors import InputError
 from multiscale import compiled_forms, doctor
 from multiscale.cli.command_line import main
 from multiscale.cli.doctor import show
 from multiscale.doctor import CheckResult, examine, refuse_failures
+from support.errors import InputError
 
 OPEN_MPI = "Open MPI v4.1.4"
 

@@ -6,7 +6,6 @@ import h5py
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup, run, sweep
 from multiscale.couplings.fields import FieldRecord
@@ -15,6 +14,7 @@ from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
 from multiscale.storage import verified
+from support.errors import InputError
 
 HARDNESS = 300.0
 UP_AND_DOWN = {"approach": [0.008, 0.004], "steps": 2}

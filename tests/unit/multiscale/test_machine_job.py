@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from geometry.errors import InputError
 from multiscale.cli.command_line import main
 from multiscale.machine import detached_processes, refuse_detached_processes
+from support.errors import InputError
 
 PAPER = "demos/scenes/paper.toml"
 

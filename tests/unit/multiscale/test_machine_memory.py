@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.machine import (
@@ -22,6 +21,7 @@ from multiscale.machine import (
 )
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.setup.memory import body_request, check_memory, memory_requests
+from support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
 LARGE = ("block.cells=[500, 500, 200]",)  # 5·10⁷ cells, 250 GB

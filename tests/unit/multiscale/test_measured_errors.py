@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import NotConverged
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
 from multiscale.couplings.contact import on_body
@@ -18,6 +17,7 @@ from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
 from multiscale.readable import quantity, with_error
 from multiscale.restart.checkpoint import checkpoint_of
+from support.errors import NotConverged
 
 
 def scene(kind="analytic", grid=40, *, check="last", load=None, seed=4, **micro):

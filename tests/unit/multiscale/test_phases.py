@@ -5,7 +5,7 @@ import time
 from types import ModuleType
 
 import pytest
-from scene_inputs import BASE
+from helpers.scene_inputs import BASE
 
 from multiscale.output.provenance import LIBRARIES, provenance
 from multiscale.run import Run

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_scene import SMALL_SCENE
+from helpers.small_scene import SMALL_SCENE
 
 from geometry import InputError, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from geometry import InputError
-from geometry.errors import NotConverged
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, run
 from multiscale.output.results import write_results
+from support.errors import NotConverged
 
 BLOCK = {"young_modulus": 4000.0, "poisson_ratio": 0.27}
 

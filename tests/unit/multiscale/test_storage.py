@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale.storage import checksum, checksummed, verified
+from support.errors import InputError
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def test_damage_costs_no_memory(tmp_path):
     """A length field of an attribute, damaged, had HDF5 allocate gigabytes."""
     code = (
         "import resource, sys; from pathlib import Path\n"
-        "from geometry.errors import InputError\n"
+        "from support.errors import InputError\n"
         "from multiscale.laws.law_file import read_laws\n"
         "from multiscale.storage import checksummed\n"
         "from multiscale.laws.law_file import read_laws\n"

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import NotWritten
 from geometry.patches import PatchGrid
-from geometry.whole_files import write_whole
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.output.results import write_tables
 from multiscale.output.terminal import show_history
 from multiscale.results.history import PATCH_COLUMNS, History
 from multiscale.storage import write_csv, write_text
+from support.errors import NotWritten
+from support.whole_files import write_whole
 
 
 @pytest.fixture

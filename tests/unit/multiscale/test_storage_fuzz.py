@@ -5,15 +5,15 @@ import os
 import h5py
 import numpy as np
 import pytest
+from helpers.scene_inputs import BASE
+from helpers.stored_inputs import READERS, flipped, originals, read, rewritten
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_inputs import BASE
-from stored_inputs import READERS, flipped, originals, read, rewritten
 
-from geometry.errors import InputError
 from multiscale.laws.law_file import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
 from multiscale.storage import checksum
+from support.errors import InputError
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mesh_files import gmsh_boxes, write_boxes, write_msh2
+from helpers.mesh_files import gmsh_boxes, write_boxes, write_msh2
 
-from geometry.errors import InputError
 from geometry.meshes.gmsh_file import read_gmsh_file
 from geometry.meshes.gmsh_session import gmsh_session
+from support.errors import InputError
 
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)
 SQUARES = [0, 1, 3, 2, 4, 5, 7, 6]  # around the lower, then the upper square, as gmsh counts

@@ -7,9 +7,9 @@ import pytest
 from mpi4py import MPI
 
 from geometry import PatchGrid
-from geometry.checked_store import Record, read_record, sealed
 from macro.compliance import cache as compliance_cache
 from macro.compliance.cache import cache_directory, cached, is_cached
+from support.checked_store import Record, read_record, sealed
 
 
 @pytest.fixture

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from geometry.materials import Material
 from macro.compliance.elements import levels
 from macro.compliance.face_compliance import face_compliance
+from support.errors import InputError
 
 SOFT = Material(young_modulus=1.0, poisson_ratio=0.3)
 

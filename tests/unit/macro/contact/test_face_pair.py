@@ -4,14 +4,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from body_meshes import HIGH, box, hanging, standing
+from helpers.body_meshes import HIGH, box, hanging, standing
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, Material, MeshedBody, Support, Traction
 from macro.body_pair import BodyPair
 from macro.contact.face_pair import FacePair
+from support.errors import InputError
 
 SOFT = Material(young_modulus=2000.0, poisson_ratio=0.3)
 HARD = Material(young_modulus=4000.0, poisson_ratio=0.3)

@@ -10,16 +10,26 @@ import pytest
 import ufl
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.user_problems import (
+    BOTTOM,
+    LAWS,
+    PATCHES,
+    TOP,
+    PowerLaw,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
 from mpi4py import MPI
 from petsc4py import PETSc
-from user_problems import BOTTOM, LAWS, PATCHES, TOP, PowerLaw, box, clamped, elastic, marked
 
-from geometry.errors import InputError, NotConverged
 from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import ContactProblem, Interface, LawOperator, LawsAtPoints, TaggedMesh, compat
 from macro.contact import law_operator
+from support.errors import InputError, NotConverged
 
 try:  # before any form is made, for UFL numbers its types when they are imported
     import dolfinx_external_operator as package

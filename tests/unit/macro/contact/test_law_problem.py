@@ -9,12 +9,12 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from geometry.errors import InputError, NotConverged
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, LawContactProblem, LoadedFace, Material, block_mesh, compat, write_fields
 from macro.contact.newton import DisplacementBasis
+from support.errors import InputError, NotConverged
 
 
 @dataclass

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
+from support.errors import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
 

@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
+from helpers.user_problems import (
+    BOTTOM,
+    LAWS,
+    PATCHES,
+    TOP,
+    PowerLaw,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
 from petsc4py import PETSc
-from user_problems import BOTTOM, LAWS, PATCHES, TOP, PowerLaw, box, clamped, elastic, marked
 
-from geometry.errors import InputError, NotConverged
 from geometry.rigid_plane import Control, RigidPlane
 from macro import ContactProblem, Interface, compat, contact_facets
+from support.errors import InputError, NotConverged
 
 LAW, PLANE = PowerLaw(3e3), RigidPlane(approach=6e-3)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from machine_parts import Part, part_body, read_part
+from helpers.machine_parts import Part, part_body, read_part
 from mpi4py import MPI
 from petsc4py import PETSc
 

@@ -6,9 +6,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry import BlockShape
-from geometry.errors import NotConverged
 from macro import Block, Material, block_mesh
 from macro.linear_solvers.options import DIRECT_DEFAULTS, default_options, set_up, solve_linear
+from support.errors import NotConverged
 
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 5, 4), element="Q2")
 INCOMPRESSIBLE = Material(young_modulus=4000.0, poisson_ratio=0.4999)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from body_meshes import box, standing
+from helpers.body_meshes import box, standing
 from petsc4py import PETSc
 
 from geometry.patches import PatchGrid

@@ -6,10 +6,10 @@ from dolfinx import fem
 from dolfinx import mesh as dmesh
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
 from macro import BOTTOM, SIDES, TOP, Block, Material, block_mesh, compat
+from support.errors import InputError
 
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])

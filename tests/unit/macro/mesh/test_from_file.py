@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from dolfinx import io
 from dolfinx import mesh as dmesh
-from mesh_files import SIDES, tagged_box, write_boxes, write_msh2
+from helpers.mesh_files import SIDES, tagged_box, write_boxes, write_msh2
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.to_file import write_mesh
+from support.errors import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

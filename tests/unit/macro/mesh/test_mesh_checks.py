@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
-from mesh_files import tagged_box
+from helpers.mesh_files import tagged_box
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.checks import check_cells, check_connected, size_note
 from macro.mesh.neighbours import parts
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 COMM = MPI.COMM_SELF
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from dolfinx import mesh as dmesh
-from mesh_files import SIDES, tagged_box
+from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)

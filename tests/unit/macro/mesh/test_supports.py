@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mesh_files import SIDES, tagged_box
+from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
 from scipy.sparse import csr_array
 
-from geometry.errors import InputError
 from macro import compat
 from macro.mesh.supports import check_supports, check_tractions, free_motions
+from support.errors import InputError
 
 COMM = MPI.COMM_SELF
 LENGTHS = (2.0, 3.0, 0.5)

@@ -1,11 +1,11 @@
 """Tags of surfaces and volumes by name and number."""
 
 import pytest
-from mesh_files import tagged_box
+from helpers.mesh_files import tagged_box
 from mpi4py import MPI
 
-from geometry.errors import InputError
 from macro.mesh.tagged import TaggedMesh
+from support.errors import InputError
 
 
 @pytest.fixture(scope="module")

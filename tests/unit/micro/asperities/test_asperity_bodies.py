@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from asperity_states import displacement, interference
+from helpers.asperity_states import displacement, interference
 from scipy.optimize import brentq
 
 from geometry import (

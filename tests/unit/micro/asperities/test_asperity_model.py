@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asperity_states import displacement, interference, surface_displacement
+from helpers.asperity_states import displacement, interference, surface_displacement
 
 from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, micro_model

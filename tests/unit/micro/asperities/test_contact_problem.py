@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asperity_states import places
+from helpers.asperity_states import places
 
 from geometry import InputError, NotConverged
 from micro.asperities import contact_problem

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asperity_states import places
+from helpers.asperity_states import places
 from scipy.special import elliprf
 
 from micro.asperities.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from boussinesq import love_integral
+from helpers.boussinesq import love_integral
 from scipy.special import roots_jacobi
 
 from geometry import PatchGrid

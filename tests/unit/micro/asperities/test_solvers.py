@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from asperity_states import places
+from helpers.asperity_states import places
 
 from geometry import NotConverged
 from micro.asperities.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step

@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from boussinesq import love_integral
+from helpers.boussinesq import love_integral
 from scipy.integrate import dblquad
 
 from micro.closed_forms.love import love_centre, love_mean, love_mutual

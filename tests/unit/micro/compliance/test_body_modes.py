@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, UnevenPartition
-from geometry.errors import InputError
 from geometry.legendre_modes import mode_values
 from micro.compliance.body_modes import BodyModes
+from support.errors import InputError
 
 LENGTHS = (1.2, 0.8)
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from free_motions import contact_problem
+from helpers.free_motions import contact_problem
 
 from geometry import Control, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from rough_half_space import displaced
+from helpers.rough_half_space import displaced
 
 from geometry import InputError, Material, Spectrum, Surface, synthesise
 from micro import FreeSides, HalfSpaceModel

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from free_side_points import side_displacements
+from helpers.free_side_points import side_displacements
 
 from geometry import Surface, UnevenPartition
-from geometry.errors import InputError
 from micro import (
     FreeSides,
     HalfSpaceModel,
@@ -18,6 +17,7 @@ from micro import (
 from micro.compliance.grid_compliance import Compliance
 from micro.compliance.half_space_grid import Cells
 from micro.compliance.side_cells import side_cells
+from support.errors import InputError
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
 GRID = (20, 30)

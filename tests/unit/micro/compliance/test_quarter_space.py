@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from boussinesq import stresses
+from helpers.boussinesq import stresses
 
 from geometry import Material, UnevenPartition
 from micro.compliance.quarter_space import side_compliance, side_traction

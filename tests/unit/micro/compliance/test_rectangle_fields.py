@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from boussinesq import stresses
+from helpers.boussinesq import stresses
 
 from geometry import Material, PatchGrid
 from geometry.legendre_modes import mode_values

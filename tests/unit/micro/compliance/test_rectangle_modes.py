@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from free_side_points import side_displacements
+from helpers.free_side_points import side_displacements
 
 from geometry import PatchGrid, UnevenPartition
 from geometry.legendre_modes import mode_means

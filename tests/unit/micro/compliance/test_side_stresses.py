@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from love_stresses import love_stresses
+from helpers.love_stresses import love_stresses
 
 from geometry import Material
 from micro import FreeSides

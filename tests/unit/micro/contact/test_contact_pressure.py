@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from free_motions import approach, contact_problem, solved
+from helpers.free_motions import approach, contact_problem, solved
 from scipy.optimize import nnls
 
 from geometry import NotConverged

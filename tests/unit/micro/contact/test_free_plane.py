@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_contact import dense_contact, matrix_of
-from free_motions import approach, contact_problem, solved, turning
+from helpers.dense_contact import dense_contact, matrix_of
+from helpers.free_motions import approach, contact_problem, solved, turning
 
 from geometry import Control, InputError, NotConverged, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel

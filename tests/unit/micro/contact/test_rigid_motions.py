@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from free_motions import approach, turning
+from helpers.free_motions import approach, turning
 
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)

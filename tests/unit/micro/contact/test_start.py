@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from free_motions import turning
+from helpers.free_motions import turning
 from scipy.optimize import linprog
 
 from micro.contact.start import clearance

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from free_motions import approach, contact_problem
+from helpers.free_motions import approach, contact_problem
 
 from geometry import Control, InputError, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel

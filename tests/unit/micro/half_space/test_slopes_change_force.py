@@ -1,7 +1,7 @@
 """Change of the force by finite slopes: homogeneity, origin of heights, free sides."""
 
 import pytest
-from slope_effect import slope_effect
+from helpers.slope_effect import slope_effect
 
 from geometry import Spectrum, Surface, synthesise
 from micro import FreeSides, HalfSpaceModel

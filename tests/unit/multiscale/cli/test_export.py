@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 import pytest
-from small_scene import SMALL_SCENE
+from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.exports import FORMATS

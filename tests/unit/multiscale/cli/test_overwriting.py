@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from small_scene import SMALL_SCENE
+from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
 from multiscale.restart.checkpoint import FILE_NAME, CheckpointWriter

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
@@ -19,6 +18,7 @@ from multiscale.comparison.process import run_here
 from multiscale.comparison.scene_content import SMALL_SLOPES
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from support.errors import InputError, NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.comparison.comparison import Comparison, Row
 from multiscale.comparison.configuration import Configuration
 from multiscale.comparison.errors import ErrorMeasures
+from support.errors import InputError
 
 PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 

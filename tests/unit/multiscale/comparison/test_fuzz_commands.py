@@ -1,9 +1,9 @@
 """Comparisons of any scenes, and command lines of any words, end in order or in one line."""
 
-from command_words import called, lines
-from compared_inputs import asked, compared
+from helpers.command_words import called, lines
+from helpers.compared_inputs import asked, compared
+from helpers.scene_inputs import BASE, toml
 from hypothesis import HealthCheck, given, settings
-from scene_inputs import BASE, toml
 
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import InputError, NotConverged
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.compare import reference_within, run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
@@ -16,6 +15,7 @@ from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.comparison.process import run_here
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
+from support.errors import InputError, NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = ["surface.grid=[32, 32]", "load.steps=2", "patches.grid=[2, 2]"]

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
 from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import contact_model
 from multiscale.couplings.patch_compliance import patch_displacements
+from support.errors import InputError
 
 
 def setup(

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from petsc4py import PETSc
 
-from geometry.errors import NotConverged
 from multiscale import Run, Scene, run
 from multiscale.couplings.assembly import newton_choice
 from multiscale.couplings.patch_compliance import patch_compliance
 from multiscale.planning.plan import statements
 from multiscale.planning.problem_setup import make_setup
+from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [

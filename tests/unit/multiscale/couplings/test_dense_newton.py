@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from multiscale.couplings.condensed import equilibrium
+from support.errors import InputError, NotConverged
 
 
 class HertzLaws:

@@ -10,13 +10,13 @@ import h5py
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale import Scene, make_setup, run
 from multiscale.cli.command_line import main
 from multiscale.figures.curves import history_figure
 from multiscale.output.figures import pressure_figure
 from multiscale.planning import plan
 from multiscale.results.reference_record import reference_record
+from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 COARSE = [

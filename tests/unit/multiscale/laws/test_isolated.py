@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
-from geometry.errors import InputError
 from micro import AsperityModel, micro_model
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.isolated import IsolatedPatch, isolated_laws
+from support.errors import InputError
 
 MODULUS = 4000.0
 TOLERANCE = 1e-4

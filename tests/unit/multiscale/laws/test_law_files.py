@@ -6,13 +6,13 @@ import h5py
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from geometry.patches import PatchGrid
 from multiscale.laws.law_file import read_laws, write_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.storage import checksum, checksummed
+from support.errors import InputError
 
 SCALARS = (
     "first_touch", "initial_separation", "interpolation_error", "stiffness_error",

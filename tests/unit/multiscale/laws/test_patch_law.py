@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, SolvedRows
+from support.errors import InputError
 
 
 def law_of(form, *, touch=1e-3, end=9e-3, rows=12, **changes):

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import LawRows, SolvedRows
+from support.errors import InputError
 
 
 def law(touch=1e-3, rows=12, own=0.0, stiffness=4e3):

@@ -4,7 +4,7 @@ import tomllib
 
 import numpy as np
 import pytest
-from small_scene import SMALL_SCENE
+from helpers.small_scene import SMALL_SCENE
 
 from multiscale import Scene, run
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from geometry.errors import NotConverged
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import BeyondLaws, LoadHistory, load_steps
+from support.errors import NotConverged
 
 
 class Spring:

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
-from geometry.collective import shared
-from geometry.cores import Place
 from geometry.rigid_plane import Control
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.loading.stepper import LoadHistory
 from multiscale.output import terminal
+from support.collective import shared
+from support.cores import Place
 
 LOADS = LoadHistory(quantity="approach", points=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)

@@ -8,7 +8,6 @@ import time
 
 import pytest
 
-from geometry.errors import InputError
 from multiscale import Run, Scene, make_setup
 from multiscale.machine import ClusterNodes
 from multiscale.output import terminal
@@ -22,6 +21,7 @@ from multiscale.planning.auto_keys import (
     resolved_sections,
 )
 from multiscale.readable import Caution
+from support.errors import InputError
 
 SPECTRUM = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.1883, "seed": 3}
 KINDS = ("open", "analytic", "concurrent", "consistent", "isolated", "reference")

@@ -7,11 +7,11 @@ import json
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale import Scene, make_setup
 from multiscale.machine import ClusterNodes
 from multiscale.planning.auto_keys import auto_keys, resolved_sections
 from multiscale.planning.plan import statements, warnings
+from support.errors import InputError
 
 
 def scene(source=None, **sections):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from box_msh import write_box
+from helpers.box_msh import write_box
 from mpi4py import MPI
 
 from geometry import BlockShape

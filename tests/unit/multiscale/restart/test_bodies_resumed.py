@@ -1,7 +1,7 @@
 """Runs on bodies from meshes that go on: with the same results, and not with another mesh."""
 
 import pytest
-from box_msh import write_box
+from helpers.box_msh import write_box
 
 from geometry import BlockShape, InputError
 from multiscale import Scene

@@ -11,8 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.checked_store import read_record, write_record
-from geometry.errors import InputError, NotConverged, NotWritten
 from multiscale import Run, Scene
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
@@ -26,6 +24,8 @@ from multiscale.restart.checkpoint import (
 )
 from multiscale.restart.results_folder import FolderLock, find_checkpoint
 from multiscale.scene.sections import MicroSection
+from support.checked_store import read_record, write_record
+from support.errors import InputError, NotConverged, NotWritten
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from geometry.errors import InputError
 from multiscale.cli.command_line import main
 from multiscale.restart.results_folder import FolderLock
+from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

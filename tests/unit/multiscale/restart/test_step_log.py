@@ -5,10 +5,10 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from geometry.checked_store import Mark
-from geometry.errors import InputError, NotWritten
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.restart.step_log import StepLog, read_steps
+from support.checked_store import Mark
+from support.errors import InputError, NotWritten
 
 
 def step(number):
@@ -94,7 +94,7 @@ def test_failed_write_leaves_the_mark(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as broken:
-        broken.setattr("geometry.checked_store.os.fsync", full)
+        broken.setattr("support.checked_store.os.fsync", full)
         with pytest.raises(NotWritten, match="log: cannot be written: No space left on device"):
             log.write(STEPS)
     assert log.mark == mark

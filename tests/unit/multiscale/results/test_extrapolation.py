@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale.results.extrapolation import extrapolated
+from support.errors import InputError
 
 LIMIT = 4.0
 RATIOS = (2.0 ** (1 / 3), 1.5, 2.0)

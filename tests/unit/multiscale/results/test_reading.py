@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from small_scene import SMALL_SCENE
+from helpers.small_scene import SMALL_SCENE
 
-from geometry.errors import InputError
 from multiscale import read_history, run
 from multiscale.cli.command_line import main
 from multiscale.results.history import COLUMNS
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 TILTED = ["load.tilt=[1e-3, 0.0]", "output.check=last"]
 

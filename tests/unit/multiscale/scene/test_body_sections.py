@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from geometry.errors import InputError
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SURFACE = {**SAMPLE, "lengths": ["1 mm", "1 mm"]}

@@ -5,15 +5,15 @@ import re
 import tomllib
 
 import pytest
+from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 
-from geometry.errors import InputError
 from multiscale.machine import ClusterNodes
 from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import MOST_BYTES, parsed
+from support.errors import InputError
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)

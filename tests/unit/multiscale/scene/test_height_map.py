@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from multiscale import compare, run
 from multiscale.scene.scene import Scene
 from multiscale.setup.surface_and_block import make_surface
+from support.errors import InputError
 
 
 def scene(heights, **surface):

@@ -1,6 +1,6 @@
 """Misspelt keys and units are refused, and the right ones offered."""
 
-import misspellings
+from helpers import misspellings
 from hypothesis import given, settings
 
 FEW = settings(max_examples=150, derandomize=True, database=None, deadline=None)

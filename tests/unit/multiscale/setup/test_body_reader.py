@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from box_msh import write_box
+from helpers.box_msh import write_box
 
-from geometry.errors import InputError
 from multiscale.scene.scene import Scene
 from multiscale.setup.body_reader import scene_bodies
+from support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
 SAMPLE |= {"lengths": ["1 mm", "1 mm"]}

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from geometry import Spectrum, facing, synthesise, turned_over
-from geometry.errors import InputError
 from multiscale import Scene, make_setup, run, sweep
 from multiscale.planning.plan import statements
 from multiscale.setup.surface_and_block import make_surfaces
+from support.errors import InputError
 
 
 def side(seed, lengths=(1.0, 1.0), periodic=False):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from geometry import InputError
-from geometry.errors import NotConverged
 from multiscale import Scene, make_setup, run
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import plane_at_largest_load
+from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 

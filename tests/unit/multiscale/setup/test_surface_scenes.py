@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.errors import InputError
 from micro import HalfSpaceModel
 from multiscale.planning.problem_setup import make_setup
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL_SLOPES = ["micro.finite_slopes=false", "load.steps=2", "output.check=none"]

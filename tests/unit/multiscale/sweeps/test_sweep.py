@@ -6,17 +6,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers.small_scene import SMALL_SCENE
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
-from small_scene import SMALL_SCENE
 
-from geometry.checked_store import START, unsealed
-from geometry.errors import InputError, NotConverged
 from multiscale import run, sweep
 from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.sweeps.cases import sweep_cases, values_from_text
+from support.checked_store import START, unsealed
+from support.errors import InputError, NotConverged
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
 VARY = {MODULUS: ["1 GPa", "4 GPa"], SEED: range(3)}

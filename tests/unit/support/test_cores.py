@@ -6,8 +6,8 @@ import threading
 import pytest
 from threadpoolctl import threadpool_info
 
-from geometry import cores as module
-from geometry.cores import Place, cores, hold_blas, in_threads, lendable, lent, own_cores, place
+from support import cores as module
+from support.cores import Place, cores, hold_blas, in_threads, lendable, lent, own_cores, place
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (

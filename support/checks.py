@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
+from support.errors import InputError
 
 SMALLEST, LARGEST = 1e-15, 1e15
 """Range of lengths whose squares and products stay within double precision [mm]."""

@@ -6,12 +6,12 @@ import h5py
 import numpy as np
 from hypothesis import strategies as st
 
-from geometry.errors import InputError
 from multiscale.laws.law_file import read_laws, write_laws
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.storage import checksum
+from support.errors import InputError
 
 ODD = (
     np.zeros(0), np.zeros(1), np.zeros((3, 3)), np.full(5, np.nan), np.full(5, 1e308), np.arange(5),

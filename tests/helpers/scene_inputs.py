@@ -8,12 +8,12 @@ import re
 import numpy as np
 from hypothesis import strategies as st
 
-from geometry.errors import InputError, NotConverged
 from multiscale.planning.plan import statements, warnings
 from multiscale.planning.problem_setup import make_setup
 from multiscale.planning.work import work_of
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from support.errors import InputError, NotConverged
 
 BASE = {
     "surface": {

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import Material, Partition
-from geometry.errors import InputError
 from micro.closed_forms.love import corner_integral
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -1,10 +1,10 @@
 """Stresses in the surface of a half-space, cell by cell, by Love's rectangle."""
 
 import numpy as np
-from boussinesq import stresses
 from scipy.signal import fftconvolve
 
 from geometry import PatchGrid
+from helpers.boussinesq import stresses
 
 
 def love_stresses(material, pressure, spacing):

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from geometry.checked_store import (
+from support.checked_store import (
     START,
     Record,
     append,
@@ -15,7 +15,7 @@ from geometry.checked_store import (
     unsealed,
     write_record,
 )
-from geometry.errors import InputError
+from support.errors import InputError
 
 
 def records(count=4):

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 from hypothesis import strategies as st
-from scene_inputs import BASE, KEYS, put, toml, value
 
-STORED = sorted((Path(__file__).parents[3] / "demos" / "scenes").glob("*.toml"))
+from helpers.scene_inputs import BASE, KEYS, put, toml, value
+
+STORED = sorted((Path(__file__).parents[2] / "demos" / "scenes").glob("*.toml"))
 SMALL = {
     "surface.grid": [24, 24],
     "patches.grid": [2, 2],

@@ -4,7 +4,7 @@ import pickle
 
 import pytest
 
-from geometry.errors import InputError, NotConverged
+from support.errors import InputError, NotConverged
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from traceback import walk_tb
 
-from geometry.errors import NotInstalled
+from support.errors import NotInstalled
 
 _SCENES = (
     "scenes, figures and files",

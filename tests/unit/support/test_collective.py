@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.collective import dealt, shared
+from support.collective import dealt, shared
 
 
 def test_equal_tasks_are_dealt_in_turn():

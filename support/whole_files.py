@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from uuid import uuid4
 
-from geometry.errors import NotWritten
+from support.errors import NotWritten
 
 
 @contextmanager

@@ -14,12 +14,12 @@ class OnRanks(dict):
 
     Args:
         mpirun: Starts words on a number of ranks.
-        script: Name of a script beside this module.
+        script: Name of a script in `tests/parallel`.
     """
 
     def __init__(self, mpirun, script):
         super().__init__()
-        self._mpirun, self._script = mpirun, Path(__file__).with_name(script)
+        self._mpirun, self._script = mpirun, Path(__file__).parents[1] / "parallel" / script
 
     def __missing__(self, ranks):
         done = self._mpirun(ranks, self._script)

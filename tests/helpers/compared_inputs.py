@@ -6,16 +6,16 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from hypothesis import strategies as st
-from scene_inputs import scenes, takes_long
 
-from geometry.errors import InputError, NotConverged
 from geometry.patches import PatchGrid
+from helpers.scene_inputs import scenes, takes_long
 from multiscale.cli.compare import comparison_html
 from multiscale.comparison import AGAINST
 from multiscale.comparison.compare import compare
 from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_csv
+from support.errors import InputError, NotConverged
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)

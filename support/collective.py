@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 from itertools import chain
 from typing import Any, TypeVar
 
-from geometry.cores import lendable, lent, place
+from support.cores import lendable, lent, place
 
 T = TypeVar("T")
 

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.collective import on_root
 from geometry.meshes.gmsh_session import gmsh_session
 from macro import Material, MeshedBody, Support
 from macro.mesh.from_file import read_mesh
+from support.collective import on_root
 
 STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 

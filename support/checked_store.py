@@ -23,8 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.errors import InputError
-from geometry.whole_files import write_bytes, written
+from support.errors import InputError
+from support.whole_files import write_bytes, written
 
 Arrays = dict[str, NDArray[Any]]
 """Arrays by name."""

@@ -4,8 +4,8 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from io import StringIO
 
 from hypothesis import strategies as st
-from scene_inputs import KEYS, odd_text
 
+from helpers.scene_inputs import KEYS, odd_text
 from multiscale.cli.command_line import main
 
 COMMANDS = (

@@ -6,8 +6,8 @@ import sys
 
 import pytest
 
-from geometry.errors import NotInstalled
-from geometry.packages import optional_packages
+from support.errors import NotInstalled
+from support.packages import optional_packages
 
 COMMAND = "import sys; from multiscale.cli.command_line import main; sys.exit(main(sys.argv[1:]))"
 BROKEN = {

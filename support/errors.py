@@ -80,7 +80,7 @@ class InputError(PatchlawError, ValueError):
 
 
 class NotInstalled(PatchlawError, ImportError):
-    """A package is missing that only a part of patchlaw needs; see `geometry.packages`."""
+    """A package is missing that only a part of patchlaw needs; see `support.packages`."""
 
     exit_code = 2
 

@@ -3,12 +3,12 @@
 import re
 
 from hypothesis import strategies as st
-from scene_inputs import BASE, put
 
-from geometry.errors import InputError
+from helpers.scene_inputs import BASE, put
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.quantities import _UNITS, parse_quantity
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 _LONG = 5  # letters of a name in which one wrong letter leaves no doubt
 KEYS = [
