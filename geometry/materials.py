@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from support.errors import InputError
+from support.fields import Limits, PositivePressure, check_limits
+
+PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """Linear, isotropic, elastic material.
+    """Elastic constants of a linear, isotropic material.
 
     Args:
-        young_modulus: Young's modulus E [MPa], positive and finite.
-        poisson_ratio: Poisson's ratio ν, −1 < ν < 0.5.
+        young_modulus: Young's modulus E [MPa].
+        poisson_ratio: Poisson's ratio ν.
 
     Raises:
         InputError: When a constant is outside its range.
     """
 
-    young_modulus: float
-    poisson_ratio: float
+    young_modulus: PositivePressure
+    poisson_ratio: PoissonRatio
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.young_modulus) and self.young_modulus > 0.0):
-            raise InputError(
-                "Young's modulus must be positive", value=self.young_modulus, allowed="E > 0 MPa"
-            )
-        if not -1.0 < self.poisson_ratio < 0.5:
-            raise InputError(
-                "Poisson's ratio is impossible", value=self.poisson_ratio, allowed="-1 < ν < 0.5"
-            )
+        check_limits(self)
 
     @property
     def surface_compliance(self) -> float:
-        """(1 − ν²) / E, by which the body's surface gives way under pressure [1/MPa]."""
+        """(1 − ν²) / E, of the body's surface under pressure [1/MPa]."""
         return (1.0 - self.poisson_ratio**2) / self.young_modulus
 
     @property

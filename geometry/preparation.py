@@ -15,9 +15,10 @@ from geometry.plausibility import check_slopes
 from geometry.surface import Surface
 from support.checks import cell_counts, cells_between
 from support.errors import InputError
+from support.fields import Heights, Length, PositiveLength
 
 Array = NDArray[np.float64]
-Interval = tuple[float, float]
+Interval = tuple[Length, Length]
 
 _MUCH_MISSING = 0.3
 _RARE = 1e-3
@@ -27,34 +28,63 @@ _ORDERS = {"mean": 0, "plane": 1, "quadratic": 2}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Preparation:
-    """What is done to a map, in the order of the arguments.
+class Crop:
+    """The rectangle of a map that is kept, rounded to whole cells; all of an axis not given.
 
     Args:
-        swap_xy: Whether x and y are exchanged: the map is read with index [iy, ix].
-        crop: Rectangle that is kept, intervals along x and along y [mm]; all along an axis that is
-            None. Rounded to whole cells.
-        outliers: ``remove`` makes spikes missing heights, which are filled; see `spikes`.
-        missing: What is done with missing heights: refuse the map, or ``fill`` them by a membrane
-            between those that are no spikes, see `geometry.missing.filled`.
-        form: Form that is removed by least squares: ``none``, ``mean``, ``plane``, ``quadratic``.
-        short: Cut-off wavelength below which waves are removed (S-filter) [mm].
-        long: Cut-off wavelength beyond which waves are removed (L-filter) [mm].
-        resample: New numbers of heights, see `regridded`.
+        x: Where the kept part begins and ends along x [mm]; all of it when not given.
+        y: Where the kept part begins and ends along y [mm]; all of it when not given.
+    """
 
-    Note:
-        ISO 25178-3 takes the S-filter before the form. Here the form goes first, as a tilt would
-        disturb the filter along the borders of the map.
+    x: Interval | None = None
+    y: Interval | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Filter:
+    """Cut-off wavelengths of the areal Gaussian filter, ISO 16610-61.
+
+    Half of the amplitude passes at a cut-off.
+
+    Args:
+        short: S-filter: waves shorter than this are removed [mm].
+        long: L-filter: waves longer than this are removed [mm].
+    """
+
+    short: PositiveLength | None = None
+    long: PositiveLength | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Preparation:
+    """What is done to a map.
+
+    It is done in this order: ``swap_xy``, ``crop``, ``outliers``, ``missing``, ``detrend``,
+    ``filter``, ``resample``. ISO 25178-3 takes the S-filter before the form. Here the form goes
+    first, as a tilt would disturb the filter along the borders of the map.
+
+    Args:
+        swap_xy: Whether x and y of the map are exchanged: rows of a text without sides, and the
+            first index of an array, then lie along x. ``lengths``, ``grid`` and ``crop`` are those
+            after it.
+        crop: The rectangle that is kept, before anything else is done to a map.
+        outliers: Whether spikes, and a repeated value that means "no data", are kept, or removed
+            and filled.
+        missing: What happens to heights that are masked or not a number: ``refuse`` them, or
+            ``fill`` them by the smoothest membrane between the others, spikes aside.
+        detrend: Form that is removed from a map: its mean, its mean plane, or its mean quadratic
+            form.
+        filter: Cut-off wavelengths of a Gaussian filter, applied after the form is removed.
+        resample: Numbers of heights along x and y of a new grid, which a map is brought to at last.
     """
 
     swap_xy: bool = False
-    crop: tuple[Interval | None, Interval | None] = (None, None)
+    crop: Crop = Crop()
     outliers: Literal["keep", "remove"] = "keep"
     missing: Literal["refuse", "fill"] = "refuse"
-    form: Literal["none", "mean", "plane", "quadratic"] = "none"
-    short: float | None = None
-    long: float | None = None
-    resample: tuple[int, int] | None = None
+    detrend: Literal["none", "mean", "plane", "quadratic"] = "none"
+    filter: Filter = Filter()
+    resample: tuple[Heights, Heights] | None = None
 
 
 def prepared(surface: Surface, steps: Preparation) -> Surface:
@@ -68,17 +98,18 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
         InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
     """
     done = []
-    if steps.form != "none":
-        surface = surface.detrended(_ORDERS[steps.form])
-        done.append(f"its {steps.form} removed")
-    _check_cut_offs(surface, steps.short, steps.long)
+    if steps.detrend != "none":
+        surface = surface.detrended(_ORDERS[steps.detrend])
+        done.append(f"its {steps.detrend} removed")
+    short, long = steps.filter.short, steps.filter.long
+    _check_cut_offs(surface, short, long)
     h, spacing, periodic = surface.heights, surface.spacing, surface.periodic
-    if steps.short is not None:
-        h = smoothed(h, spacing, steps.short, periodic=periodic)
-        done.append(f"waves below {1e3 * steps.short:g} µm removed (Gaussian)")
-    if steps.long is not None:
-        h = h - smoothed(h, spacing, steps.long, periodic=periodic)
-        done.append(f"waves beyond {1e3 * steps.long:g} µm removed (Gaussian)")
+    if short is not None:
+        h = smoothed(h, spacing, short, periodic=periodic)
+        done.append(f"waves below {1e3 * short:g} µm removed (Gaussian)")
+    if long is not None:
+        h = h - smoothed(h, spacing, long, periodic=periodic)
+        done.append(f"waves beyond {1e3 * long:g} µm removed (Gaussian)")
     if steps.resample is not None:
         mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
         h = regridded(h, surface.lengths, (mx, my), periodic=periodic)
@@ -108,7 +139,7 @@ def completed(
     """
     done: list[str] = []
     notes: list[str] = []
-    if steps.crop != (None, None):
+    if steps.crop != Crop():
         heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
         done.append(sentence)
     if np.isinf(heights).any():  # refused as a surface
@@ -173,11 +204,13 @@ def _on_filling(inside: Array, others: Array) -> list[str]:
 
 
 def _cropped(
-    heights: Array, lengths: tuple[float, float], crop: tuple[Interval | None, Interval | None]
+    heights: Array, lengths: tuple[float, float], crop: Crop
 ) -> tuple[Array, tuple[float, float], str]:
     """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
     cells, corner, sides = [], [], []
-    for interval, length, count, axis in zip(crop, lengths, heights.shape, "xy", strict=True):
+    for interval, length, count, axis in zip(
+        (crop.x, crop.y), lengths, heights.shape, "xy", strict=True
+    ):
         try:
             part = cells_between(interval, length, count, axis)
         except InputError as error:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from numbers import Integral
+from typing import Annotated, Any
 
 from support.checks import finite_pair
 from support.errors import InputError
+from support.fields import Limits, Positive, PositiveLength, Slope, Unit, check_limits
 
 LARGEST_SEED = 2**128 - 1
 """Seeds have at most 128 bits, as many as numpy draws from the system for a seed."""
+
+Band = tuple[float, float]
 
 _BANDS = ("waves", "waves_x", "waves_y")
 _AMPLITUDES = ("rms_slope", "rms_height", "s0")
@@ -22,7 +23,7 @@ _UNITS = {"rms_height": " mm", "s0": " mm^4"}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spectrum:
-    """Power spectral density S = S0 |k|^(−2 (H + 1)) in a band of waves, 0 outside.
+    """A synthesised self-affine surface: S = S0 |k|^(−2 (H + 1)) in a band of waves, 0 outside.
 
     k = (kx, ky) counts waves per side. On a rectangle its length is measured along x,
     |k| = Lx |q| / 2π with the angular wavenumber q, so that the surface stays isotropic. The
@@ -30,14 +31,17 @@ class Spectrum:
     ellipse (kx/lo_x)² + (ky/lo_y)² < 1.
 
     Args:
-        hurst: Hurst exponent H, 0 … 1.
-        waves: Ring (lo, hi) [waves per Lx].
-        waves_x: Limits (lo_x, hi_x) of the box along x [waves per Lx].
-        waves_y: Limits (lo_y, hi_y) of the box along y [waves per Ly].
-        rms_slope: Amplitude by sqrt<|∇h|²>, met exactly by every surface [-].
-        rms_height: Amplitude by sqrt<h²>, met exactly by every surface [mm].
-        s0: Amplitude S0 itself [mm⁴]; <h²> is the integral of S over the angular wavenumbers.
-        seed: Seed of the phases.
+        hurst: Hurst exponent of the self-affine roughness, between 0 and 1; 0.8 and more are usual.
+        waves: Smallest and largest number of waves along the side x, of a spectrum that is the same
+            in all directions: the ring. Either this, or ``waves_x`` and ``waves_y``.
+        waves_x: Smallest and largest number of waves along x, of an anisotropic spectrum: the box.
+        waves_y: Smallest and largest number of waves along y, of an anisotropic spectrum.
+        rms_slope: Rms gradient of the surface, sqrt<|∇h|²>, which every surface has exactly. It is
+            scaled by exactly one of ``rms_slope``, ``rms_height`` and ``s0``.
+        rms_height: Rms height sqrt<h²>, instead of ``rms_slope`` [mm].
+        s0: Amplitude S0 of the spectrum, instead of ``rms_slope`` [mm⁴]; <h²> is the integral of S
+            over the angular wavenumbers.
+        seed: Number that the random phases follow from; the same number makes the same surface.
 
     Raises:
         InputError: When a value is out of range, or not exactly one kind of band and one
@@ -46,29 +50,23 @@ class Spectrum:
     Source: Waddad et al. 2016, section 1.1, doi 10.1016/j.triboint.2015.12.023.
     """
 
-    hurst: float
-    waves: tuple[float, float] | None = None
-    waves_x: tuple[float, float] | None = None
-    waves_y: tuple[float, float] | None = None
-    rms_slope: float | None = None
-    rms_height: float | None = None
-    s0: float | None = None
-    seed: int = 0
+    hurst: Annotated[float, Limits(ge=0, le=1)]
+    waves: Band | None = None
+    waves_x: Band | None = None
+    waves_y: Band | None = None
+    rms_slope: Annotated[Slope, Positive] | None = None
+    rms_height: PositiveLength | None = None
+    s0: Annotated[float, Unit("mm**4"), Positive] | None = None
+    seed: Annotated[int, Limits(ge=0, le=LARGEST_SEED)] = 0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.hurst <= 1.0:
-            raise InputError(
-                "the Hurst exponent is out of range", value=self.hurst, allowed="0 … 1"
-            )
-        if not isinstance(self.seed, int | np.integer) or not 0 <= self.seed <= LARGEST_SEED:
-            raise InputError(
-                "the seed does not fit", value=self.seed, allowed="a whole number, 0 … 2^128 − 1"
-            )
+        check_limits(self)
+        if not isinstance(self.seed, Integral):
+            raise InputError("must be a whole number", key="seed", value=self.seed)
         bands = self._given(_BANDS)
         if bands not in (["waves"], ["waves_x", "waves_y"]):
             raise InputError(
-                "a spectrum needs exactly one band",
-                value=bands,
+                f"a spectrum needs exactly one band, not {' and '.join(bands) or 'none'}",
                 allowed="waves, or waves_x and waves_y together",
             )
         for name in bands:
@@ -76,13 +74,9 @@ class Spectrum:
         amplitudes = self._given(_AMPLITUDES)
         if len(amplitudes) != 1:
             raise InputError(
-                "a spectrum needs exactly one amplitude",
-                value=amplitudes,
+                f"a spectrum needs exactly one amplitude, not {' and '.join(amplitudes) or 'none'}",
                 allowed="one of " + ", ".join(_AMPLITUDES),
             )
-        size = getattr(self, amplitudes[0])
-        if not (math.isfinite(size) and size > 0.0):
-            raise InputError(f"{amplitudes[0]} must be positive", value=size, allowed="> 0")
 
     def __str__(self) -> str:
         given = self._given(("hurst", *_BANDS, *_AMPLITUDES, "seed"))
@@ -98,9 +92,12 @@ def _written(value: Any) -> str:
     return f"{value:.12g}" if isinstance(value, float) else str(value)  # without rounding noise
 
 
-def _checked_band(band: tuple[float, float], name: str) -> tuple[float, float]:
-    problem, allowed = f"{name} is not a band", "0 ≤ lo ≤ hi, waves per side"
-    lo, hi = finite_pair(band, problem, allowed=allowed)
+def _checked_band(band: Band, name: str) -> Band:
+    problem, allowed = "is not a band", "0 ≤ lo ≤ hi, waves per side"
+    try:
+        lo, hi = finite_pair(band, problem, allowed=allowed)
+    except InputError as error:
+        raise error.located(key=name) from None
     if not 0.0 <= lo <= hi:
-        raise InputError(problem, value=band, allowed=allowed)
+        raise InputError(problem, key=name, value=band, allowed=allowed)
     return lo, hi

@@ -14,8 +14,8 @@ from multiscale.laws.patch_law import PatchLaw as PatchLaw
 from multiscale.laws.patch_law import PatchLaws as PatchLaws
 from multiscale.laws.representative import representative_law as representative_law
 from multiscale.laws.representative import representative_laws as representative_laws
+from multiscale.loading.load_history import LoadHistory as LoadHistory
 from multiscale.loading.load_step import LoadStep as LoadStep
-from multiscale.loading.stepper import LoadHistory as LoadHistory
 from multiscale.loading.stepper import load_steps as load_steps
 from multiscale.planning.problem_setup import make_setup as make_setup
 from multiscale.results.extrapolation import extrapolated as extrapolated

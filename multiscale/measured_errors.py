@@ -281,7 +281,7 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
         Collective.
     """
     load_history, probe = setup.load_history, error_probe(setup, body)
-    by_force, turns = load_history.quantity == "force", load_history.tilt is None
+    by_force, turns = load_history.quantity == "force", load_history.slopes is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
     force, approach = (

@@ -49,7 +49,7 @@ def read_surface(
         channel: Name or number of the channel of an instrument's file, counted from 0.
         periodic: Whether the heights continue periodically.
         steps: What is done to the map, the arguments of `Preparation`, such as
-            ``missing="fill", form="plane"``; nothing when not given.
+            ``missing="fill", detrend="plane"``; nothing when not given.
 
     Returns:
         The surface, with heights in mm. Its source says what was done to the map, its notes what a

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +13,12 @@ from geometry.meshes.lattice import Segment
 from geometry.patches import PatchGrid
 from support.checks import cell_counts, positive_lengths
 from support.errors import InputError
+from support.fields import Count, Length, Limits, PositiveLength, check_limits
 
 Array = NDArray[np.float64]
 
-ELEMENTS = ("Q1", "Q2", "P1", "P2")
+Element = Literal["Q1", "Q2", "P1", "P2"]
+ELEMENTS = get_args(Element)
 
 LEAST_MARGIN = 1e-3
 """Narrowest margin, relative to the shorter side of the interface. Measured on a cube of
@@ -24,11 +27,29 @@ LEAST_MARGIN = 1e-3
 LEAST_MARGIN_CELL = 1e-5
 """Narrowest cell of a margin, relative to the same."""
 
-_MOST_COUNTED = 10**9  # cells that can be divided by; whole numbers may be beyond any float
+
+@dataclass(frozen=True, kw_only=True)
+class BlockMeshing:
+    """What of a block's mesh does not depend on the size of the block.
+
+    Args:
+        element: Element of the block's mesh: hexahedra Q or tetrahedra P, six in each hexahedron,
+            linear or quadratic.
+        grading: Height of the lowest layer of cells over that of the highest.
+        margin: Width of the block beyond the rough interface, on all four sides [mm].
+        margin_cells: Cells of the mesh across the margin.
+        margin_grading: Width of the outermost cells of the margin over that of the innermost.
+    """
+
+    element: str = "Q1"
+    grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
+    margin: Annotated[Length, Limits(ge=0)] = 0.0
+    margin_cells: Count = 8
+    margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 1.0
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class BlockShape:
+@dataclass(frozen=True, kw_only=True)
+class BlockShape(BlockMeshing):
     """A block whose top face z = 0 holds the interface [0, Lx] × [0, Ly], and its division.
 
     The block occupies [−margin, Lx + margin] × [−margin, Ly + margin] × [−height, 0].
@@ -37,42 +58,22 @@ class BlockShape:
         interface: Sides (Lx, Ly) of the contact interface [mm].
         height: Height of the block [mm].
         cells: Hexahedra (nx, ny) over the interface and nz over the height.
-        element: ``Q1`` or ``Q2`` hexahedra; ``P1`` or ``P2``: six tetrahedra in each hexahedron.
-        grading: Height of the bottom layer relative to the top layer, layers growing
-            geometrically; 1 is uniform.
-        margin: Width by which the block exceeds the interface on each side [mm].
-        margin_cells: Cells across the margin on each side.
-        margin_grading: Width of the outermost margin cell relative to the innermost.
 
     Raises:
         InputError: When a value is out of its range.
     """
 
     interface: tuple[float, float]
-    height: float
+    height: PositiveLength
     cells: tuple[int, int, int]
-    element: str = "Q1"
-    grading: float = 1.0
-    margin: float = 0.0
-    margin_cells: int = 0
-    margin_grading: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
         object.__setattr__(self, "cells", cell_counts(self.cells, "the block", dimension=3))
-        _require_at_least("height", self.height, 0.0, strict=True)
-        _require_at_least("grading", self.grading, 1.0)
-        _require_at_least("margin", self.margin, 0.0)
-        _require_at_least("margin grading", self.margin_grading, 1.0)
+        check_limits(self)
         if self.element not in ELEMENTS:
             raise InputError(
                 "this element is unknown", value=self.element, allowed=", ".join(ELEMENTS)
-            )
-        if self.margin_cells < 0 or (self.margin_cells > 0) != (self.margin > 0.0):
-            raise InputError(
-                "the block's margin and its cells do not fit together",
-                value=(self.margin, self.margin_cells),
-                allowed="margin > 0 with margin_cells ≥ 1, or both 0",
             )
         if self.margin:
             self._check_margin()
@@ -108,10 +109,10 @@ class BlockShape:
                 value=self.margin,
                 allowed=f"0, or at least {LEAST_MARGIN * side:g} mm",
             )
-        count = min(self.margin_cells, _MOST_COUNTED)
-        narrowest = Segment(
-            start=0.0, end=self.margin, cells=count, growth=self.margin_grading
-        ).narrowest
+        across = Segment(
+            start=0.0, end=self.margin, cells=self.margin_cells, growth=self.margin_grading
+        )
+        narrowest = across.narrowest
         if narrowest < LEAST_MARGIN_CELL * side:
             raise InputError(
                 f"the block's margin has cells of {narrowest:.3g} mm, too narrow to be meshed",
@@ -177,12 +178,3 @@ def misalignment(shape: BlockShape, patches: PatchGrid) -> str:
         f"patch borders cut elements along {' and '.join(parts)}; "
         "a multiple of the number of patches would align them"
     )
-
-
-def _require_at_least(what: str, value: float, least: float, *, strict: bool = False) -> None:
-    if not math.isfinite(value) or value < least or (strict and value == least):
-        raise InputError(
-            f"the block's {what} is out of range",
-            value=value,
-            allowed=f"{what} {'>' if strict else '≥'} {least:g}",
-        )

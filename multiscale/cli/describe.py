@@ -27,7 +27,7 @@ from multiscale.planning.work import work_of
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
-from multiscale.scene.keys import Key, scene_keys
+from multiscale.scene.keys import Key, scene_keys, scene_schema
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import write_text
@@ -164,7 +164,7 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         comm: MPI communicator; None for a process on its own.
     """
     if terminal.speaks(comm):
-        print(json.dumps(Scene.model_json_schema(by_alias=True), indent=2))
+        print(json.dumps(scene_schema(), indent=2))
 
 
 def explain_keys(choice: argparse.Namespace, options: list[str], comm: Any) -> None:

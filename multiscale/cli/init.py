@@ -21,7 +21,7 @@ from multiscale.scene.new_scene import (
 )
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
-from multiscale.setup.surface_and_block import block_material, block_section, make_surface
+from multiscale.setup.surface_and_block import block_section, make_surface
 from multiscale.storage import write_text
 from support.collective import on_root
 from support.errors import InputError
@@ -75,7 +75,7 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
     height = quantity(block_section(scene).height_under(surface.lengths), "mm", digits=6)
     scene = scene.with_({"block.height": height.replace("µ", "u")})
     if not loaded:
-        force = sensible_force(surface, block_material(scene))
+        force = sensible_force(surface, block_section(scene).material)
         scene = scene.with_({"load.force": force})
         remarks.append(
             f"The force of {force} is a start: about {100 * CONTACT_AREA:g} % of the surface will "

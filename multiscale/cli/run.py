@@ -109,7 +109,7 @@ def _make_load_steps(
     run: Run, checkpoints: CheckpointWriter, interruption: Interruption
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
-    load_history = run.scene.loading.load_history
+    load_history = run.scene.loading
     with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.observe):
         try:
             if run.setup.uses_laws:

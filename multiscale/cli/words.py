@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 from multiscale.comparison import AGAINST
 from multiscale.exports import FORMATS
+from support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"
 """What the results folder of a sweep is called after the scene's name."""
@@ -54,8 +55,6 @@ def wall_time(text: str) -> float:
     Raises:
         argparse.ArgumentTypeError: When the text is no time, or not greater than zero.
     """
-    from multiscale.scene.quantities import parse_duration
-
     try:
         return parse_duration(text)
     except ValueError as error:

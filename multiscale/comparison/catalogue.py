@@ -30,6 +30,7 @@ from multiscale.comparison.scene_content import (
 )
 from multiscale.planning.problem_setup import make_setup
 from multiscale.planning.work import work_of
+from multiscale.scene.reader import to_dict
 from multiscale.scene.scene import Scene
 from multiscale.setup.memory import MemoryLacking
 from multiscale.setup.problem import ProblemSetup
@@ -109,7 +110,7 @@ class _Catalogue:
         content, self._scene, self._patches = content_of(scene), scene, patch_grid(scene)
         # Every key of a configuration is stated, so that no accuracy chooses one.
         self._accuracy, self._own_micro = content.pop("accuracy", None), content["micro"]
-        content["micro"] = scene.micro.model_dump(mode="json", exclude_none=True)
+        content["micro"] = to_dict(scene.micro, whole=False)
         # Only laws need a mesh of the block.
         content["block"].pop("cells", None)
         cells = block_section(scene).cells

@@ -47,8 +47,8 @@ def content_of(scene: Scene) -> Content:
 
     A micro model that an accuracy leaves open stays open.
     """
-    content = scene.model_dump(by_alias=True, mode="json", exclude_none=True)
-    if scene.accuracy is not None and not scene.micro.model_fields_set:
+    content = scene.to_dict(whole=False)
+    if scene.accuracy is not None and not scene.stated("micro"):
         content["micro"] = {}
     for key, path in scene.files().items():  # the content has no folder that names start in
         *sections, name = key.split(".")

@@ -197,7 +197,7 @@ def assemble(setup: ProblemSetup, made: LawTable | MicroModel | None, comm: Any)
     if setup.samples:
         return FaceCoupling(setup, made, comm)
     condensed = newton_choice(setup, made).condensed
-    mode, tilt = setup.scene.coupling.interface, setup.load_history.tilt
+    mode, tilt = setup.scene.coupling.interface, setup.load_history.slopes
     if made.path is not None and mode == "patchwise" and tilt is None:
         return FreePlaneCoupling(made, patch_displacements(setup, comm, dense=condensed))
     if condensed:

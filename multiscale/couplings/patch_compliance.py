@@ -96,7 +96,7 @@ def _bodies_as_text(setup: ProblemSetup) -> tuple[Any, ...]:
         parts += [setup.shape, setup.materials.first, block_section(scene).sides]
     for section, face in ((scene.body, setup.face), (counter, setup.counter_face)):
         if section is not None and face is not None:
-            parts += [section.model_dump_json(), face.digest]
+            parts += [section, face.digest]
     return tuple(parts)
 
 

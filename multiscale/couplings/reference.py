@@ -16,7 +16,7 @@ from micro.contact_detail import ContactDetail, peaks_of
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material, block_section, located
+from multiscale.setup.surface_and_block import block_section, located
 from multiscale.storage import packed, unpacked
 from support.checked_store import Arrays
 
@@ -209,7 +209,7 @@ def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
         with located(scene, "surface"):
             mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
         problem = UnilateralContactProblem(
-            Block(mesh, block_material(scene), sides=block_section(scene).sides),
+            Block(mesh, block_section(scene).material, sides=block_section(scene).sides),
             surface.highest - surface.mean_height,
             method=scene.reference.method,
             patches=setup.patches if finest else None,

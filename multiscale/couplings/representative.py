@@ -122,7 +122,7 @@ def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:
         force = history.largest
         mean = force / face.area
         return stated or max(_CONCENTRATION * mean, _hertz(setup, force=force)), None
-    tilt = history.tilt or (0.0, 0.0)
+    tilt = history.slopes or (0.0, 0.0)
     approach = history.largest + 0.5 * float(np.abs(np.multiply(face.lengths, tilt)).sum())
     mean = approach / mean_compliance(setup, comm)
     pressure = stated or max(_CONCENTRATION * mean, _hertz(setup, approach=approach))

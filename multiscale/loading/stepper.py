@@ -1,18 +1,16 @@
-"""Load histories, and the stepper that turns them into load steps of any coupling."""
+"""The stepper that turns a load history into load steps of any coupling."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Any, Literal, Protocol, runtime_checkable
-
-import numpy as np
+from typing import Any, Protocol, runtime_checkable
 
 from geometry import Control, NotConverged
 from micro.contact_detail import ContactDetail
 from micro.model import Stiffness
+from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from support.checked_store import Arrays
 
@@ -107,82 +105,6 @@ class PathDependent(Protocol):
 
 class BeyondLaws(NotConverged):
     """A patch is outside the range of its law, where smaller load steps do not help."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoadHistory:
-    """Turning points of the load, and the number of load steps between them.
-
-    Attributes:
-        quantity: What is prescribed, ``"approach"`` or ``"force"``.
-        points: Its values at the ends of the legs, the first of which starts at zero [mm or N].
-        steps: Load steps per leg.
-        cycles: How often the points follow each other.
-        tilt: Slopes of the plane; None lets it turn freely.
-        zero: Approach at the height that approaches are shown from; it, and an approach among the
-            points, counts from first touch [mm].
-        force_change: Largest change of the force in a step relative to the largest force so far,
-            that of the step included; steps that exceed it are halved. The first step with a force
-            is not limited. None sets no limit.
-    """
-
-    quantity: Literal["approach", "force"]
-    points: tuple[float, ...]
-    steps: int = 8
-    tilt: tuple[float, float] | None = (0.0, 0.0)
-    force_change: float | None = None
-    cycles: int = 1
-    zero: float = 0.0
-
-    @property
-    def targets(self) -> list[float]:
-        """Values of the prescribed quantity at the load steps, before any is halved."""
-        first, later = self.cycle_from(0.0), self.cycle_from(self.points[-1])
-        return first + (self.cycles - 1) * later
-
-    def cycle_from(self, value: float) -> list[float]:
-        """Return the values of the prescribed quantity in a cycle that starts at a value."""
-        ends = np.array((value, *self.points))
-        legs = np.linspace(ends[:-1], ends[1:], self.steps + 1, axis=1)[:, 1:]
-        return [float(each) for each in legs.ravel()]
-
-    @property
-    def legs(self) -> int:
-        """Number of ways from one turning point to the next."""
-        return self.cycles * len(self.points)
-
-    @property
-    def count(self) -> int:
-        """Number of load steps, before any is halved."""
-        return self.steps * self.legs
-
-    @property
-    def largest(self) -> float:
-        """Largest value of the prescribed quantity."""
-        return max(self.points)
-
-    @property
-    def unloads(self) -> bool:
-        """Whether the load falls anywhere."""
-        points = self.points[-1:] * (self.cycles > 1) + self.points
-        return any(later < earlier for earlier, later in pairwise(points))
-
-    @property
-    def up_to_largest(self) -> LoadHistory:
-        """The history of one load step, straight to the largest load."""
-        return LoadHistory(quantity=self.quantity, points=(self.largest,), steps=1, tilt=self.tilt)
-
-    def control(self, value: float) -> Control:
-        """Return what a load step to a value of the prescribed quantity prescribes."""
-        if self.quantity == "force":
-            return Control(force=value, tilt=self.tilt)
-        return Control(approach=value, tilt=self.tilt)
-
-    def shown(self, control: Control) -> Control:
-        """Return a control whose approach counts from the zero, as users see it."""
-        if control.approach is None:
-            return control
-        return replace(control, approach=control.approach - self.zero)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

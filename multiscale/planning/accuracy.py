@@ -138,7 +138,7 @@ class _Search(MeshSearch):
         if sum(errors.values()) <= self.accuracy or not self._may_be_meshed:
             return self.decided(setup, errors)
         reference = type(setup.scene.coupling)(kind="reference")
-        scene = setup.scene.model_copy(update={"coupling": reference})
+        scene = replace(setup.scene, coupling=reference)
         try:
             meshed = self.with_first_meshes(self.build(scene))
             if not self.is_small(meshed):
@@ -157,7 +157,7 @@ class _Search(MeshSearch):
         """Whether the scene leaves it open that its roughness be meshed."""
         if self.given.micro.hardness is not None or self.given.conductance is not None:
             return False  # meshes are elastic, and do not know the stiffness of the interface alone
-        stated = self.given.coupling.model_fields_set - {"kind"}
+        stated = self.given.stated("coupling") - {"kind"}
         return {"coupling.kind", "micro.model"} <= auto_keys(self.given) and not stated
 
     def decided(

@@ -5,16 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from geometry.spectrum import Spectrum
 from geometry.surface import Surface
 from micro import HalfSpaceModel
 from multiscale.planning.memory_costs import step_count
-from multiscale.scene.coupling_sections import CouplingSection
+from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene import Scene
-from multiscale.scene.sections import SpectrumSection
+from multiscale.scene.sections import CouplingSection
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import PROVISIONAL_PATCHES, patch_limits
 from support.errors import InputError
@@ -47,9 +49,9 @@ def auto_keys(scene: Scene) -> frozenset[str]:
         section = getattr(scene, name)
         if section is None or scene.law.representative:
             continue
-        unstated = scene.accuracy is not None and field not in section.model_fields_set
+        unstated = scene.accuracy is not None and field not in scene.stated(name)
         if name == "micro":  # its other keys belong to a model that is stated
-            unstated = unstated and not section.model_fields_set
+            unstated = unstated and not scene.stated(name)
         if name == "surface":
             unstated = scene.accuracy is not None and scene.surface.lacks_grid
         if getattr(section, field) == "auto" or unstated:
@@ -90,7 +92,7 @@ def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
     start: dict[str, Any] = {"block.cells": None, "patches.grid": PROVISIONAL_PATCHES}
     changed = scene
     if "coupling.kind" in auto:
-        changed = scene.model_copy(update={"coupling": chosen_coupling(scene)[0]})
+        changed = replace(scene, coupling=chosen_coupling(scene)[0])
     for key in auto & set(start):
         changed = with_value(changed, key, start[key])
     return changed
@@ -105,8 +107,8 @@ def with_value(scene: Scene, key: str, value: Any) -> Scene:
         value: The value.
     """
     name, _, field = key.partition(".")
-    section = getattr(scene, name).model_copy(update={field: value})
-    return scene.model_copy(update={name: section})
+    section = replace(getattr(scene, name), **{field: value})
+    return replace(scene, **{name: section})
 
 
 def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
@@ -127,8 +129,7 @@ def resolved_sections(setup: ProblemSetup, given: Scene) -> dict[str, Any]:
         names |= {"coupling", "reference"}  # the tolerance of laws, and the edges of meshes
     found = {}
     for name in sorted(names):
-        section = getattr(setup.scene, name)
-        found[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
+        found[name] = to_dict(getattr(setup.scene, name))
     if "micro" in names:
         model = setup.micro
         found["micro"] = list(model.surface.grid) if isinstance(model, HalfSpaceModel) else None
@@ -143,11 +144,11 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         resolved: What `resolved_sections` returned.
     """
     changed: dict[str, Any] = {
-        name: type(getattr(scene, name)).model_validate(content)
+        name: read(type(getattr(scene, name)), content)
         for name, content in resolved.items()
         if name != "micro"
     }
-    return scene.model_copy(update=changed)
+    return replace(scene, **changed)
 
 
 def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
@@ -163,7 +164,7 @@ def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
     for kind in ("concurrent", "consistent"):
         with suppress(InputError):  # another key does not go with it
             fitting[kind] = scene.with_({"coupling.kind": kind}).coupling
-    steps = step_count(scene.loading.load_history)
+    steps = step_count(scene.loading)
     if len(fitting) < 2:
         kind = next(iter(fitting), "consistent")
         return fitting.get(kind, scene.coupling), "what the scene states goes with no other"
@@ -191,7 +192,7 @@ def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
 
 
 def heights_per_wave(
-    spectrum: SpectrumSection, grid: tuple[int, int], lengths: tuple[float, float]
+    spectrum: Spectrum, grid: tuple[int, int], lengths: tuple[float, float]
 ) -> float:
     """Return the heights along the shortest wavelength of a spectrum.
 
@@ -219,7 +220,7 @@ def on_waves(scene: Scene, count: int) -> Scene:
     return with_value(scene, "surface.grid", grid)
 
 
-def _most_waves(spectrum: SpectrumSection, lengths: tuple[float, float]) -> list[float]:
+def _most_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> list[float]:
     """Return the largest number of waves along each side."""
     if spectrum.waves is not None:  # counted along x
         return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]

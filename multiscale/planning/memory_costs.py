@@ -11,7 +11,7 @@ from micro import HalfSpaceModel
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import MemoryRequest, peak_memory
 from multiscale.measured_errors import MOST_CHECKED_CELLS
-from multiscale.scene.body_sections import CounterBodySection
+from multiscale.scene.bodies import CounterBodySection
 from multiscale.setup.memory import body_request, memory_requests
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.reference_meshes import reference_requests
@@ -79,7 +79,7 @@ def run_memory_requests(setup: ProblemSetup) -> list[MemoryRequest]:
         setup: The problem.
     """
     meshes, scene = setup.meshes, setup.scene
-    steps = step_count(scene.loading.load_history)
+    steps = step_count(scene.loading)
     of_bodies = [
         body_request(key, face.element, face.unknowns, steps, in_parts=_in_parts(section))
         for key, face, section in (

@@ -234,7 +234,7 @@ def _coupling(setup: ProblemSetup) -> str:
 
 
 def _load(setup: ProblemSetup) -> str:
-    load_history = setup.scene.loading.load_history
+    load_history = setup.scene.loading
     forced = load_history.quantity == "force"
     unit, what = ("N", "a force") if forced else ("mm", "an approach")
     way = ", ".join(quantity(point, unit, 6) for point in load_history.points)
@@ -245,10 +245,10 @@ def _load(setup: ProblemSetup) -> str:
         text += f", approaches from the {setup.scene.loading.zero}, {depth} below first touch"
     if load_history.force_change is not None:
         text += f", halved where the force changes by more than {load_history.force_change:.3g}"
-    if load_history.tilt is None:
+    if load_history.slopes is None:
         text += ", the plane free to tilt"
-    elif any(load_history.tilt):
-        text += f", tilted by {_slopes(load_history.tilt)}"
+    elif any(load_history.slopes):
+        text += f", tilted by {_slopes(load_history.slopes)}"
     if forced and setup.plane_at_largest_load is not None:
         approach = quantity(setup.plane.approach - setup.zero, "mm", 3)
         text += f"; on a half-space its approach is about {approach}"

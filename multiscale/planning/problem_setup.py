@@ -189,9 +189,9 @@ def prescribed_plane(load_history: LoadHistory, surface: Surface) -> RigidPlane 
         load_history: The loads.
         surface: The surface.
     """
-    if load_history.quantity == "force" or load_history.tilt is None:
+    if load_history.quantity == "force" or load_history.slopes is None:
         return None
-    return RigidPlane.above(surface, load_history.largest, load_history.tilt)
+    return RigidPlane.above(surface, load_history.largest, load_history.slopes)
 
 
 def plane_at_largest_load(

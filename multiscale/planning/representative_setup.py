@@ -18,7 +18,7 @@ from multiscale.setup.reference_meshes import mesh_unknowns
 from multiscale.setup.samples import region_samples
 from multiscale.setup.surface_and_block import (
     Bulk,
-    block_material,
+    block_section,
     check_load,
     load_history_on,
     make_shape,
@@ -81,7 +81,7 @@ def face_of_block(scene: Scene, shape: BlockShape) -> FaceFacts:
         shape: Shape and mesh of its block.
     """
     x, y = (length + 2.0 * shape.margin for length in shape.interface)
-    material = block_material(scene)
+    material = block_section(scene).material
     kind = "hexahedra" if shape.hexahedral else "tetrahedra"
     return FaceFacts(
         lengths=shape.interface,

@@ -140,7 +140,7 @@ def work_of(setup: ProblemSetup, launch: Launch | None = None) -> Work:
         launch: How the run is started; by default in this process.
     """
     launch, output = launch or Launch(), setup.scene.output
-    steps = step_count(setup.scene.loading.load_history)
+    steps = step_count(setup.scene.loading)
     rows = SOLUTIONS_OF_LAWS * max(sum(len(region.surfaces) for region in setup.samples), 1)
     rows = rows if setup.uses_laws else 0
     cells, solutions, products = _contact_work(setup, steps, rows)

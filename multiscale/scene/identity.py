@@ -34,9 +34,7 @@ def identity(scene: Scene) -> dict[str, Any]:
     Args:
         scene: The scene; what it wants drawn is left out.
     """
-    return flat_identity(
-        scene.model_dump(by_alias=True, mode="json"), file_digests(scene), version("patchlaw")
-    )
+    return flat_identity(scene.to_dict(), file_digests(scene), version("patchlaw"))
 
 
 def flat_identity(
@@ -49,8 +47,8 @@ def flat_identity(
         files: What `file_digests` returned then.
         release: Version of patchlaw.
     """
-    found = {key: value for key, value in dotted(sections) if key not in _DRAWN}
-    return found | {CONTENT + key: each for key, each in files.items()} | {VERSION: release}
+    keys = {key: value for key, value in dotted(sections) if key not in _DRAWN}
+    return keys | {CONTENT + key: each for key, each in files.items()} | {VERSION: release}
 
 
 def files_of(identity: Mapping[str, Any]) -> dict[str, str]:

@@ -6,12 +6,13 @@ They are those of the JSON Schema of scene files, so that help and schema say th
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 from multiscale.scene.contents import SceneSections
+from multiscale.scene.reader import model_of
 
 _ANY = 1e9
 """A bound from here on is none that a user meets."""
@@ -60,10 +61,15 @@ class Key:
         return "not given" if default is None else json.dumps(default)
 
 
+def scene_schema() -> dict[str, Any]:
+    """Return the JSON Schema of scene files."""
+    return model_of(SceneSections).model_json_schema(by_alias=True) | {"title": "Scene"}
+
+
 @cache
 def scene_keys() -> dict[str, Key]:
     """Return all keys and sections of a scene by dotted name, each section before its keys."""
-    schema = SceneSections.model_json_schema(by_alias=True)
+    schema = scene_schema()
     return {key.name: key for key in _keys(schema, schema["$defs"], "")}
 
 
@@ -149,7 +155,25 @@ def bare_quantities(data: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _key_of(name: str) -> Key:
-    """Return the key of a dotted name, of which one part may be a name of the user's."""
-    parts, keys = name.split("."), scene_keys()
-    names = [name, *(".".join(parts[:i] + parts[i + 1 :]) for i in range(len(parts)))]
-    return next(keys[one] for one in names if one in keys)
+    """Return the key of a dotted name, of which one part may be a number or a user's name."""
+    keys = scene_keys()
+    return next(keys[one] for one in _names(name) if one in keys)
+
+
+def keys_beside(path: Sequence[str]) -> list[str]:
+    """Return the keys of the section that a key would be in.
+
+    Args:
+        path: The parts of its dotted name; one may be a number or a name of the user's.
+    """
+    keys, section = scene_keys(), ".".join(path[:-1])
+    place = next((one for one in _names(section) if one in keys), "")
+    inner = (name.rpartition(".") for name in keys)
+    return [name for before, _, name in inner if before == place]
+
+
+def _names(name: str) -> Iterator[str]:
+    """Yield a dotted name, and it without one of its parts."""
+    parts = name.split(".")
+    yield name
+    yield from (".".join(parts[:i] + parts[i + 1 :]) for i in range(len(parts)))

@@ -3,39 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any, get_origin
-
-from pydantic import BaseModel, ValidationError
+from typing import Any, get_args, get_type_hints
 
 from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections
-from multiscale.scene.keys import scene_keys
+from multiscale.scene.keys import keys_beside, scene_keys
+from multiscale.scene.reader import read, to_dict
+from multiscale.scene.rules import check_together
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
-from multiscale.scene.sections import NAMES_A_FILE, Section
+from multiscale.scene.surface import NAMES_A_FILE
 from support.errors import InputError, did_you_mean
-
-_OF_TYPES = ("str", "int", "constrained-int", "float", "constrained-float")
-"""Names of types that stand at the end of a key's place where it may have several."""
+from support.fields import KEY, key_of
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
-    """What was written of a scene, which takes no part when scenes are compared.
+@dataclass(frozen=True, kw_only=True)
+class Scene(SceneSections):
+    """A complete scene: its sections, and the file that it was read from.
 
     Args:
-        data: The sections, before units were read.
+        source: The file; None for a scene from Python.
+        written: What was written, as nested dictionaries, before units were read.
     """
 
-    data: dict[str, Any] = field(default_factory=dict, compare=False)
-
-
-class Scene(SceneSections):
-    """A complete scene: its sections, and the file that it was read from."""
-
-    _source: Path | None = None
-    _written: Written = Written()
+    source: Path | None = field(default=None, metadata={KEY: None})
+    written: dict[str, Any] = field(default_factory=dict, compare=False, metadata={KEY: None})
 
     @classmethod
     def load(cls, path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -68,13 +61,22 @@ class Scene(SceneSections):
         """
         try:
             refuse_removed(data)
-            scene = cls.model_validate(data)
+            sections = read(cls, data, _unknown_key)
+            scene = replace(sections, source=source, written=_copied(data))
+            check_together(scene, scene.stated("coupling"))
         except InputError as error:
             raise error.located(file=str(source) if source else None) from None
-        except ValidationError as error:
-            raise _first_problem(error, cls).located(file=str(source) if source else None) from None
-        scene._source, scene._written = source, Written(data)
         return scene
+
+    def to_dict(self, *, whole: bool = True) -> dict[str, Any]:
+        """Return all sections as nested dictionaries that JSON can hold, as `from_dict` takes them.
+
+        Heights in memory are named by their digest.
+
+        Args:
+            whole: Whether keys without a value are among them, as None.
+        """
+        return to_dict(self, whole=whole)
 
     def with_(self, changes: Mapping[str, Any]) -> Scene:
         """Return a scene that differs in some keys.
@@ -88,27 +90,35 @@ class Scene(SceneSections):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
-        data, written = self.model_dump(by_alias=True, exclude_unset=True), self.written
+        data = self.written
         for key, value in changes.items():
-            data, written = changed(data, key, value), changed(written, key, value)
-        scene = Scene.from_dict(data, self._source)
-        scene._written = Written(written)
-        return scene
+            data = changed(data, key, value)
+        return Scene.from_dict(data, self.source)
 
-    @property
-    def written(self) -> dict[str, Any]:
-        """What was written, as nested dictionaries, before units were read."""
-        return self._written.data
+    def stated(self, section: str) -> set[str]:
+        """Return the keys that were written of a section.
+
+        Of a section that was written whole, as `to_dict` does, they are those with another value
+        than the default.
+
+        Args:
+            section: Its name.
+        """
+        given, record = set(self.written.get(section) or ()), getattr(self, section)
+        values = {one.name: getattr(record, one.name) for one in fields(record)}
+        if not given >= {name for name, value in values.items() if value is not None}:
+            return given
+        return {one.name for one in fields(record) if values[one.name] != one.default}
 
     @property
     def name(self) -> str:
         """Name of the scene: its file's stem."""
-        return self._source.stem if self._source else "scene"
+        return self.source.stem if self.source else "scene"
 
     @property
     def file(self) -> str | None:
         """The file the scene was read from."""
-        return str(self._source) if self._source else None
+        return str(self.source) if self.source else None
 
     def files(self) -> dict[str, Path]:
         """Return the paths of all files that the scene names, by dotted key."""
@@ -128,74 +138,46 @@ class Scene(SceneSections):
         """
         if file is None:
             return None
-        return (self._source.parent if self._source else Path()) / file
+        return (self.source.parent if self.source else Path()) / file
+
+
+def _copied(data: Any) -> Any:
+    """Return nested dictionaries that do not change with those that were given."""
+    if isinstance(data, dict):
+        return {name: _copied(value) for name, value in data.items()}
+    return data
 
 
 def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:
     """Yield dotted keys below a value of a scene that name files, with what they name."""
-    if isinstance(value, Section):
-        for name, field in type(value).model_fields.items():
-            key = f"{place}{field.alias or name}"
-            if NAMES_A_FILE in field.metadata:
-                yield key, getattr(value, name)
+    if is_dataclass(value):
+        hints = get_type_hints(type(value), include_extras=True)
+        for one in fields(value):
+            if not (key := key_of(one)):
+                continue
+            if names_a_file(hints[one.name]):
+                yield f"{place}{key}", getattr(value, one.name)
             else:
-                yield from _named_files(getattr(value, name), f"{key}.")
+                yield from _named_files(getattr(value, one.name), f"{place}{key}.")
     elif isinstance(value, tuple):
         for number, one in enumerate(value):
             yield from _named_files(one, f"{place}{number}.")
 
 
-def _first_problem(error: ValidationError, model: type[BaseModel]) -> InputError:
-    """Return the first problem that pydantic found, with key, value and what is allowed.
+def names_a_file(kind: Any) -> bool:
+    """Tell whether values of a type name files.
 
     Args:
-        error: What pydantic raised.
-        model: The model that was being filled, which knows its keys.
+        kind: The type of a field.
     """
-    problems = error.errors(include_url=False)
-    # A misspelt key also leaves its true name missing: the misspelling is what to say.
-    problems.sort(key=lambda problem: problem["type"] != "extra_forbidden")
-    problem = problems[0]
-    path = [str(part) for part in problem["loc"]]
-    if problem["type"] == "extra_forbidden":
-        return _unknown_key(path, model)
-    # of a key with several types pydantic names the type, and has a problem for each
-    if path and path[-1] in _OF_TYPES:
-        path.pop()
-    key = ".".join(part for part in path if "[" not in part and part != "bool") or None
-    key = key or problem.get("ctx", {}).get("key")
-    if problem["type"] == "missing":
-        return InputError("is required and missing", key=key)
-    if problem["type"] == "model_type":
-        return InputError("must be a section", key=key, value=problem["input"])
-    text, _, allowed = problem["msg"].removeprefix("Value error, ").partition(" (allowed: ")
-    text = text.replace("Input should be", "must be").replace("valid tuple", "list")
-    for other in problems[1:]:
-        if other["type"] == "literal_error" and other["input"] is problem["input"]:
-            text += f", or {other['ctx']['expected']}"
-    value = {} if isinstance(problem["input"], dict) else {"value": problem["input"]}
-    return InputError(text, key=key, allowed=allowed.rstrip(")") or None, **value)
+    marked = NAMES_A_FILE in getattr(kind, "__metadata__", ())
+    return marked or any(names_a_file(one) for one in get_args(kind) if one is not kind)
 
 
-def _unknown_key(path: list[str], model: type[BaseModel]) -> InputError:
+def _unknown_key(path: list[str]) -> InputError:
     """Return the error on a key that a section does not have; a very near one may be elsewhere."""
-    known = _known_keys(model, path[:-1])
+    known = keys_beside(path)
     tries = ((known, 0.7), (scene_keys(), 0.7), (known, 0.5))
     hints = (did_you_mean(path[-1], names, cutoff=cutoff) for names, cutoff in tries)
     hint = next(filter(None, hints), "")
     return InputError(f"unknown key{hint}", key=".".join(path) or '""', allowed=", ".join(known))
-
-
-def _known_keys(model: Any, sections: list[str]) -> list[str]:
-    """Return the keys of the section that a path leads to."""
-    several = False
-    for section in sections:
-        if several:  # the number or the name of one of several
-            several = False
-            continue
-        fields = {field.alias or name: field for name, field in model.model_fields.items()}
-        annotation = fields[section].annotation
-        several = get_origin(annotation) in (tuple, dict)
-        options = getattr(annotation, "__args__", (annotation,))
-        model = next(option for option in options if hasattr(option, "model_fields"))
-    return [field.alias or name for name, field in model.model_fields.items()]

@@ -114,10 +114,10 @@ def changed(data: dict[str, Any], key: str, value: Any) -> dict[str, Any]:
 
 def _overriding(text: str) -> Any:
     try:
-        found = parsed(f"value = {text}")
+        stated = parsed(f"value = {text}")
     except ValueError:
         return text
-    return found["value"] if found.keys() == {"value"} else text
+    return stated["value"] if stated.keys() == {"value"} else text
 
 
 def parsed(text: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from geometry import InputError, Material
 from geometry.face_frame import UPWARD, FaceFrame
-from multiscale.scene.body_sections import CounterBodySection
+from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies, SceneBody
@@ -196,7 +196,7 @@ class _Reader:
         if section.whole_material is not None:
             return section.whole_material
         return {
-            mesh.cell_tag(name, key=f"{self._key}.materials"): one.material
+            mesh.cell_tag(name, key=f"{self._key}.materials"): one
             for name, one in section.materials.items()
         }
 

@@ -101,7 +101,7 @@ def memory_requests(scene: Scene) -> Iterator[MemoryRequest]:
         where = "shared" if kind == "isolated" else "root_only"
         sizes = {"per_rank": count * BYTES_PER_LAW, where: count * BYTES_PER_NEW_LAW}
         yield request(key, patches, "a law for every patch", **sizes)
-    steps, purpose = scene.loading.load_history.count, f"the history of {count} patches"
+    steps, purpose = scene.loading.count, f"the history of {count} patches"
     size = steps * (count * BYTES_PER_STATE + BYTES_PER_STEP)
     yield request("load.steps", scene.loading.steps, purpose, per_rank=size)
 

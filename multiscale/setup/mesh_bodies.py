@@ -13,7 +13,7 @@ import numpy as np
 from geometry import Material, MaterialPair
 from geometry.face_frame import FaceFrame
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import block_material
+from multiscale.setup.surface_and_block import block_section
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody
@@ -130,7 +130,7 @@ def materials_in_contact(scene: Scene, faces: Faces) -> MaterialPair:
         faces: What is known of its meshes.
     """
     face, counter = faces
-    first = block_material(scene) if face is None else face.materials[0]
+    first = block_section(scene).material if face is None else face.materials[0]
     return MaterialPair(first=first, second=second_material(scene, counter))
 
 

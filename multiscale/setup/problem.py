@@ -23,7 +23,7 @@ from geometry.plausibility import check_finite_slopes
 from geometry.zero import Zero
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from multiscale.laws.refinement import MOST_ROWS
-from multiscale.loading.stepper import LoadHistory
+from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene
 from multiscale.setup.mesh_bodies import FaceFacts, SceneBodies
 from multiscale.setup.reference_meshes import ReferenceMeshes
@@ -213,7 +213,7 @@ class ProblemSetup:
     @property
     def zero(self) -> float:
         """Approach from first touch of the height that approaches are shown from [mm]."""
-        return self.load_history.zero
+        return self.load_history.depth
 
     @cached_property
     def zero_error(self) -> float:

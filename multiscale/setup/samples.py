@@ -5,11 +5,11 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from geometry import Material, MaterialPair, Surface, facing, mirrored
 from multiscale.scene.scene import Scene
-from multiscale.scene.sections import SurfaceSection
+from multiscale.scene.surface import SurfaceSection
 from multiscale.setup.surface_and_block import laid_counter_surface, located, sample_surface
 
 WHOLE = "face"
@@ -73,5 +73,5 @@ def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSect
     """Return the section of every seed; the section itself where it is no spectrum."""
     if section.spectrum is None or not seeds:
         return [section]
-    spectra = [section.spectrum.model_copy(update={"seed": seed}) for seed in seeds]
-    return [section.model_copy(update={"spectrum": spectrum}) for spectrum in spectra]
+    spectra = [replace(section.spectrum, seed=seed) for seed in seeds]
+    return [replace(section, spectrum=spectrum) for spectrum in spectra]

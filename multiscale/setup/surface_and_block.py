@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +13,6 @@ import numpy as np
 from geometry import (
     BlockShape,
     InputError,
-    Material,
     Surface,
     facing,
     laid_on,
@@ -22,11 +21,14 @@ from geometry import (
     turned_over,
 )
 from geometry.files.reading import surface_of
-from geometry.preparation import prepared
+from geometry.meshes.block import BlockMeshing
+from geometry.preparation import Preparation, prepared
 from geometry.zero import Zero
-from multiscale.loading.stepper import LoadHistory
+from multiscale.loading.load_history import LoadHistory
+from multiscale.scene.bodies import BlockSection
 from multiscale.scene.scene import Scene
-from multiscale.scene.sections import BlockSection, CounterSurfaceSection, SurfaceSection
+from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from support.fields import part_of
 
 LAW_BLOCK_CELLS, FIELD_CELLS = (40, 40, 25), (20, 20, 12)
 """Cells of a block that carries laws on its mesh, those of Waddad et al. 2016, or contacts, and of
@@ -109,8 +111,7 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
     extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
     if section.spectrum is not None:
         with located(scene, f"{key}.spectrum"):
-            surface = synthesise(section.spectrum.spectrum(), **extent)
-            surface = prepared(surface, section.preparation)
+            surface = prepared(synthesise(section.spectrum, **extent), section)
     elif section.heights is not None:
         with located(scene, f"{key}.heights"):
             return surface_of(
@@ -118,11 +119,11 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
                 lengths=section.lengths or (0.0, 0.0),
                 height_unit=section.height_unit or "mm",
                 periodic=section.periodic,
-                **asdict(section.preparation),
+                **part_of(section, Preparation),
             )
     else:
         extent |= {"height_unit": section.height_unit, "channel": section.channel}
-        extent |= {"periodic": section.periodic, **asdict(section.preparation)}
+        extent |= {"periodic": section.periodic, **part_of(section, Preparation)}
         with located(scene, f"{key}.file"):
             surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
@@ -143,18 +144,8 @@ def make_shape(scene: Scene, surface: Surface) -> BlockShape:
             interface=lengths,
             height=block.height_under(lengths),
             cells=block_cells(scene),
-            element=block.element,
-            grading=block.grading,
-            margin=block.margin,
-            margin_cells=block.margin_cells if block.margin else 0,
-            margin_grading=block.margin_grading if block.margin else 1.0,
+            **part_of(block, BlockMeshing),
         )
-
-
-def block_material(scene: Scene) -> Material:
-    """Return the elastic constants of a scene's block."""
-    block = block_section(scene)
-    return Material(young_modulus=block.young_modulus, poisson_ratio=block.poisson_ratio)
 
 
 def block_section(scene: Scene) -> BlockSection:
@@ -244,22 +235,22 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
     Raises:
         InputError: When the zero is none of the surface, or the plane does not touch it.
     """
-    loading, history = scene.loading, scene.loading.load_history
+    loading = scene.loading
     with located(scene, "load.zero"):
-        zero = Zero(loading.zero).depth(surfaces)
+        depth = Zero(loading.zero).depth(surfaces)
     if loading.approach is None:
-        return replace(history, zero=zero)
-    points = tuple(value + zero for value in history.points)
+        return replace(loading, depth=depth)
+    points = tuple(value + depth for value in loading.approach)
     if not points[0] > 0.0 or min(points) < 0.0:
         raise InputError(
-            f"does not touch the surface, or turns before first touch, {zero:.6g} mm above the "
+            f"does not touch the surface, or turns before first touch, {depth:.6g} mm above the "
             f"{loading.zero}",
             key="load.approach",
             value=list(loading.approach),
-            allowed=f"> {-zero:.6g} mm",
+            allowed=f"> {-depth:.6g} mm",
             file=scene.file,
         )
-    return replace(history, points=points, zero=zero)
+    return replace(loading, approach=points, depth=depth)
 
 
 def check_load(scene: Scene, surfaces: Sequence[Surface], body: Bulk) -> None:
@@ -273,7 +264,7 @@ def check_load(scene: Scene, surfaces: Sequence[Surface], body: Bulk) -> None:
         body: Size and stiffness of its body.
     """
     loading, fields = scene.loading, scene.output.fields
-    count = loading.load_history.count
+    count = loading.count
     if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
         raise InputError(
             "there are fewer load steps",

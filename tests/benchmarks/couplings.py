@@ -59,7 +59,7 @@ def surface_of(cells):
 
 def condensed(table, compliance):
     """Press a hundred steps."""
-    load_history = LoadHistory(quantity="approach", points=(APPROACH,), steps=100)
+    load_history = LoadHistory(approach=(APPROACH,), steps=100)
     return list(load_steps(CondensedCoupling(table, compliance), load_history))
 
 

@@ -88,8 +88,8 @@ def models(surface):
 
 
 def _small(setup):
-    micro = setup.scene.micro.model_copy(update={"finite_slopes": False})
-    return replace(setup, scene=setup.scene.model_copy(update={"micro": micro}))
+    micro = replace(setup.scene.micro, finite_slopes=False)
+    return replace(setup, scene=replace(setup.scene, micro=micro))
 
 
 def curve(model, scale, approaches):

@@ -78,7 +78,7 @@ def measure(choice: argparse.Namespace) -> None:
         table = timed("laws", lambda: make_table(setup, model, comm))
     else:
         displacements = timed("displacements", lambda: patch_displacements(setup, comm, dense=True))
-        history = setup.scene.loading.load_history
+        history = setup.scene.loading
         table = timed(
             "laws",
             lambda: consistent_laws(

@@ -6,9 +6,9 @@ from hypothesis import strategies as st
 
 from helpers.scene_inputs import BASE, put
 from multiscale.scene.keys import scene_keys
-from multiscale.scene.quantities import _UNITS, parse_quantity
 from multiscale.scene.scene import Scene
 from support.errors import InputError
+from support.quantities import _UNITS, parse_quantity
 
 _LONG = 5  # letters of a name in which one wrong letter leaves no doubt
 KEYS = [

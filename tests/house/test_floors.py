@@ -21,7 +21,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "support": [
         "cores errors small_caches",
-        "checks collective packages whole_files",
+        "checks collective fields packages quantities whole_files",
         "checked_store",
     ],
     "geometry": [

@@ -11,7 +11,8 @@ from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Scene, run
 from multiscale.couplings.contact import ContactCoupling
-from multiscale.loading.stepper import LoadHistory, load_steps
+from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stepper import load_steps
 
 SURFACE = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
@@ -32,7 +33,7 @@ def coupling(block):
 @pytest.mark.parametrize("block", BLOCKS)
 def test_the_way_back_is_the_way_there(block, tilt):
     points = (9e-3, 3e-3)
-    load_history = LoadHistory(quantity="approach", points=points, steps=3, tilt=tilt)
+    load_history = LoadHistory(approach=points, steps=3, tilt=tilt)
     steps = list(load_steps(coupling(block), load_history))
     again = coupling(block)
     for step in reversed(steps[2:]):

@@ -9,7 +9,8 @@ from geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthes
 from micro import HalfSpaceModel
 from multiscale.couplings.contact import ContactCoupling
 from multiscale.loading.energy import missing_energy, with_work
-from multiscale.loading.stepper import LoadHistory, load_steps
+from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stepper import load_steps
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 RADIUS, MODULUS, HARDNESS = 5.0, 1000.0, 0.3
@@ -104,7 +105,7 @@ def test_work_is_elastic_and_plastic_energy():
     """The rise of energy lies between first and last force times motion, at every step."""
     surface = rough()
     coupling = ContactCoupling(model(surface), WHOLE, patch_means(surface, WHOLE))
-    history, steps = LoadHistory(quantity="approach", points=(8e-3, 2e-3, 8e-3), steps=16), []
+    history, steps = LoadHistory(approach=(8e-3, 2e-3, 8e-3), steps=16), []
     for step in load_steps(coupling, history):
         stiffness, _, error = coupling.stiffness()
         known = replace(step, stiffness_N_per_mm=stiffness, stiffness_error_N_per_mm=error)
@@ -123,9 +124,7 @@ def test_a_step_that_is_halved_leaves_no_plastic_depth():
     surface, ends = rough(), []
     for change in (None, 0.3):
         coupling = ContactCoupling(model(surface), WHOLE, patch_means(surface, WHOLE))
-        history = LoadHistory(
-            quantity="approach", points=(2e-3, 8e-3, 4e-3), steps=1, force_change=change
-        )
+        history = LoadHistory(approach=(2e-3, 8e-3, 4e-3), steps=1, force_change=change)
         ends.append(list(load_steps(coupling, history)))
     assert len(ends[1]) > len(ends[0])
     assert ends[1][-1].force_N == pytest.approx(ends[0][-1].force_N, rel=1e-6)
@@ -250,7 +249,7 @@ def test_work_of_a_first_step_is_that_of_many(seed, hardness):
     surface, ends = rough(seed, 48), []
     for count in (1, 64):
         coupling = ContactCoupling(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
-        history, before = LoadHistory(quantity="approach", points=(8e-3,), steps=count), None
+        history, before = LoadHistory(approach=(8e-3,), steps=count), None
         for step in load_steps(coupling, history):
             stiffness, _, error = coupling.stiffness()
             known = replace(step, stiffness_N_per_mm=stiffness, stiffness_error_N_per_mm=error)

@@ -15,13 +15,13 @@ STEEL = Material(young_modulus=200e3, poisson_ratio=0.3)
 @pytest.mark.parametrize(
     ("e", "nu", "match"),
     [
-        (0.0, 0.3, r"0\.0: Young's modulus must be positive \(allowed: E > 0 MPa\)"),
-        (-4.0, 0.3, "Young's modulus"),
-        (math.nan, 0.3, "Young's modulus"),
-        (math.inf, 0.3, "Young's modulus"),
-        (1.0, 0.5, r"0\.5: Poisson's ratio is impossible \(allowed: -1 < ν < 0\.5\)"),
-        (1.0, -1.0, "Poisson's ratio"),
-        (1.0, math.nan, "Poisson's ratio"),
+        (0.0, 0.3, r"young_modulus = 0\.0: must be greater than 0"),
+        (-4.0, 0.3, "young_modulus = -4.0: must be greater than 0"),
+        (math.nan, 0.3, "young_modulus = nan: must be a finite number"),
+        (math.inf, 0.3, "young_modulus = inf: must be a finite number"),
+        (1.0, 0.5, r"poisson_ratio = 0\.5: must be less than 0\.5"),
+        (1.0, -1.0, "poisson_ratio = -1.0: must be greater than -1"),
+        (1.0, math.nan, "poisson_ratio = nan: must be a finite number"),
     ],
 )
 def test_impossible_material_is_refused(e, nu, match):

@@ -3,7 +3,7 @@ import pytest
 
 from geometry import InputError, Spectrum, Surface, read_surface, synthesise
 from geometry.filters import spikes
-from geometry.preparation import Preparation, prepared
+from geometry.preparation import Crop, Filter, Preparation, prepared
 
 X = (np.arange(64) + 0.5) / 64
 
@@ -29,11 +29,10 @@ def test_a_map_is_cropped_filled_levelled_filtered_and_resampled(tmp_path):
     surface = read(
         tmp_path,
         heights,
-        crop=((0.5, 1.0), None),
+        crop=Crop(x=(0.5, 1.0)),
         missing="fill",
-        form="plane",
-        short=0.1,
-        long=0.4,
+        detrend="plane",
+        filter=Filter(short=0.1, long=0.4),
         resample=(16, 32),
     )
     assert surface.grid == (16, 32) and surface.lengths == (0.5, 1.0)
@@ -51,11 +50,11 @@ def test_a_map_is_cropped_filled_levelled_filtered_and_resampled(tmp_path):
 
 def test_crops_are_whole_cells_of_the_map(tmp_path):
     heights = rough().heights
-    surface = read(tmp_path, heights, crop=((0.25, 0.5), (0.0, 0.51)))
+    surface = read(tmp_path, heights, crop=Crop(x=(0.25, 0.5), y=(0.0, 0.51)))
     np.testing.assert_array_equal(surface.heights, heights[16:32, :33])
     assert surface.lengths == pytest.approx((0.25, 33 / 64))
     with pytest.raises(InputError, match=r"surface.crop.x = \(0.5, 1.5\): the crop along x does"):
-        read(tmp_path, heights, crop=((0.5, 1.5), None))
+        read(tmp_path, heights, crop=Crop(x=(0.5, 1.5)))
 
 
 def test_spikes_are_removed_and_steps_stay(tmp_path):
@@ -116,18 +115,18 @@ def test_heights_in_the_wrong_unit_are_asked_about(tmp_path):
 
 
 def test_a_prepared_surface_stays_periodic_but_for_its_form():
-    surface = prepared(rough(), Preparation(short=0.1, resample=(32, 32)))
+    surface = prepared(rough(), Preparation(filter=Filter(short=0.1), resample=(32, 32)))
     assert surface.periodic and surface.grid == (32, 32)
-    assert not prepared(rough(), Preparation(form="plane")).periodic
+    assert not prepared(rough(), Preparation(detrend="plane")).periodic
     assert prepared(rough(), Preparation()).source == rough().source
 
 
 @pytest.mark.parametrize(
     ("steps", "message"),
     [
-        ({"short": 0.01}, r"filter.short = 0.01: the short cut-off .*0.03125 to 1 mm"),
-        ({"long": 2.0}, r"filter.long = 2.0: the long cut-off of the filter does not fit"),
-        ({"short": 0.5, "long": 0.4}, r"leave no waves \(allowed: less than the long cut-off, 0.4"),
+        ({"filter": Filter(short=0.01)}, r"filter.short = 0.01: the short cut.*0.03125 to 1 mm"),
+        ({"filter": Filter(long=2.0)}, r"filter.long = 2.0: the long cut-off .* does not fit"),
+        ({"filter": Filter(short=0.5, long=0.4)}, r"leave no waves .allowed: less than .*, 0.4"),
         ({"resample": (3, 8)}, r"the new grid of the surface does not fit"),
     ],
 )
@@ -138,6 +137,6 @@ def test_steps_that_do_not_fit_are_refused(steps, message):
 
 def test_surfaces_of_python_are_prepared_alike(tmp_path):
     surface = Surface(heights=rough().heights, lengths=(1.0, 1.0), source="mine")
-    done = prepared(surface, Preparation(form="quadratic"))
+    done = prepared(surface, Preparation(detrend="quadratic"))
     assert done.source == "mine, its quadratic removed"
     np.testing.assert_array_equal(done.heights, surface.detrended(2).heights)

@@ -140,7 +140,7 @@ def test_what_cannot_be_measured_is_said_and_the_run_goes_on(monkeypatch):
 
 
 def test_an_accuracy_that_is_not_kept_is_said():
-    wanted = scene(grid=96, finite_slopes=False).model_copy(update={"accuracy": 0.005})
+    wanted = replace(scene(grid=96, finite_slopes=False), accuracy=0.005)
     history = run(wanted)
     (said,) = [note for note in history.notes if "accuracy of 0.5 % is not kept" in note]
     assert "most of it by slopes" in said

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from multiscale.readable import duration, measured, number, percent, quantity, usual_unit
-from multiscale.scene.quantities import parse_quantity
+from support.quantities import parse_quantity
 
 SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 

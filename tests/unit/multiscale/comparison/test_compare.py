@@ -114,7 +114,7 @@ def test_nothing_reached_is_no_comparison():
 
 
 def test_prescribed_force_is_measured_by_the_approach():
-    scene = Scene.load(PAPER, TINY).model_dump(by_alias=True, mode="json", exclude_none=True)
+    scene = Scene.load(PAPER, TINY).to_dict(whole=False)
     scene["load"] = {"force": 2.0, "steps": 2, "tilt": "free"}
 
     def analytic(one, seconds):

@@ -197,7 +197,7 @@ def test_configuration_that_stops_keeps_its_steps(some, monkeypatch):
 
 def test_refused_configuration_tells_why(some):
     scene = Scene.load(PAPER, ["patches.grid=[64, 64]", "block.cells=[8, 8, 4]"])
-    result = run_here(replace(some[0], content=scene.model_dump(by_alias=True, exclude_none=True)))
+    result = run_here(replace(some[0], content=scene.to_dict(whole=False)))
     assert (result.status, result.exit_code, result.steps) == ("refused", 2, 0)
     assert "more patches than cells of the interface" in result.message
 

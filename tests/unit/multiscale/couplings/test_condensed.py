@@ -26,7 +26,7 @@ FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 
 def scene(*overrides, **load):
-    data = Scene.load(PAPER, [*SMALL, *overrides]).model_dump(by_alias=True)
+    data = Scene.load(PAPER, [*SMALL, *overrides]).to_dict()
     data["load"] |= load
     return Scene.from_dict(data)
 

@@ -125,7 +125,7 @@ def test_augmented_lagrangian_finds_the_contact_too(history):
 
 @pytest.fixture(scope="module")
 def by_force():
-    data = scene("load.steps=1").model_dump(by_alias=True)
+    data = scene("load.steps=1").to_dict()
     data["load"] = {"force": ["2 N", "0.5 N"], "steps": 1, "tilt": "free"}
     return run(Scene.from_dict(data))
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.loading.stepper import BeyondLaws, LoadHistory, load_steps
+from multiscale.loading.stepper import BeyondLaws, load_steps
 from support.errors import NotConverged
 
 
@@ -42,7 +43,7 @@ class Spring:
 
 
 def load_history(*points, quantity="approach", **more):
-    return LoadHistory(quantity=quantity, points=points, **more)
+    return LoadHistory(**{quantity: points}, **more)
 
 
 def test_legs_are_divided_evenly():
@@ -69,7 +70,7 @@ def test_steps_are_numbered_through():
 
 
 def test_controls_carry_quantity_and_tilt():
-    control = load_history(2.0, quantity="force", tilt=None).control(1.5)
+    control = load_history(2.0, quantity="force", tilt="free").control(1.5)
     assert (control.approach, control.force, control.tilt) == (None, 1.5, None)
 
 

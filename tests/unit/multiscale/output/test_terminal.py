@@ -9,12 +9,12 @@ from geometry.rigid_plane import Control
 from micro import micro_model
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
-from multiscale.loading.stepper import LoadHistory
+from multiscale.loading.load_history import LoadHistory
 from multiscale.output import terminal
 from support.collective import shared
 from support.cores import Place
 
-LOADS = LoadHistory(quantity="approach", points=(8e-3,), steps=4, tilt=(0.0, 0.0))
+LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
 STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)
 
 

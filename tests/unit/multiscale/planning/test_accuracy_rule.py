@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -197,9 +198,7 @@ def test_a_coupling_that_other_sections_refuse_is_not_chosen():
     load = {"approach": [0.006, 0.001], "steps": 2 * SOLUTIONS_OF_LAWS}
     free = scene(load=load, surface={"grid": [48, 48]}, coupling={"kind": "concurrent"})
     hard = free.with_({"micro.hardness": 400.0})
-    opened = hard.model_copy(
-        update={"coupling": type(hard.coupling).model_construct(**{"kind": "consistent"})}
-    )
+    opened = replace(hard, coupling=replace(hard.coupling, kind="consistent"))
     assert chosen_coupling(free)[0].kind == "consistent"
     assert chosen_coupling(opened)[0].kind == "concurrent"
 

@@ -11,6 +11,7 @@ from multiscale import Scene, make_setup
 from multiscale.machine import ClusterNodes
 from multiscale.planning.auto_keys import auto_keys, resolved_sections
 from multiscale.planning.plan import statements, warnings
+from multiscale.scene.keys import scene_schema
 from support.errors import InputError
 
 
@@ -235,10 +236,10 @@ def test_sizes_that_fit_no_memory_are_refused_before_anything_is_made(sections, 
 
 def test_auto_values_survive_a_dump_and_are_in_the_schema():
     given = scene({"grid": "auto"}, accuracy=0.03, **OPEN)
-    again = Scene.from_dict(given.model_dump(by_alias=True, mode="json"))
+    again = Scene.from_dict(given.to_dict())
     assert auto_keys(again) == {"surface.grid", "coupling.kind", "patches.grid"}
     assert auto_keys(given) - auto_keys(again) == {"micro.model"}  # a dump states every key
-    patches = Scene.model_json_schema(by_alias=True)["$defs"]["PatchesSection"]
+    patches = scene_schema()["$defs"]["PatchesSection"]
     assert {"const": "auto", "type": "string"} in patches["properties"]["grid"]["anyOf"]
 
 

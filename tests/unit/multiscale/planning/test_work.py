@@ -11,7 +11,7 @@ import pytest
 from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
-from multiscale.loading.stepper import LoadHistory
+from multiscale.loading.load_history import LoadHistory
 from multiscale.output.terminal import Pace
 from multiscale.planning import work
 from multiscale.planning.auto_keys import SOLUTIONS_OF_LAWS
@@ -130,11 +130,9 @@ def test_work_grows_with_what_is_asked():
 
 
 def test_steps_that_may_be_halved_are_counted():
-    plain = LoadHistory(quantity="approach", points=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
+    plain = LoadHistory(approach=(0.008, 0.002), steps=3, tilt=(0.0, 0.0))
     assert step_count(plain) == 6
-    fine = LoadHistory(
-        quantity="approach", points=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05
-    )
+    fine = LoadHistory(approach=(0.008,), steps=3, tilt=(0.0, 0.0), force_change=0.05)
     assert step_count(fine) == 20
 
 

@@ -23,7 +23,6 @@ from multiscale.restart.checkpoint import (
     write_checkpoint,
 )
 from multiscale.restart.results_folder import FolderLock, find_checkpoint
-from multiscale.scene.sections import MicroSection
 from support.checked_store import read_record, write_record
 from support.errors import InputError, NotConverged, NotWritten
 
@@ -495,11 +494,9 @@ def test_folders_under_names_of_results_are_nobody_elses_to_remove(tmp_path, cap
 
 @pytest.mark.long
 def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, monkeypatch):
-    left_open = scene({
-        "block": {"cells": "auto"},
-        "patches": {"grid": "auto"},
-        "coupling": {"kind": "auto"},
-    }).model_copy(update={"accuracy": 0.4, "micro": MicroSection()})  # fmt: skip
+    auto = {"block": {"cells": "auto"}, "patches": {"grid": "auto"}, "coupling": {"kind": "auto"}}
+    data = scene(auto).written | {"accuracy": 0.4, "micro": {}}
+    left_open = Scene.from_dict(data)
     whole = Run(left_open)
     next(steps := whole.load_steps())
     path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.state()))

@@ -14,8 +14,8 @@ from multiscale.cli import describe
 from multiscale.cli.command_line import main
 from multiscale.cli.signals import Ended, signals_raise
 from multiscale.restart.interruption import Interruption, Stopped
-from multiscale.scene.quantities import parse_duration
 from support.errors import InputError
+from support.quantities import parse_duration
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [

@@ -1,12 +1,17 @@
 """Identity of a scene: its keys, the content of every file that it names, the version."""
 
+from typing import get_type_hints
+
 import numpy as np
 import pytest
 
 from multiscale.scene import identity as module
+from multiscale.scene.bodies import BodySection, CounterBodySection
 from multiscale.scene.identity import changes, content_digest, identity
-from multiscale.scene.scene import Scene
-from multiscale.scene.sections import NAMES_A_FILE, Section
+from multiscale.scene.keys import scene_keys
+from multiscale.scene.reader import described
+from multiscale.scene.scene import Scene, names_a_file
+from multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}
 BODY = {
@@ -78,21 +83,16 @@ def test_heights_in_memory_count_by_their_numbers():
 
 def test_no_key_that_names_a_file_is_forgotten():
     """Fields whose text speaks of a file are marked; a new one must not slip past."""
-
-    def sections(kind):
-        return [kind, *(one for below in kind.__subclasses__() for one in sections(below))]
-
-    named = {
-        (kind.__name__, name)
-        for kind in sections(Section)
-        for name, field in kind.model_fields.items()
-        if (field.description or "").startswith("File of")
-    }
-    marked = {
-        (kind.__name__, name)
-        for kind in sections(Section)
-        for name, field in kind.model_fields.items()
-        if NAMES_A_FILE in field.metadata
-    }
-    assert named == marked
-    assert {name for _, name in marked} == {"file", "mesh"}
+    surfaces = (SurfaceSection, CounterSurfaceSection, RegionSection)
+    for section in (*surfaces, CounterBodySection, BodySection):
+        hints, (_, meanings) = get_type_hints(section, include_extras=True), described(section)
+        named = {name for name, text in meanings.items() if text.startswith("File of")}
+        assert named == {name for name in meanings if names_a_file(hints[name])}
+    keys = {name for name, key in scene_keys().items() if key.meaning.startswith("File of")}
+    assert keys == {"law.regions.file"} | {
+        f"{section}.{name}"
+        for section, name in [
+            ("surface", "file"), ("counter_surface", "file"),
+            ("body", "mesh"), ("counter_body", "mesh"),
+        ]
+    }  # fmt: skip

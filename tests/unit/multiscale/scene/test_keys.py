@@ -1,9 +1,14 @@
 """Every key of a scene says what it is, in help and schema alike."""
 
+from dataclasses import fields, is_dataclass
+from typing import get_args, get_type_hints
+
 import pytest
 
 from multiscale.scene.keys import bare_quantities, dotted, scene_keys
+from multiscale.scene.reader import described
 from multiscale.scene.scene import Scene
+from support.fields import key_of
 
 GIVEN = {
     "surface": {
@@ -16,25 +21,26 @@ GIVEN = {
 }
 
 
-def models(annotation):
-    """Yield the sections in a type."""
-    if hasattr(annotation, "model_fields"):
-        yield annotation
-    for part in getattr(annotation, "__args__", ()):
-        yield from models(part)
+def records(kind):
+    """Yield the records in a type."""
+    if isinstance(kind, type) and is_dataclass(kind):
+        yield kind
+    for part in get_args(kind):
+        yield from records(part)
 
 
-def fields(model):
-    """Yield all fields of a section and of those in it, which the schema has or leaves out."""
-    for name, field in model.model_fields.items():
-        yield f"{model.__name__}.{name}", field
-        for inner in models(field.annotation):
-            yield from fields(inner)
+def described_keys(record):
+    """Yield all keys of a section and of those in it with what their docstring says."""
+    hints, (_, meanings) = get_type_hints(record, include_extras=True), described(record)
+    for field in fields(record):
+        if key_of(field):
+            yield f"{record.__name__}.{field.name}", meanings.get(field.name, "")
+            for inner in records(hints[field.name]):
+                yield from described_keys(inner)
 
 
-@pytest.mark.parametrize(("name", "field"), list(fields(Scene)))
-def test_every_key_has_a_description(name, field):
-    text = field.description or ""
+@pytest.mark.parametrize(("name", "text"), list(described_keys(Scene)))
+def test_every_key_has_a_description(name, text):
     assert len(text) > 10, name
     assert text[0].isupper() and text.endswith("."), name
 

@@ -15,8 +15,8 @@ from multiscale.scene.new_scene import (
     scene_text,
     sensible_force,
 )
-from multiscale.scene.quantities import parse_quantity
 from multiscale.scene.scene import Scene
+from support.quantities import parse_quantity
 
 DATA = {**START, "surface": SYNTHESISED, "load": {"steps": 8, "force": "2 N"}}
 

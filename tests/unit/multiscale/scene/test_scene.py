@@ -10,6 +10,7 @@ import pint
 import pytest
 
 from multiscale.planning.problem_setup import make_setup
+from multiscale.scene.keys import scene_schema
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import read_scene_file
 from support.errors import InputError
@@ -84,7 +85,7 @@ REFUSED = {
     "tilt in kg": ("load.tilt=['1 kg', 0]", "load.tilt.0 = '1 kg': has the wrong unit"),
     "change of force": ("load.force_change=0", "load.force_change = 0: must be greater than"),
     "two amplitudes": ("surface.spectrum.rms_height=1", "surface.spectrum: "),
-    "empty band": ("surface.spectrum.waves=[10, 2]", "waves is not a band"),
+    "empty band": ("surface.spectrum.waves=[10, 2]", "waves = [10, 2]: is not a band"),
 }
 
 
@@ -95,7 +96,7 @@ def test_refusal_names_file_key_and_value(override, text):
 
 
 def test_heights_of_a_file_have_their_grid():
-    data = Scene.load(PAPER).model_dump(by_alias=True, exclude_none=True)
+    data = Scene.load(PAPER).to_dict(whole=False)
     data["surface"] = {"file": "a.npy", "grid": "auto", "lengths": [1.0, 1.0]}
     with pytest.raises(InputError, match="surface: grid = 'auto' needs a 'spectrum'"):
         Scene.from_dict(data)
@@ -158,17 +159,17 @@ def test_which_block_stands_under_the_patches(overrides, decomposed):
 
 
 def test_loads_in_newtons_up_and_down():
-    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data = Scene.load(PAPER).to_dict()
     data["load"] = {"force": ["5 N", "1000 mN", 0, "2 N"], "steps": 2, "tilt": "free"}
-    load_history = Scene.from_dict(data).loading.load_history
-    assert (load_history.quantity, load_history.tilt) == ("force", None)
+    load_history = Scene.from_dict(data).loading
+    assert (load_history.quantity, load_history.slopes) == ("force", None)
     assert load_history.targets == pytest.approx(
         [2.5, 5, 3, 1, 0.5, 0, 1, 2], rel=1e-14
     )  # rounding
 
 
 def test_no_load_is_refused():
-    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data = Scene.load(PAPER).to_dict()
     data["load"] = {"steps": 2}
     with pytest.raises(InputError, match="load: needs exactly one load"):
         Scene.from_dict(data)
@@ -270,18 +271,18 @@ def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
 
 
 def test_scene_is_frozen():
-    with pytest.raises(ValueError, match="frozen"):
+    with pytest.raises(AttributeError, match="cannot assign to field 'steps'"):
         Scene.load(PAPER).loading.steps = 3
 
 
 def test_schema_knows_every_section():
-    schema = Scene.model_json_schema(by_alias=True)
+    schema = scene_schema()
     assert {"surface", "block", "patches", "micro", "coupling", "load"} <= set(schema["properties"])
     assert schema["additionalProperties"] is False
 
 
 def test_spectrum_needs_an_extent():
-    data = Scene.load(PAPER).model_dump(by_alias=True)
+    data = Scene.load(PAPER).to_dict()
     data["surface"]["lengths"] = None
     with pytest.raises(InputError, match="surface: a 'spectrum' needs 'grid' and 'lengths' beside"):
         Scene.from_dict(data)
@@ -290,7 +291,7 @@ def test_spectrum_needs_an_extent():
 def test_byte_order_mark_of_some_editors_is_passed_over(tmp_path):
     path = tmp_path / "marked.toml"
     path.write_bytes(b"\xef\xbb\xbf" + PAPER.read_bytes())
-    assert Scene.load(path).model_dump() == Scene.load(PAPER).model_dump()
+    assert Scene.load(path).to_dict() == Scene.load(PAPER).to_dict()
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ PEAKS = {"hurst": 0.8, "waves": [2, 16], "rms_slope": 0.2, "seed": 2}
 def scene(seed=1, coupling="consistent", **load):
     small = [f"surface.spectrum.seed={seed}", "surface.grid=[33, 33]", "block.cells=[8, 8, 6]"]
     models = ["micro.model=half-space", f"coupling.kind={coupling}"]
-    data = Scene.load(PAPER, [*small, *models]).model_dump(by_alias=True)
+    data = Scene.load(PAPER, [*small, *models]).to_dict()
     return Scene.from_dict(data | {"load": {"steps": 1} | load})
 
 
@@ -109,7 +109,7 @@ class Shy(ContactCoupling):
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
     coupling = Shy(setup.model, setup.patches, setup.mean_heights)
-    load_history = setup.scene.loading.load_history
+    load_history = setup.scene.loading
     plain = ContactCoupling(setup.model, setup.patches, setup.mean_heights)
     known, found = (
         plane_at_largest_load(load_history, one, setup.surface) for one in (plain, coupling)

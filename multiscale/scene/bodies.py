@@ -1,0 +1,176 @@
+"""The sections of a scene on elastic bodies: the block, and bodies from a mesh on either side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Annotated, Literal
+
+from geometry.materials import Material, PoissonRatio
+from geometry.meshes.block import BlockMeshing, Element
+from multiscale.scene.surface import NAMES_A_FILE, Auto, Tag
+from support.errors import InputError
+from support.fields import (
+    Count,
+    Length,
+    Limits,
+    PositiveLength,
+    PositivePressure,
+    Pressure,
+    part_of,
+)
+
+Cells = tuple[Count, Count, Count]
+Component = Length | Literal["free"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BlockSection(Material, BlockMeshing):
+    """The elastic block below the surface, pressed by a rigid plane.
+
+    ``cells`` and the keys after it describe the mesh of the block with a flat top. That mesh is
+    made where patch laws need it (``coupling.compliance = "finite-element"``) and for fields
+    (``output.fields``); nothing else depends on it.
+
+    Args:
+        height: Height of the block; the shorter side of the surface when not given.
+        lengths: Sides of the contact face along x and y under a law of a sample (``law.kind =
+            "representative"``); otherwise they are those of the surface.
+        young_modulus: Young's modulus of the block.
+        poisson_ratio: Poisson's ratio of the block.
+        sides: Whether the four sides of the block are free, or held by rollers that let them slide.
+        cells: Cells of the block's mesh along x, y and z; as many as its use needs when not given.
+    """
+
+    height: PositiveLength | None = None
+    lengths: tuple[PositiveLength, PositiveLength] | None = None
+    sides: Literal["free", "roller"] = "free"
+    cells: Cells | Auto | None = None
+    element: Element = "Q1"
+    margin_grading: Annotated[float, Limits(ge=1, le=1e6)] = 8.0
+
+    @property
+    def material(self) -> Material:
+        """The material."""
+        return Material(**part_of(self, Material))
+
+    def height_under(self, lengths: tuple[float, float]) -> float:
+        """Return the height of the block under a surface of given sides [mm]."""
+        return min(lengths) if self.height is None else self.height
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SupportSection:
+    """A face that is held.
+
+    Args:
+        surface: Physical name or number of the face.
+        displacement: Displacement along the axes x, y and z of the mesh; ``"free"`` leaves a
+            component free.
+    """
+
+    surface: Tag
+    displacement: tuple[Component, Component, Component] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TractionSection:
+    """A face that is loaded.
+
+    Args:
+        surface: Physical name or number of the face.
+        stress: Force per area along the axes x, y and z of the mesh.
+    """
+
+    surface: Tag
+    stress: tuple[Pressure, Pressure, Pressure]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CounterBodySection:
+    """The elastic body on the other side; a rigid plane without this section.
+
+    With elastic constants alone it is a half-space. With a mesh it is a second body, whose contact
+    face lies opposite to that of the first one, in the same plane; the meshes need not match. Its
+    supports move with the approach.
+
+    Args:
+        mesh: File of the mesh, gmsh's .msh or .xdmf, with named or numbered faces. A relative path
+            starts in the folder of the scene. Without it the body is a half-space.
+        mesh_unit: Unit of the mesh's coordinates.
+        contact: Physical name or number of the planar face that is in contact.
+        element: Degree of the displacements.
+        supports: Faces that are held; together they leave no rigid motion.
+        materials: Elastic constants by physical name or number of the volumes; instead of these,
+            one material for the whole body.
+        tractions: Faces that are loaded besides the contact, by loads that stay while the plane
+            approaches.
+        young_modulus: Young's modulus of the whole body.
+        poisson_ratio: Poisson's ratio of the whole body.
+    """
+
+    mesh: Annotated[str, NAMES_A_FILE] | None = None
+    mesh_unit: Literal["mm", "m", "um", "inch"] = "mm"
+    contact: Tag | None = None
+    element: Literal["linear", "quadratic"] = "linear"
+    supports: tuple[SupportSection, ...] = ()
+    materials: dict[str, Material] = field(default_factory=dict)
+    tractions: tuple[TractionSection, ...] = ()
+    young_modulus: PositivePressure | None = None
+    poisson_ratio: PoissonRatio | None = None
+
+    def __post_init__(self) -> None:
+        alone = (self.young_modulus, self.poisson_ratio)
+        stated = sum(value is not None for value in alone)
+        if stated == 1 or (stated == 2) == bool(self.materials):
+            raise InputError(
+                "needs the elastic constants of the body once",
+                allowed="young_modulus and poisson_ratio; or, of a mesh, materials by volume",
+            )
+        if self.mesh is None:
+            self._check_half_space()
+        elif self.contact is None or not self.supports:
+            missing = "supports" if self.contact is not None else "contact"
+            raise InputError(f"a 'mesh' needs '{missing}' beside it", allowed="names of its faces")
+
+    def _check_half_space(self) -> None:
+        """Refuse what is about a mesh."""
+        for one in sorted(fields(CounterBodySection), key=lambda one: one.name):
+            default = {} if one.name == "materials" else one.default
+            constant = one.name in ("young_modulus", "poisson_ratio")
+            if not constant and getattr(self, one.name) != default:
+                raise InputError(
+                    f"'{one.name}' needs a 'mesh'",
+                    allowed="a mesh; or young_modulus and poisson_ratio alone, of a half-space",
+                )
+
+    @property
+    def whole_material(self) -> Material | None:
+        """The material of the whole body; None where volumes have their own."""
+        if self.young_modulus is None or self.poisson_ratio is None:
+            return None
+        return Material(young_modulus=self.young_modulus, poisson_ratio=self.poisson_ratio)
+
+    @property
+    def faces(self) -> set[str | int]:
+        """All faces that are named."""
+        held = {one.surface for one in self.supports}
+        loaded = {one.surface for one in self.tractions}
+        return held | loaded if self.contact is None else held | loaded | {self.contact}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BodySection(CounterBodySection):
+    """The elastic body below the surface, from a mesh, instead of ``[block]``.
+
+    Args:
+        mesh: File of the mesh, gmsh's .msh or .xdmf, with named or numbered faces. A relative path
+            starts in the folder of the scene.
+        contact: Physical name or number of the planar face that is in contact.
+        place: Lower corner of the surface's rectangle in the coordinates of the contact face, which
+            count from the lower corner of its bounding rectangle; in the middle of the face when
+            not given.
+    """
+
+    mesh: Annotated[str, NAMES_A_FILE]
+    contact: Tag
+    place: tuple[Length, Length] | None = None

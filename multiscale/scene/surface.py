@@ -1,0 +1,184 @@
+"""The sections of a scene on heights: the surface, that of the other side, those of regions."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, InstanceOf
+from pydantic.json_schema import SkipJsonSchema
+
+from geometry.files.content import LENGTH_UNITS, length_unit
+from geometry.preparation import Preparation
+from geometry.spectrum import Spectrum
+from support.checks import real_array
+from support.errors import InputError, did_you_mean
+from support.fields import Heights, Length, Limits, PositiveLength, Unit
+
+Auto = Literal["auto"]
+"""Value of a key that is left to the plan."""
+Tag = str | Annotated[int, Limits(ge=0)]
+"""Physical name or number of a face in a mesh."""
+
+NAMES_A_FILE = "names a file"
+"""Marks keys whose value is the name of a file that results depend on."""
+
+
+class HeightMap:
+    """Heights in memory, equal to others with the same numbers; float64 is not copied.
+
+    Args:
+        values: Heights, shape (nx, ny); not a number, or masked, where they are missing.
+
+    Raises:
+        InputError: When they are no map of numbers.
+    """
+
+    def __init__(self, values: Any) -> None:
+        self.values = real_array(values)
+        if self.values.ndim != 2:
+            raise InputError("is no map of heights", allowed="numbers with an index [ix, iy]")
+
+    @cached_property
+    def digest(self) -> str:
+        """Shape and SHA-256, which stand for the heights where a scene is written down."""
+        content = np.ascontiguousarray(self.values).tobytes()
+        return f"{self.values.shape} {self.values.dtype} {hashlib.sha256(content).hexdigest()}"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, HeightMap) and self.digest == other.digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __repr__(self) -> str:
+        nx, ny = self.values.shape
+        return f"{nx} × {ny} heights"
+
+
+def _height_map(value: Any) -> Any:
+    return value if value is None or isinstance(value, HeightMap) else HeightMap(value)
+
+
+HeightsInMemory = Annotated[
+    SkipJsonSchema[InstanceOf[HeightMap] | None], BeforeValidator(_height_map)
+]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceSection(Preparation):
+    """Exactly one source of heights, the rectangle it covers, and what is done to the map.
+
+    A map is prepared in this order: ``swap_xy``, ``crop``, ``outliers``, ``missing``, ``detrend``,
+    ``filter``, ``resample``.
+
+    Args:
+        spectrum: Recipe of a synthesised surface; it needs ``lengths``, and ``grid`` unless an
+            ``accuracy`` chooses it.
+        file: File of a measured map: .npy, text, .xyz, or an instrument's format. A relative path
+            starts in the folder of the scene.
+        heights: From Python: an array with index [ix, iy], in mm or in ``height_unit``.
+        height_unit: Unit of the heights of a file that does not state one; mm when not given.
+        channel: Name or number, counted from 0, of the channel of a file that has several.
+        grid: Numbers of heights along x and y: what a spectrum is sampled on, or what a file must
+            have. With an ``accuracy`` a spectrum needs none.
+        lengths: Sides of the surface along x and y; needed where a file does not state them.
+        periodic: Whether surface and contact continue over the borders; half-space contacts with
+            ``coupling.kind = "analytic"`` alone.
+    """
+
+    grid_is_open: ClassVar[bool] = True
+    """Whether a spectrum may be without a grid, for an accuracy to choose it."""
+
+    spectrum: Spectrum | None = None
+    file: Annotated[str, NAMES_A_FILE] | None = None
+    heights: HeightsInMemory = None
+    height_unit: str | None = None
+    channel: str | Annotated[int, Limits(ge=0)] | None = None
+    grid: tuple[Heights, Heights] | Auto | None = None
+    lengths: tuple[PositiveLength, PositiveLength] | None = None
+    periodic: bool = False
+
+    def __post_init__(self) -> None:
+        if sum(source is not None for source in (self.spectrum, self.file, self.heights)) != 1:
+            raise InputError(
+                "needs exactly one source",
+                allowed="either 'spectrum' or 'file'; from Python also 'heights'",
+            )
+        if self.heights is not None and self.lengths is None:
+            raise InputError("'heights' need 'lengths' beside them")
+        without_grid = self.grid is None and not self.grid_is_open
+        if self.spectrum is not None and (without_grid or self.lengths is None):
+            raise InputError("a 'spectrum' needs 'grid' and 'lengths' beside it")
+        maps = ("height_unit", "channel", "swap_xy", "crop", "missing", "outliers", "resample")
+        defaults = {field.name: field.default for field in fields(self)}
+        for key in maps:
+            if self.spectrum is not None and getattr(self, key) != defaults[key]:
+                raise InputError(f"'{key}' needs a 'file'", allowed="leave it out")
+        if self.heights is not None and (self.grid, self.channel) != (None, None):
+            raise InputError("'heights' have their own grid, and no channel", allowed="neither")
+        if self.file is not None and self.grid == "auto":
+            raise InputError(
+                "grid = 'auto' needs a 'spectrum'",
+                allowed="the grid of the file, or leave it out",
+            )
+        if self.height_unit is not None:
+            _check_unit(self.height_unit)
+
+    @property
+    def lacks_grid(self) -> bool:
+        """Whether a spectrum is sampled on a grid that only an accuracy decides."""
+        return self.spectrum is not None and self.grid is None
+
+
+def _check_unit(unit: str) -> None:
+    try:
+        length_unit(unit)
+    except InputError:
+        hint = did_you_mean(unit, LENGTH_UNITS, cutoff=1.0)
+        raise InputError(
+            f"height_unit = '{unit}' is no unit of heights{hint}", allowed=", ".join(LENGTH_UNITS)
+        ) from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CounterSurfaceSection(SurfaceSection):
+    """Roughness of the other side, and how it lies on the surface.
+
+    Its other keys are those of ``[surface]``.
+
+    Args:
+        shift: Way along x and y that it is moved, once it lies on the surface: over the borders of
+            a periodic map, or over a map that is larger than the surface.
+        rotation: Angle that it is turned by about its middle, from x to y as seen from above,
+            before it is moved. Quarters of a turn are exact; others interpolate, on a periodic or
+            larger map.
+    """
+
+    grid_is_open: ClassVar[bool] = False
+
+    shift: tuple[Length, Length] = (0.0, 0.0)
+    rotation: Annotated[float, Unit("deg")] = 0.0
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether it is shifted or turned."""
+        return any(self.shift) or self.rotation != 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RegionSection(SurfaceSection):
+    """A face with a surface of its own, in the same plane as the contact face.
+
+    Its other keys are those of ``[surface]``.
+
+    Args:
+        surface: Physical name or number of the face.
+    """
+
+    grid_is_open: ClassVar[bool] = False
+
+    surface: Tag

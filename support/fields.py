@@ -1,0 +1,123 @@
+"""Units and limits of the fields of records, stated once, where a field is declared.
+
+A record refuses what is beyond them by `check_limits`. Whatever reads records from text, as scenes
+are read, finds them beside the types.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import Field, dataclass, fields
+from functools import cache
+from typing import Annotated, Any, get_args, get_type_hints
+
+from support.errors import InputError
+
+KEY = "key"
+"""Metadata of a dataclass's field: its name in scene files; None where it is no key of theirs."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Unit of a number, or of several.
+
+    Args:
+        name: The unit in pint's notation; empty for a ratio.
+        several: Whether the field holds a tuple, for which users may write one number or a list.
+    """
+
+    name: str
+    several: bool = False
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Limits:
+    """Limits of a number; those that are None are none.
+
+    Args:
+        gt: What it exceeds.
+        ge: Its least value.
+        lt: What it is less than.
+        le: Its largest value.
+    """
+
+    gt: float | None = None
+    ge: float | None = None
+    lt: float | None = None
+    le: float | None = None
+
+    def problem(self, value: float) -> str:
+        """Return what is wrong with a number, in pydantic's words; empty for nothing."""
+        if isinstance(value, float) and not math.isfinite(value):
+            return "must be a finite number"
+        tests = (
+            (self.gt is None or value > self.gt, f"greater than {self.gt}"),
+            (self.ge is None or value >= self.ge, f"greater than or equal to {self.ge}"),
+            (self.lt is None or value < self.lt, f"less than {self.lt}"),
+            (self.le is None or value <= self.le, f"less than or equal to {self.le}"),
+        )
+        return next((f"must be {words}" for kept, words in tests if not kept), "")
+
+
+Positive = Limits(gt=0)
+Length = Annotated[float, Unit("mm")]
+PositiveLength = Annotated[float, Unit("mm"), Positive]
+Pressure = Annotated[float, Unit("MPa")]
+PositivePressure = Annotated[float, Unit("MPa"), Positive]
+Slope = Annotated[float, Unit("")]
+Count = Annotated[int, Limits(ge=1, le=1_000_000_000)]
+Heights = Annotated[int, Limits(ge=4, le=1_000_000_000)]
+"""Number of heights along a side; fewer than four have no cubic interpolant."""
+
+
+def check_limits(record: Any) -> None:
+    """Refuse a record with a number beyond the limits of its field; None is within them.
+
+    Args:
+        record: The record.
+
+    Raises:
+        InputError: Names field and value.
+    """
+    for name, limits in _limits(record.__class__).items():
+        value = getattr(record, name)
+        if value is not None and (problem := limits.problem(value)):
+            raise InputError(problem, key=name, value=value)
+
+
+@cache
+def _limits(record: Any) -> Mapping[str, Limits]:
+    """Return the limits of a record's numbers by field; those of numbers in lists are left out."""
+    hints = get_type_hints(record, include_extras=True)
+    named = ((one.name, next(_within(hints[one.name]), None)) for one in fields(record))
+    return {name: limits for name, limits in named if limits is not None}
+
+
+def _within(annotation: Any) -> Iterator[Limits]:
+    """Yield the limits in the type of a number, which may be None."""
+    if hasattr(annotation, "__metadata__"):
+        yield from (mark for mark in annotation.__metadata__ if isinstance(mark, Limits))
+    elif type(None) in (options := get_args(annotation)):
+        for option in options:
+            yield from _within(option)
+
+
+def part_of(record: Any, base: type) -> dict[str, Any]:
+    """Return the fields that a record has from one of its bases, as arguments of that base.
+
+    Args:
+        record: The record.
+        base: The base, a dataclass.
+    """
+    return {field.name: getattr(record, field.name) for field in fields(base)}
+
+
+def key_of(field: Field[Any]) -> str | None:
+    """Return the name of a record's field in scene files; None where it is no key of theirs.
+
+    Args:
+        field: The field of a dataclass.
+    """
+    key: str | None = field.metadata.get(KEY, field.name)
+    return key
