@@ -39,8 +39,8 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
         "scene_file": run.scene.file,
-        "scene": run.scene,
-        "scene_given": run.given,
+        "scene": run.scene.to_dict(),
+        "scene_given": run.given.to_dict(),
         "files": files_of(run.identity),
         "units": "mm, N, MPa",
         "surface": {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from itertools import chain
 
 from multiscale.scene.contents import SceneSections
@@ -106,7 +107,11 @@ def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> It
     if not scene.law.representative:
         return
     law, out = "law.kind = 'representative'", "leave it out"
-    for key in sorted(set(of_coupling) - {"table_tolerance"}):
+    values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
+    stated = set(of_coupling)
+    if stated >= {key for key, value in values.items() if value is not None}:  # written whole
+        stated = {key for key in stated if values[key] != default[key]}
+    for key in sorted(stated - {"table_tolerance"}):
         yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
     if scene.patches != type(scene.patches)():
         yield "patches.grid", f"does not go with {law}, which has no patches", out

@@ -98,17 +98,10 @@ class Scene(SceneSections):
     def stated(self, section: str) -> set[str]:
         """Return the keys that were written of a section.
 
-        Of a section that was written whole, as `to_dict` does, they are those with another value
-        than the default.
-
         Args:
             section: Its name.
         """
-        given, record = set(self.written.get(section) or ()), getattr(self, section)
-        values = {one.name: getattr(record, one.name) for one in fields(record)}
-        if not given >= {name for name, value in values.items() if value is not None}:
-            return given
-        return {one.name for one in fields(record) if values[one.name] != one.default}
+        return set(self.written.get(section) or ())
 
     @property
     def name(self) -> str:
