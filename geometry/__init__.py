@@ -6,16 +6,22 @@ contact modulus, and block shapes the mesh of the body under the surface.
 """
 
 from geometry.asperities import Asperities, find_asperities
-from geometry.facing import facing, laid_on, turned_over
+from geometry.facing import facing, laid_on, mirrored, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.expected_contact import places_in_reach
 from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
-from geometry.mirroring import mirrored
-from geometry.patches import Partition, PatchGrid, UnevenPartition, overlaps, patch_means
-from geometry.regions import Regions
+from geometry.patches import (
+    Partition,
+    PatchGrid,
+    Regions,
+    UnevenPartition,
+    overlaps,
+    patch_means,
+)
+from geometry.preparation import Crop, Filter, Preparation
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.spectrum import Spectrum
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
@@ -27,6 +33,8 @@ __all__ = [
     "Asperities",
     "BlockShape",
     "Control",
+    "Crop",
+    "Filter",
     "InputError",
     "Material",
     "MaterialPair",
@@ -36,6 +44,7 @@ __all__ = [
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
+    "Preparation",
     "RefinedShape",
     "Regions",
     "RigidPlane",

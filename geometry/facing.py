@@ -1,4 +1,4 @@
-"""Two rough surfaces that face each other, as one surface of the sums of their heights."""
+"""Surfaces made from others: the sums of the heights of two that face each other, mirror images."""
 
 from __future__ import annotations
 
@@ -102,3 +102,19 @@ def facing(first: Surface, second: Surface) -> Surface:
     )
     check_slopes(both)
     return both
+
+
+def mirrored(surface: Surface) -> Surface:
+    """Return a surface with its mirror images beside it, twice as long and wide, periodic.
+
+    A map that is continued as it is has a step all around it, whose ridge carries load. Mirrored
+    heights continue without a step; all they have is a crease where the map slopes at its border.
+
+    Args:
+        surface: The surface.
+    """
+    lx, ly = surface.lengths
+    row = np.concatenate((surface.heights, surface.heights[::-1]))
+    heights = np.concatenate((row, row[:, ::-1]), axis=1)
+    source = f"{surface.source}, mirrored" if surface.source else "mirrored"
+    return replace(surface, heights=heights, lengths=(2 * lx, 2 * ly), periodic=True, source=source)

@@ -1,4 +1,4 @@
-"""Filters on maps of heights: areal Gaussian, spikes, cell averages on another grid."""
+"""Filters on maps of heights: areal Gaussian, spikes, missing heights, averages on another grid."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from functools import partial
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import uniform_filter
+from scipy.sparse import coo_matrix
+from scipy.sparse.linalg import spsolve
 
 from geometry.interpolant import Interpolant
-from geometry.missing import filled
 from support.checks import is_level
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -80,12 +82,12 @@ def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
         heights: Heights, shape (nx, ny) [mm]; not a number where missing.
         spacing: Sides (dx, dy) of a cell [mm].
     """
-    found = np.zeros(heights.shape, dtype=np.bool_)
+    spiking = np.zeros(heights.shape, dtype=np.bool_)
     lonely = partial(_lonely_spikes, spacing=spacing)
     with np.errstate(over="ignore", invalid="ignore"):  # heights of no scale are refused later
-        for found_by in (_codes, _local_spikes, lonely, _codes):  # what is found misleads no other
-            found |= found_by(np.where(found, np.nan, heights))
-    return found
+        for search in (_codes, _local_spikes, lonely, _codes):  # a spike misleads no later search
+            spiking |= search(np.where(spiking, np.nan, heights))
+    return spiking
 
 
 def _local_spikes(heights: Array) -> NDArray[np.bool_]:
@@ -139,15 +141,69 @@ def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.b
 def _codes(heights: Array) -> NDArray[np.bool_]:
     """Find a lowest or highest value that means "no data"."""
     known = np.isfinite(heights)
-    found = np.zeros(heights.shape, dtype=np.bool_)
+    codes = np.zeros(heights.shape, dtype=np.bool_)
     for code in (heights[known].min(), heights[known].max()) if known.any() else ():
         same = heights == code
         others = heights[known & ~same]
         if np.count_nonzero(same) < _FEWEST_CODES or not others.size or is_level(others):
             continue
         if float(np.abs(others - code).min()) > float(np.ptp(others)):
-            found |= same
-    return found
+            codes |= same
+    return codes
+
+
+def filled(heights: ArrayLike, spacing: tuple[float, float]) -> tuple[Array, float]:
+    """Replace missing heights by a membrane that hangs between the others.
+
+    The filled heights minimise ∫ |∇h|² (Laplace's equation, five-point differences), free on the
+    border of the grid. They lie between the lowest and the highest of the heights around them, so
+    that no summit is invented; a summit that was not measured stays unknown.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; missing where not a number.
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        The heights, and the share of them that was missing.
+
+    Raises:
+        InputError: When all are missing.
+    """
+    whole = np.array(heights, dtype=np.float64)
+    missing = np.isnan(whole)
+    if missing.all():
+        raise InputError("all heights are missing", allowed="heights to fill gaps from")
+    if missing.any():
+        whole[missing] = _membrane(whole, missing, spacing)
+    return whole, float(missing.mean())
+
+
+def _membrane(heights: Array, missing: NDArray[np.bool_], spacing: tuple[float, float]) -> Array:
+    """Return the heights at the gaps, in the order of the array."""
+    number = np.full(heights.shape, -1)
+    number[missing] = np.arange(np.count_nonzero(missing))
+    ends, others, weights = [], [], []
+    for axis, step in enumerate(spacing):
+        one = np.moveaxis(np.arange(heights.size).reshape(heights.shape), axis, 0)
+        for here, there in ((one[:-1], one[1:]), (one[1:], one[:-1])):
+            gap = missing.ravel()[here]
+            ends.append(here[gap])
+            others.append(there[gap])
+            weights.append(np.full(int(gap.sum()), (min(spacing) / step) ** 2))
+    cell, other, weight = np.concatenate(ends), np.concatenate(others), np.concatenate(weights)
+    row, column, count = number.ravel()[cell], number.ravel()[other], int(missing.sum())
+    inside = column >= 0
+    right = np.bincount(
+        row[~inside],
+        weights=weight[~inside] * heights.ravel()[other[~inside]],
+        minlength=count,
+    )
+    diagonal = np.bincount(row, weights=weight, minlength=count)
+    entries = np.concatenate((-weight[inside], diagonal))
+    rows = np.concatenate((row[inside], np.arange(count)))
+    columns = np.concatenate((column[inside], np.arange(count)))
+    matrix = coo_matrix((entries, (rows, columns)), shape=(count, count)).tocsc()
+    return np.asarray(spsolve(matrix, right))
 
 
 def regridded(

@@ -195,8 +195,8 @@ class Interpolant:
         low, high = np.transpose([self._box(axis) for axis in range(2)])
         limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
         options = {"ftol": 1e-16, "gtol": 1e-12}
-        found = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
-        px, py = np.clip(origin + found.x * (dx, dy), low, high)
+        top = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
+        px, py = np.clip(origin + top.x * (dx, dy), low, high)
         return float(px), float(py), float(value(px, py, grid=False))
 
 

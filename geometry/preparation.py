@@ -9,8 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.filters import regridded, smoothed, spikes
-from geometry.missing import filled
+from geometry.filters import filled, regridded, smoothed, spikes
 from geometry.plausibility import check_slopes
 from geometry.surface import Surface
 from support.checks import cell_counts, cells_between

@@ -86,12 +86,12 @@ class Control:
 
     def prescribed(self, motion: Array) -> Array:
         """Return a plane's approach and slopes, shape (3,), with the prescribed ones put in."""
-        found = np.array(motion, dtype=np.float64)
+        plane = np.array(motion, dtype=np.float64)
         if self.approach is not None:
-            found[0] = self.approach
+            plane[0] = self.approach
         if self.tilt is not None:
-            found[1:] = self.tilt
-        return found
+            plane[1:] = self.tilt
+        return plane
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -112,9 +112,9 @@ class Surface:
     def _summit(self) -> tuple[float, float, float]:
         if self.heights.size <= _KEPT_SPLINE or "interpolant" in vars(self):
             return self.interpolant.maximum()
-        found = Interpolant(self.heights, self.lengths, periodic=self.periodic).maximum()
+        summit = Interpolant(self.heights, self.lengths, periodic=self.periodic).maximum()
         gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
-        return found
+        return summit
 
     def height_at(self, x: ArrayLike, y: ArrayLike) -> Array:
         """Evaluate the interpolant at any points, up to and on the border.

@@ -58,9 +58,9 @@ class Zero:
     @property
     def share(self) -> float:
         """Share of the area that lies higher than a quantile; NaN where there is none."""
-        found = _QUANTILE.fullmatch(self.name)
+        quantile = _QUANTILE.fullmatch(self.name)
         try:
-            return float(found[1]) if found else math.nan
+            return float(quantile[1]) if quantile else math.nan
         except ValueError:  # two points
             return math.nan
 

@@ -25,7 +25,7 @@ from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Coupling
 from multiscale.readable import Caution, quantity
-from multiscale.scene.conductance import ConductanceSection
+from multiscale.scene.bodies import ConductanceSection
 from multiscale.setup.problem import ProblemSetup
 
 Array = NDArray[np.float64]

@@ -143,12 +143,12 @@ def shared(
     parts = dealt(count, size, costs)
 
     def work_off() -> list[T]:
-        found = []
+        results = []
         for turn, index in enumerate(parts[rank]):
-            found.append(work(index))
+            results.append(work(index))
             if observe is not None:
                 observe(min(size * (turn + 1), count))
-        return found
+        return results
 
     if size == 1:
         gathered = [work_off()]
@@ -159,7 +159,7 @@ def shared(
         failures = [error for _, error in outcomes if error is not None]
         if failures:
             raise failures[0]
-        gathered = [found for found, _ in outcomes]
+        gathered = [result for result, _ in outcomes]
     results = dict(zip(chain(*parts), chain(*gathered), strict=True))
     return [results[index] for index in range(count)]
 

@@ -50,11 +50,11 @@ def optional_packages() -> Iterator[None]:
 
 def _failed_import(error: Exception) -> str:
     """Return the package whose import raised an error; nothing where none did."""
-    found = ""
+    missing = ""
     if isinstance(error, ImportError):
-        found = (error.name or "").partition(".")[0]
+        missing = (error.name or "").partition(".")[0]
     for frame, _ in walk_tb(error.__traceback__):
         package = str(frame.f_globals.get("__name__", "")).partition(".")[0]
-        if frame.f_code.co_name == "<module>" and package in _NEEDS and found not in _NEEDS:
-            found = package
-    return found
+        if frame.f_code.co_name == "<module>" and package in _NEEDS and missing not in _NEEDS:
+            missing = package
+    return missing

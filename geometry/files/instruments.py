@@ -9,8 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from geometry.files.arrays import first_line
-from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
+from geometry.files.content import (
+    LENGTH_UNITS,
+    FileContent,
+    check_memory,
+    first_line,
+    length_unit,
+)
 from support.errors import InputError
 
 _BYTES_PER_BYTE = 20
@@ -43,10 +48,10 @@ def read_instrument(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of readers, about metadata
             with library.open_topography(str(file)) as reader:
-                found = _channel(reader, channel)
-                if states_sides and found.physical_sizes is None:
+                chosen = _channel(reader, channel)
+                if states_sides and chosen.physical_sizes is None:
                     raise UnknownFormat("the text states no sides that SurfaceTopography knows")
-                return _content(reader, found)
+                return _content(reader, chosen)
     except InputError:
         raise
     except Exception as error:  # its readers raise errors of many families
@@ -95,16 +100,16 @@ def _channel(reader: Any, wanted: str | int | None) -> Any:
     if wanted is None:
         maps = [one for one in channels if one.is_height_channel and one.dim == 2]
         default = reader.default_channel
-        found = default if default in maps or not maps else maps[0]
+        chosen = default if default in maps or not maps else maps[0]
     else:
         named: dict[str | int, Any] = {one.name: one for one in reversed(channels)}
         named |= enumerate(channels)
         if wanted not in named:
             names = ", ".join(f"{number} {one.name!r}" for number, one in enumerate(channels))
             raise InputError("there is no such channel", value=wanted, allowed=names)
-        found = named[wanted]
-    if found.dim != 2:
+        chosen = named[wanted]
+    if chosen.dim != 2:
         raise InputError("the file holds a profile, not a surface", allowed="areal measurements")
-    if not found.is_height_channel:
-        raise InputError(f"the channel {found.name!r} holds {found.data_kind.value}, no heights")
-    return found
+    if not chosen.is_height_channel:
+        raise InputError(f"the channel {chosen.name!r} holds {chosen.data_kind.value}, no heights")
+    return chosen

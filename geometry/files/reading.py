@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.files.arrays import read_array
-from geometry.files.content import LENGTH_UNITS, FileContent, length_unit
+from geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
 from geometry.files.instruments import UnknownFormat, read_instrument
 from geometry.files.text import load_text, read_text
 from geometry.plausibility import reading_notes, surface_notes

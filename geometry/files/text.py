@@ -7,10 +7,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
-from geometry.files.points import heights_of_points, lists_points
 from geometry.files.table import Line, is_number, number_table, words_of
+from support.checks import LARGEST
 from support.errors import InputError
+
+Array = NDArray[np.float64]
 
 _BYTES_PER_CHARACTER = 8
 """Memory that a text takes per character while it is read, roughly [B]."""
@@ -18,6 +23,14 @@ _START = 4096
 """Bytes at the start of a file that tell text from other formats."""
 _SHOWN = 40
 """Characters of a heading that are shown."""
+
+_PLACE_TOLERANCE = 0.01
+"""Distance of a point from its place on a regular grid that is accepted [cells]."""
+_FEWEST = 0.5
+"""Least share of a grid's places that points must take: with fewer it is hardly their grid."""
+
+_FEWEST_POINTS, _MOST_COLUMNS = 16, 12
+"""Rows and columns between which a matrix may be a list of points with more than heights."""
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
@@ -130,16 +143,76 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
 
 def _image(comments: list[str]) -> tuple[tuple[float, float] | None, str | None]:
     """Return the sides [mm] that two comments in succession state, and the unit of heights."""
-    unit = next((found[1] for line in comments if (found := _VALUE_UNIT.fullmatch(line))), None)
-    known = {*LENGTH_UNITS, "µm", "μm"}
+    unit = next((known[1] for line in comments if (known := _VALUE_UNIT.fullmatch(line))), None)
+    units = {*LENGTH_UNITS, "µm", "μm"}
     for place, pair in enumerate(pairwise(comments)):
-        sizes = [found for line in pair if (found := _SIZE.fullmatch(line)) and found[2] in known]
+        sizes = [size for line in pair if (size := _SIZE.fullmatch(line)) and size[2] in units]
         if len(sizes) == 2:
             after = (_WORD.fullmatch(line) for line in comments[place + 2 :])
-            unit = unit or next((found[1] for found in after if found), None)
+            unit = unit or next((word[1] for word in after if word), None)
             x, y = (
                 float(size[1].replace(",", ".")) * LENGTH_UNITS[length_unit(size[2])]
                 for size in sizes
             )
             return (x, y), unit and length_unit(unit)
     return None, unit and length_unit(unit)
+
+
+def heights_of_points(points: Array) -> FileContent:
+    """Return the heights of points on a regular grid, in any order; not a number where none is.
+
+    Args:
+        points: Rows x, y, z [mm], z in the unit of the file.
+
+    Raises:
+        InputError: When there are not three columns, or the points lie on no regular grid.
+    """
+    if points.shape[1] != 3:
+        raise InputError(
+            "a point list needs three columns x, y, z",
+            value=points.shape[1],
+            allowed="3 columns; a list of x, z is a profile, not a surface",
+        )
+    if not np.all(np.abs(points[:, :2]) <= LARGEST):
+        raise InputError(f"some coordinates x, y are not finite, or beyond {LARGEST:g} mm")
+    (ix, dx), (iy, dy) = _places(points[:, 0], "x"), _places(points[:, 1], "y")
+    nx, ny = int(ix.max()) + 1, int(iy.max()) + 1
+    taken, times = np.unique(ix * ny + iy, return_counts=True)
+    if taken.size < _FEWEST * nx * ny or np.any(times != 1):
+        raise InputError(
+            f"the points do not fill a regular grid of {nx} × {ny}: "
+            f"{nx * ny - taken.size} places are empty, "
+            f"{np.count_nonzero(times > 1)} taken more than once"
+        )
+    heights = np.full((nx, ny), np.nan)
+    heights[ix, iy] = points[:, 2]
+    return FileContent(heights=heights, lengths=(nx * dx, ny * dy))
+
+
+def lists_points(matrix: Array) -> bool:
+    """Tell whether the first two columns of a matrix are the places of a whole regular grid.
+
+    Args:
+        matrix: A matrix of three or more columns.
+    """
+    if len(matrix) < _FEWEST_POINTS or matrix.shape[1] > _MOST_COLUMNS:
+        return False
+    try:
+        return heights_of_points(matrix[:, :3]).heights.size == len(matrix)
+    except InputError:
+        return False
+
+
+def _places(coordinate: Array, axis: str) -> tuple[NDArray[np.intp], float]:
+    """Return the index of every coordinate on an even division, and the division's step [mm]."""
+    lowest, span = coordinate.min(), float(np.ptp(coordinate))
+    gaps = np.diff(np.sort(coordinate))
+    if not span:
+        raise InputError(f"all points have the same {axis}, they are a profile, not a surface")
+    count = round(span / float(np.median(gaps[gaps > 0.3 * gaps.max()])))  # without rounding noise
+    step = span / count
+    place = (coordinate - lowest) / step
+    index = np.rint(place).astype(np.intp)
+    if np.max(np.abs(place - index)) > _PLACE_TOLERANCE:
+        raise InputError(f"the points are not evenly spaced along {axis}")
+    return index, step

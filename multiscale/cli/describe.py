@@ -185,13 +185,13 @@ def _explained(topic: str | None) -> Iterator[tuple[str, str]]:
         yield from ((key.name, key.meaning) for key in keys.values() if "." not in key.name)
         yield "more", "patchlaw help load, patchlaw help load.force"
         return
-    found = [key for key in keys.values() if f".{key.name}".endswith(f".{topic}")]
-    if not found:
+    named = [key for key in keys.values() if f".{key.name}".endswith(f".{topic}")]
+    if not named:
         close = difflib.get_close_matches(topic, keys, n=1)
         hint = f"; did you mean '{close[0]}'?" if close else ""
         sections = ", ".join(key.name for key in keys.values() if key.is_section)
         raise InputError(f"is no key of a scene{hint}", key="KEY", value=topic, allowed=sections)
-    for key in found:
+    for key in named:
         yield key.name, key.meaning if key.is_section else _on_key(key)
         inner = (one for one in keys.values() if one.name.rpartition(".")[0] == key.name)
         yield from ((one.name, one.meaning if one.is_section else _on_key(one)) for one in inner)

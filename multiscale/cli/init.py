@@ -8,10 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.surface import Surface
-from multiscale.machine import refuse_detached_processes
-from multiscale.output import terminal
-from multiscale.readable import quantity
-from multiscale.scene.new_scene import (
+from multiscale.cli.new_scene import (
     CONTACT_AREA,
     START,
     SYNTHESISED,
@@ -19,6 +16,9 @@ from multiscale.scene.new_scene import (
     scene_text,
     sensible_force,
 )
+from multiscale.machine import refuse_detached_processes
+from multiscale.output import terminal
+from multiscale.readable import quantity
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
 from multiscale.setup.surface_and_block import block_section, make_surface

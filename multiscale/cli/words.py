@@ -36,13 +36,13 @@ class _ShowVersions(argparse.Action):
     def __call__(self, *given: Any) -> NoReturn:
         from importlib import metadata  # takes longer than all else that --help needs
 
-        found = []
+        versions = []
         for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
             try:
-                found.append(f"{name} {metadata.version(distribution)}")
+                versions.append(f"{name} {metadata.version(distribution)}")
             except metadata.PackageNotFoundError:
-                found.append(f"{name} not installed")
-        print(", ".join(found))
+                versions.append(f"{name} not installed")
+        print(", ".join(versions))
         raise SystemExit(0)
 
 

@@ -9,8 +9,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.patches import PatchGrid
-from geometry.regions import Regions
+from geometry.patches import PatchGrid, Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error

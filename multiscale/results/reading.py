@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry.patches import PatchGrid
-from geometry.regions import Regions
+from geometry.patches import PatchGrid, Regions
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History

@@ -1,13 +1,19 @@
-"""All sections of a scene in one record."""
+"""All sections of a scene in one record, and which of them go together."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from itertools import chain
 from typing import Annotated
 
 from multiscale.loading.load_history import LoadHistory
-from multiscale.scene.bodies import BlockSection, BodySection, CounterBodySection
-from multiscale.scene.conductance import ConductanceSection
+from multiscale.scene.bodies import (
+    BlockSection,
+    BodySection,
+    ConductanceSection,
+    CounterBodySection,
+)
 from multiscale.scene.sections import (
     CouplingSection,
     LawSection,
@@ -17,7 +23,11 @@ from multiscale.scene.sections import (
     ReferenceSection,
 )
 from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from support.errors import InputError
 from support.fields import KEY, Limits
+
+Problem = tuple[str, str, str]
+"""A key, why its value makes no sense beside those of others, and what is allowed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,3 +92,170 @@ class SceneSections:
     def on_mesh(self) -> bool:
         """Whether laws lie on finite elements of the body, plain or condensed."""
         return self.kind not in ("analytic", "concurrent", "reference") and not self.decomposed
+
+
+def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
+    """Refuse sections that make no sense together.
+
+    Args:
+        scene: The sections, each of which makes sense.
+        of_coupling: The keys that were written of the section on the coupling.
+
+    Raises:
+        InputError: With the first reason.
+    """
+    problems = chain(
+        *(rule(scene) for rule in (_bodies, _surfaces, _couplings)),
+        _representative_laws(scene, of_coupling),
+        *(rule(scene) for rule in (_hardness, _conductance)),
+    )
+    for key, problem, allowed in problems:
+        raise InputError(problem, key=key, allowed=allowed or None)
+
+
+def _bodies(scene: SceneSections) -> Iterator[Problem]:
+    if scene.block is None and scene.body is None:
+        yield "block", "is required and missing", "[block]; or [body], of a mesh"
+    if scene.block is not None and scene.body is not None:
+        yield "body", "is a second body below the surface", "either [block] or [body]"
+    if scene.block is None:
+        return
+    if scene.law.representative and scene.block.lengths is None:
+        yield (
+            "block.lengths",
+            "is required with law.kind = 'representative', whose surface is a sample",
+            "the sides of the block along x and y",
+        )
+    if scene.block.lengths is not None and not scene.law.representative:
+        yield (
+            "block.lengths",
+            "needs law.kind = 'representative'",
+            "leave it out; the sides of the block are those of the surface, and block.margin",
+        )
+
+
+def _surfaces(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what does not fit of periodic surfaces, where something ends or turns, and two."""
+    kind, model, tilt = scene.coupling.kind, scene.micro.model, scene.loading.tilt
+    alone = (kind, model, tilt) == ("analytic", "half-space", (0, 0))
+    if scene.surface.periodic and not (scene.law.representative or alone):
+        yield (
+            "surface.periodic",
+            "a body or a plane that turns does not continue periodically",
+            "coupling.kind = 'analytic', micro.model = 'half-space', a level plane; or "
+            "law.kind = 'representative'",
+        )
+    other = scene.counter_surface
+    if scene.surface.lacks_grid and (scene.accuracy is None or other is not None):
+        yield "surface", "a 'spectrum' needs 'grid' and 'lengths' beside it", ""
+    if other is None:
+        return
+    if other.periodic != scene.surface.periodic:
+        yield "counter_surface.periodic", "is not surface.periodic", "both, or neither"
+    if "auto" in (scene.surface.grid, other.grid):
+        yield "surface.grid", "is not chosen with [counter_surface]", "the same numbers in both"
+
+
+def _couplings(scene: SceneSections) -> Iterator[Problem]:
+    coupling, second = scene.coupling, scene.counter_body
+    for name in ("body", "counter_body", "counter_surface"):
+        if coupling.kind == "reference" and getattr(scene, name) is not None:
+            yield (
+                "coupling.kind",
+                f"reference does not go with [{name}]: what is meshed is a block under a rigid, "
+                "smooth plane",
+                "'concurrent', 'consistent', 'isolated'",
+            )
+    on_mesh = coupling.newton == "full" or coupling.interface == "pointwise"
+    if second is not None and second.mesh is None and coupling.kind == "isolated" and on_mesh:
+        yield (
+            "coupling.kind",
+            "isolated laws against a half-space need the compliance of both bodies",
+            "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
+            "coupling.kind = 'consistent'",
+        )
+    chosen = scene.accuracy is not None or "auto" in (coupling.kind, scene.surface.grid)
+    if scene.body is not None and chosen:
+        yield (
+            "accuracy",
+            "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
+            "leave it out, and state them",
+        )
+
+
+def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:
+    """Yield the keys that a law of a periodic sample has no use for."""
+    if not scene.law.representative:
+        return
+    law, out = "law.kind = 'representative'", "leave it out"
+    values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
+    stated = set(of_coupling)
+    if stated >= {key for key, value in values.items() if value is not None}:  # written whole
+        stated = {key for key in stated if values[key] != default[key]}
+    for key in sorted(stated - {"table_tolerance"}):
+        yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
+    if scene.patches != type(scene.patches)():
+        yield "patches.grid", f"does not go with {law}, which has no patches", out
+    if scene.accuracy is not None:
+        yield "accuracy", f"does not go with {law}", "coupling.table_tolerance"
+    if scene.micro.model != "half-space":
+        yield "micro.model", f"does not go with {law}", "'half-space'"
+    if scene.output.contact in ("last", "all"):
+        yield "output.contact", f"does not go with {law}, which has no spots", out
+    if scene.law.seeds and scene.surface.spectrum is None:
+        yield "law.seeds", "needs surface.spectrum", "leave it out for a measured map"
+    if scene.block is not None and scene.law.regions:
+        yield "law.regions", "names faces of a mesh", "with [body]"
+    if scene.body is not None and scene.body.place is not None:
+        yield "body.place", f"does not go with {law}, whose sample has no place", out
+
+
+def _hardness(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what has no plastic depth, or forgets it."""
+    if scene.micro.hardness is None:
+        return
+    if scene.micro.model != "half-space":
+        yield (
+            "micro.hardness",
+            f"does not go with micro.model = '{scene.micro.model}', which has no cells to yield",
+            "micro.model = 'half-space'",
+        )
+    if scene.kind in ("isolated", "reference"):
+        yield (
+            "micro.hardness",
+            f"does not go with coupling.kind = '{scene.kind}', which is elastic",
+            "coupling.kind = 'concurrent', 'consistent' or 'analytic'",
+        )
+    if scene.kind in ("consistent", "representative", "auto") and scene.loading.unloads:
+        yield (
+            "micro.hardness",
+            "does not go with a load that turns back where patch laws stand for the contact: "
+            "they are those of rising loads and have no plastic depth",
+            "coupling.kind = 'concurrent'",
+        )
+
+
+def _conductance(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what does not know the stiffness of the interface alone."""
+    if scene.conductance is None:
+        return
+    if scene.kind == "reference":
+        yield (
+            "conductance",
+            "does not go with coupling.kind = 'reference', whose meshes do not tell the stiffness "
+            "of the interface from that of the block",
+            "coupling.kind = 'concurrent', 'consistent', 'isolated' or 'analytic'",
+        )
+    if scene.micro.hardness is not None and scene.kind not in ("concurrent", "analytic"):
+        yield (
+            "conductance",
+            "does not go with micro.hardness where patch laws stand for the contact: their "
+            "stiffness is that of contacts that yield, which conduct all the same",
+            "coupling.kind = 'concurrent'",
+        )
+    if scene.kind in ("concurrent", "analytic", "auto") and scene.micro.model != "half-space":
+        yield (
+            "conductance",
+            f"does not go with micro.model = '{scene.micro.model}' without laws",
+            "micro.model = 'half-space'; or coupling.kind = 'consistent' or 'isolated'",
+        )

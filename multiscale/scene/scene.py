@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
 from multiscale.removed import refuse_removed
-from multiscale.scene.contents import SceneSections
+from multiscale.scene.contents import SceneSections, check_together
 from multiscale.scene.keys import keys_beside, scene_keys
 from multiscale.scene.reader import read, to_dict
-from multiscale.scene.rules import check_together
 from multiscale.scene.scene_file import changed, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
 from support.errors import InputError, did_you_mean

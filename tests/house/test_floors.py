@@ -26,9 +26,9 @@ FLOORS = {
     ],
     "geometry": [
         "blocked_spline legendre_modes slope_search",
-        "interpolant materials missing regions",
+        "interpolant materials",
         "face_frame filters spectrum surface",
-        "mirroring patches statistics summits synthesis zero",
+        "patches statistics summits synthesis zero",
         "plausibility",
         "facing preparation rigid_plane",
         "files",

@@ -5,7 +5,7 @@ import pytest
 from helpers.hard_cases import centred, from_file, history, scene
 
 from geometry.files.reading import read_surface
-from geometry.missing import filled
+from geometry.filters import filled
 from multiscale import make_setup, run
 from multiscale.planning.plan import statements, warnings
 from support.errors import InputError

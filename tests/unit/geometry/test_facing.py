@@ -1,9 +1,9 @@
-"""The sum of two rough surfaces that face each other."""
+"""Surfaces made from others: the sum of two that face each other, mirror images."""
 
 import numpy as np
 import pytest
 
-from geometry import InputError, Surface, facing, laid_on, turned_over
+from geometry import InputError, Surface, facing, laid_on, mirrored, turned_over
 
 
 def surface(heights, lengths=(2.0, 1.0), **kwargs):
@@ -78,3 +78,23 @@ def test_a_larger_map_is_cut_where_it_lies():
     np.testing.assert_allclose(found.heights, large.heights[1:5, 4:8], atol=1e-12)
     with pytest.raises(InputError):
         laid_on(small, large, shift=(3 / 8, 0.0))
+
+
+def test_mirrored_heights():
+    surface = Surface(
+        heights=np.arange(24.0).reshape(4, 6), lengths=(2.0, 3.0), source="map", notes=("a gap",)
+    )
+    whole = mirrored(surface)
+    assert (whole.grid, whole.lengths, whole.periodic) == ((8, 12), (4.0, 6.0), True)
+    assert whole.spacing == surface.spacing
+    assert (whole.source, whole.notes) == ("map, mirrored", ("a gap",))
+    np.testing.assert_array_equal(whole.heights[:4, :6], surface.heights)
+    np.testing.assert_array_equal(whole.heights, whole.heights[::-1])
+    np.testing.assert_array_equal(whole.heights, whole.heights[:, ::-1])
+    assert whole.mean_height == surface.mean_height
+
+
+def test_a_mirrored_slope_has_a_crease_and_no_step():
+    surface = Surface(heights=np.outer(np.arange(8.0), np.ones(4)), lengths=(8.0, 4.0))
+    around = np.append(mirrored(surface).heights[:, 0], 0.0)
+    assert np.abs(np.diff(around)).max() == 1.0

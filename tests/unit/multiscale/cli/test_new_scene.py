@@ -6,8 +6,7 @@ import pytest
 
 from geometry import Material, Spectrum, synthesise
 from micro import HalfSpaceModel
-from multiscale.scene.keys import scene_keys
-from multiscale.scene.new_scene import (
+from multiscale.cli.new_scene import (
     CONTACT_AREA,
     START,
     SYNTHESISED,
@@ -15,6 +14,7 @@ from multiscale.scene.new_scene import (
     scene_text,
     sensible_force,
 )
+from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene import Scene
 from support.quantities import parse_quantity
 
