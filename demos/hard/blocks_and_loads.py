@@ -36,7 +36,7 @@ for nu, element, cells, bound in (
     (0.4999, "Q2", [8, 8, 8], 0.03), (0.0, "Q2", [6, 6, 4], 5e-3), (-0.5, "Q2", [6, 6, 4], 5e-3),
 ):  # fmt: skip
     name = f"ν = {nu:g}, {element}, {' × '.join(map(str, cells))} cells".replace("-", "−")
-    locks = "locks, and is warned of" if (element, nu) == ("Q1", 0.4999) else "as decomposed"
+    locks = "locks, with a warning" if (element, nu) == ("Q1", 0.4999) else "as decomposed"
     case(6, name, locks, bound)(
         lambda nu=nu, element=element, cells=cells: stiff_block(nu, element, cells)
     )
@@ -196,7 +196,7 @@ def bad_cell() -> tuple[Any, ...]:
     return error, Count(newton=0, linear=block.solver.its)
 
 
-@case(20, "reference meshed too coarsely for a contact node", "none, told; the force asked", 1e-10)
+@case(20, "reference meshed too coarsely for a contact node", "no force, and a note; the prescribed force", 1e-10)
 def too_coarse() -> tuple[Any, ...]:
     coarse = {"reference__cells": [4, 4, 2], "reference__meshes": 1}
     found = solved("reference", load__approach="0.2 um", **coarse)
