@@ -4,8 +4,8 @@
 # What one learns: which cases of rough contact are numerically difficult, what the right result is,
 # how large the error is and how many iterations it takes. Every row is a scene far from the usual
 # one (a 1 mm cube, 4 × 4 patches, 8 µm), a pair of summits or a law; it is compared with a closed
-# form, another coupling or another way to the same load. The same is asserted, for more couplings, in
-# `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
+# form, another coupling or another way to the same load. The same is asserted, for more couplings,
+# in `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
 #
 # Run time: two minutes. `--quick` for one case of each kind, `--out DIR` for the folder of
 # table and figure.
@@ -57,7 +57,9 @@ for case in sorted(CASES, key=lambda one: one.number):
     if error > case.bound:
         errors.append(f"case {case.number}, {case.hard}: off by {error:.1e}")
 
-HEAD = "| | what is difficult | what must hold | error | bound | load steps | Newton | linear | CG |"
+HEAD = (
+    "| | what is difficult | what must hold | error | bound | load steps | Newton | linear | CG |"
+)
 table = [HEAD, "|--:|---|---|--:|--:|--:|--:|--:|--:|"]
 for case, error, work, _ in rows:
     off = "0" if error == 0.0 else f"{error:.1e}"

@@ -196,7 +196,12 @@ def bad_cell() -> tuple[Any, ...]:
     return error, Count(newton=0, linear=block.solver.its)
 
 
-@case(20, "reference meshed too coarsely for a contact node", "no force, and a note; the prescribed force", 1e-10)
+@case(
+    20,
+    "reference meshed too coarsely for a contact node",
+    "no force, and a note; the prescribed force",
+    1e-10,
+)
 def too_coarse() -> tuple[Any, ...]:
     coarse = {"reference__cells": [4, 4, 2], "reference__meshes": 1}
     found = solved("reference", load__approach="0.2 um", **coarse)

@@ -129,7 +129,12 @@ for name, heights in {
     case(13, name, "as without laws", 0.02)(lambda heights=heights: couplings_agree(heights))
 
 
-@case(14, "49 of 1024 heights missing, filled on request; small slopes", "as without missing heights", 1e-6)
+@case(
+    14,
+    "49 of 1024 heights missing, filled on request; small slopes",
+    "as without missing heights",
+    1e-6,
+)
 def holes() -> tuple[Any, ...]:
     """Fill heights that nothing touches: they count in finite slopes alone, there by 1e-4."""
     small: dict[str, Any] = {"micro__finite_slopes": False}
