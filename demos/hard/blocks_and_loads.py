@@ -155,7 +155,7 @@ for name, points in LAWS.items():
     )
 
 
-@case(16, "force from 1e-9 N through first touch, and none", "the force asked for", 1e-5)
+@case(16, "force from 1e-9 N through first touch, and none", "the prescribed force", 1e-5)
 def small_forces() -> tuple[Any, ...]:
     wanted = [1e-9, 1e-6, 1e-3, 1.0, 0.0]
     found = solved("consistent", load__approach=None, load__force=wanted)
