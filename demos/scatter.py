@@ -1,9 +1,9 @@
 # %% [markdown]
 # # A thousand rough surfaces on one block
 #
-# What one learns: how much the force at a given approach scatters between surfaces that are equal
-# in everything that is usually told of a rough surface (spectrum, rms gradient, size), and differ
-# in their phases alone. One deterministic curve, such as the paper's, is one draw.
+# What one learns: how much the force at a given approach scatters between surfaces that agree in
+# everything that is usually stated of a rough surface (spectrum, rms gradient, size) and differ
+# only in their phases. One deterministic curve, such as the paper's, is one sample.
 #
 #     block, sides, kernels: once a rank              1000 × { surface → contact problem on the
 #                                                       block → 8 load steps → measured error }
