@@ -57,6 +57,8 @@ def read(record: type[T], data: Any, unknown: Complain = _unknown) -> T:
         return _made(record, model.model_validate(data))
     except pydantic.ValidationError as error:
         raise _first_problem(error, unknown) from None
+    except InputError as refusal:
+        raise _placed(refusal, None, data) from None
 
 
 def to_dict(record: Any, *, whole: bool = True) -> Any:
@@ -209,7 +211,7 @@ def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputE
     return InputError(text + instead, key=key, **value)
 
 
-def _placed(refusal: InputError, key: str | None, given: Any, instead: str) -> InputError:
+def _placed(refusal: InputError, key: str | None, given: Any, instead: str = "") -> InputError:
     """Return the error of a record, or of a value, at its place in what was given for it."""
     value = given
     if isinstance(given, Mapping):

@@ -78,7 +78,7 @@ class Scene(SceneSections):
         return to_dict(self, whole=whole)
 
     def with_(self, changes: Mapping[str, Any]) -> Scene:
-        """Return a scene that differs in some keys.
+        """Return a scene that differs in some keys from what was written.
 
         A key that excludes another replaces it: ``load.force`` replaces ``load.approach``.
 

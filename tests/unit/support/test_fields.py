@@ -1,0 +1,76 @@
+"""Units and limits of fields: what they refuse, and what readers of records find."""
+
+import math
+import re
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import pytest
+
+from support.errors import InputError
+from support.fields import (
+    KEY,
+    Count,
+    Length,
+    Limits,
+    PositiveLength,
+    check_limits,
+    key_of,
+    part_of,
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bar:
+    """A bar."""
+
+    length: PositiveLength
+    share: Annotated[float, Limits(ge=0, lt=1)] | None = None
+    parts: Count = 1
+    place: Length = 0.0
+    inner: float = field(default=0.0, metadata={KEY: None})
+
+    def __post_init__(self):
+        check_limits(self)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NamedBar(Bar):
+    """A bar with a name."""
+
+    name: str = field(metadata={KEY: "load"})
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"length": 0.0}, "length = 0.0: must be greater than 0"),
+        ({"length": math.nan}, "length = nan: must be a finite number"),
+        ({"length": math.inf}, "length = inf: must be a finite number"),
+        ({"share": -0.1}, "share = -0.1: must be greater than or equal to 0"),
+        ({"share": 1.0}, "share = 1.0: must be less than 1"),
+        ({"parts": 0}, "parts = 0: must be greater than or equal to 1"),
+        ({"parts": 10**400}, "must be less than or equal to 1000000000"),
+    ],
+)
+def test_numbers_beyond_their_limits_are_refused(change, words):
+    with pytest.raises(InputError, match=re.escape(words)):
+        NamedBar(**{"length": 1.0, "name": "b"} | change)
+
+
+def test_numbers_without_limits_and_none_are_taken():
+    bar = NamedBar(length=1.0, place=-math.inf, name="b")
+    assert (bar.share, bar.place) == (None, -math.inf)
+
+
+def test_what_a_record_has_from_a_base_are_arguments_of_it():
+    bar = NamedBar(length=2.0, parts=3, name="b")
+    assert Bar(**part_of(bar, Bar)) == Bar(length=2.0, parts=3)
+
+
+def test_keys_of_fields():
+    keys = {name: key_of(one) for name, one in NamedBar.__dataclass_fields__.items()}
+    assert keys == {
+        "length": "length", "share": "share", "parts": "parts", "place": "place",
+        "inner": None, "name": "load",
+    }  # fmt: skip
