@@ -120,10 +120,10 @@ def find_equilibrium(
             clear = motions.trial(motions.moved(now, 3.0 * step))
             if clear.force == 0.0:
                 return clear.plane, clear.response.state
-        share, reached = motions.searched(now, step)
-        if reached is None:
+        share, found = motions.searched(now, step)
+        if found is None:
             break
-        step, change, now = share * step, reached.residual - now.residual, reached
+        step, change, now = share * step, found.residual - now.residual, found
     measure = max(now.force, control.force or 0.0)
     if np.abs(now.residual).max() <= max(aim, TOLERANCE) * measure:
         return now.plane, now.response.state
@@ -189,26 +189,26 @@ class _FreeMotions(Generic[T]):
 
     def searched(self, now: _Trial[T], step: Array) -> tuple[float, _Trial[T] | None]:
         """Search along a step, and return the share that was taken and where it leads."""
-        latest = now
+        found = now
 
         def slope_after(share: float) -> float:
-            nonlocal latest
+            nonlocal found
             plane = self.moved(now, share * step)
             if np.abs(plane[self._free] / self.unit).max() > _FARTHEST * self._half:
                 raise plane_failure(self._control, "NO_SUPPORT" if now.force else "NO_CONTACT")
             try:
-                latest = self.trial(plane)
+                found = self.trial(plane)
             except NotConverged:
                 if self._final:
                     raise
                 return np.inf
             # less than the tolerance is lost by rounding alone, and is no support to be kept
             held = now.force > TOLERANCE * (self._control.force or np.inf)
-            return np.inf if held and latest.force == 0.0 else float(latest.residual @ step)
+            return np.inf if held and found.force == 0.0 else float(found.residual @ step)
 
         longest = self._half / float(np.abs(step).max())
         share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
-        return (0.0, None) if share is None else (share, latest)
+        return (0.0, None) if share is None else (share, found)
 
 
 def _direction(
