@@ -49,6 +49,7 @@ class Run:
         resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
+        clock: Measures the phases of the run, and tells an observer of them.
         given: The scene as the user wrote it.
         identity: All that its numbers depend on, see `multiscale.scene.identity`.
         coupling: What was made of the scene, and finds the load steps.
@@ -61,6 +62,7 @@ class Run:
     def __init__(
         self, scene: Scene, comm: Any = None, resolved: Mapping[str, Any] | None = None
     ) -> None:
+        self.clock = Clock()
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
@@ -70,6 +72,8 @@ class Run:
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
         self.coupling: Coupling = make_setup(scene, comm, resolved=resolved, nodes=nodes)
+        self.clock.add(self.coupling.seconds)
+        self.coupling.clock = self.clock
         self.scene = self.coupling.scene
         self.fields = FieldRecorder(self.coupling)
         self._contacts = ContactRecorder(self.coupling)
@@ -90,11 +94,6 @@ class Run:
             name: Its name.
         """
         return self.clock.phase(name)
-
-    @property
-    def clock(self) -> Clock:
-        """What measures the phases of the run, and tells an observer of them."""
-        return self.coupling.clock
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""

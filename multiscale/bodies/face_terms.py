@@ -102,14 +102,6 @@ class FaceTerms(ABC):
             Collective.
         """
 
-    def is_cached(self) -> bool:
-        """Tell whether the compliance of the face is at hand, or made in a fraction of a second.
-
-        Note:
-            Collective where a body is a mesh; ranks on other nodes may know other files.
-        """
-        return True
-
     @property
     def margin(self) -> float:
         """Width by which the modes' rectangle exceeds the contact on every side [mm]."""

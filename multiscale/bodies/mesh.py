@@ -158,12 +158,6 @@ class MeshTerms(FaceTerms):
         found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
         return turned(found) if self.behind else found
 
-    def is_cached(self) -> bool:
-        """Tell whether an earlier run has left the compliance of the rectangle; collective."""
-        from macro.compliance.cache import is_cached
-
-        return is_cached(_CACHED, self._key(self._count(None)))
-
     def _count(self, modes: int | None) -> int:
         """Return the modes along a side, by default those of the shape."""
         count = modes or self.modes
@@ -226,10 +220,6 @@ class PairTerms(FaceTerms):
         if self._alike:
             share += contact_modulus / self.second.material.contact_modulus
         return share
-
-    def is_cached(self) -> bool:
-        """Tell whether earlier runs have left the compliances of both bodies; collective."""
-        return self.first.is_cached() and self._behind.is_cached()
 
     def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
         """Return the compliance of the first body, and what the other adds to a half-space.

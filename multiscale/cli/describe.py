@@ -49,10 +49,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     memory, ranks = peak_memory(), 1 if comm is None else comm.size
     load_finite_elements(scene, comm)
     coupling = _coupling(scene, comm)
-    solves_face = coupling.needs_face()
-    cost = on_root_alone(
-        comm, lambda: list(cost_statements(coupling, memory, ranks, solves_face=solves_face))
-    )
+    cost = on_root_alone(comm, lambda: list(cost_statements(coupling, memory, ranks)))
     shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
     terminal.show_plan(comm, coupling, cost, shortages)
 

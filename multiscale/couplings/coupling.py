@@ -198,7 +198,6 @@ class Coupling(ABC):
             Collective.
         """
         self.comm, self._meshes = comm, meshes
-        self.clock = Clock(dict(self.seconds))
 
     @classmethod
     def cells_unstated(cls, scene: Scene) -> Cells:
@@ -406,12 +405,11 @@ class Coupling(ABC):
         """Yield what is doubtful of the bodies."""
 
     @abstractmethod
-    def work(self, ranks: int = 1, *, solves_face: bool = False) -> Work:
+    def work(self, ranks: int = 1) -> Work:
         """Count what a run computes.
 
         Args:
             ranks: Processes that share meshes.
-            solves_face: Whether the compliance of a meshed body is yet to be solved for.
         """
 
     def memory_requests(self) -> Iterator[MemoryRequest]:
@@ -424,14 +422,6 @@ class Coupling(ABC):
                 in_parts = section.mesh.lower().endswith(".xdmf")
                 element, unknowns = facts.element, facts.unknowns
                 yield body_request(key, element, unknowns, steps, in_parts=in_parts)
-
-    def contact_memory(self) -> dict[str, float]:
-        """Return the memory of the contact problem by part, of those held at the same time [B]."""
-        return {}
-
-    def needs_face(self) -> bool:
-        """Tell whether the compliance of a meshed face is yet to be solved for; collective."""
-        return False
 
     @abstractmethod
     def unmeasured(self) -> str:

@@ -22,9 +22,11 @@ from multiscale.couplings.coupling import Coupling, Facts
 from multiscale.couplings.estimate import plane_at_largest_load, prescribed_plane
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.couplings.work import (
+    BYTES_PER_CELL,
     FACE_CYCLES,
     PRODUCTS,
     SET_UP_CYCLES,
+    SLOPES_PRODUCTS,
     SOLUTIONS_OF_LAWS,
     Work,
 )
@@ -39,16 +41,8 @@ from multiscale.scene.scene import Scene
 Array = NDArray[np.float64]
 
 _INTERACTING = ("elliptic", "circular")
-_SLOPES = 2.4
-"""Factor of the products of a solution with finite slopes."""
 _CHECK, _FINER = 2.0, 6.0
 """Solutions on the run's cells that an error check is worth, and where it solves a finer grid."""
-_SOLVED, _BODY, _MAPS, _OF_SLOPES = 90.0, 40.0, 35.0, 40.0
-"""Memory per cell of a contact problem with its kernel, work array and arrays of the cells that can
-touch, of free sides and body, of the maps of a load step, and of finite slopes [B]. With maps 95
-were measured where few cells could touch, 101 where 9/16 of 512² and of 1024² cells could."""
-_KEPT = 60.0
-"""Memory per cell that the run keeps while an error check solves a finer grid [B]."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -167,12 +161,6 @@ class MicroCoupling(PressedSurface):
             body = terms.term(terms.face(self.comm))
         return replace(self.micro, body=body)  # type: ignore[type-var]
 
-    def needs_face(self) -> bool:
-        """Tell whether the compliance of a meshed face is yet to be solved for; collective."""
-        if not (self.has_body and self.body.on_mesh):
-            return False
-        return not self.bodies.terms(side_term=self._on_cells).is_cached()
-
     # --- errors
 
     def error_probe(self) -> ErrorProbe:
@@ -204,20 +192,25 @@ class MicroCoupling(PressedSurface):
 
     # --- what is known before the run
 
-    def work(self, ranks: int = 1, *, solves_face: bool = False) -> Work:
+    def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
         output, steps = self.scene.output, step_count(self.scene.loading.load_history)
         rows = SOLUTIONS_OF_LAWS if self.has_laws else 0
-        solutions, factor = float(rows or steps), _SLOPES if self.finite_slopes else 1.0
+        solutions, factor = float(rows or steps), SLOPES_PRODUCTS if self.finite_slopes else 1.0
+        finer = 1.0
         if isinstance(self.micro, HalfSpaceModel):
             size = int(self.micro.surface.heights.size)
             if output.check != "none":
-                each = _FINER if self._checks_finer(size) else _CHECK
+                # a check solves a finer grid where the error of the grid is not outweighed
+                refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
+                each, finer = (_FINER, 4.0) if refines else (_CHECK, 1.0)
                 solutions += each * (steps if output.check == "all" else 1)
         else:
             size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
-        unknowns = sum(facts.unknowns for facts in self.meshes)
-        cycles = FACE_CYCLES * unknowns * solves_face
+        unknowns, cycles = 0, 0.0
+        if self.has_body:
+            unknowns = sum(facts.unknowns for facts in self.meshes)
+            cycles = FACE_CYCLES * unknowns
         if self.has_body and self.scene.on_mesh:
             unknowns = unknowns or self.body.unknowns
             cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
@@ -229,31 +222,13 @@ class MicroCoupling(PressedSurface):
             unknowns=unknowns,
             cycles=cycles,
             ranks=ranks,
+            memory=finer * BYTES_PER_CELL * size * self._on_cells,
             of_pairs=not self._on_cells,
         )
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
         return 0.0
-
-    def contact_memory(self) -> dict[str, float]:
-        """Return the memory of the contact problem by part [B]."""
-        if not isinstance(self.micro, HalfSpaceModel):
-            return {}
-        cells = self.micro.surface.heights.size
-        solved = _SOLVED + _BODY * self.has_body
-        run = (solved + _MAPS + _OF_SLOPES * self.finite_slopes) * cells
-        parts = {"contact problem": run}
-        if self.scene.output.check != "none" and self._checks_finer(cells):
-            parts["error check"] = (_KEPT + 4.0 * solved) * cells
-        return parts
-
-    def _checks_finer(self, cells: int) -> bool:
-        """Tell whether an error check is expected to solve a grid twice as fine.
-
-        Where finite slopes are left out their error outweighs that of the grid.
-        """
-        return self.finite_slopes and 4 * cells <= MOST_CHECKED_CELLS
 
     @property
     def interfering_summits(self) -> NDArray[np.bool_]:

@@ -247,11 +247,8 @@ class IsolatedCoupling(PatchLaws):
         return super()._closes_at_corners or self.scene.loading.force is not None
 
     def _make_table(self, observe: Observer | None) -> LawTable:
-        model = self.micro
-        if isinstance(model, HalfSpaceModel):
-            model = on_body(None, self.materials, None)(model, 0)
         return isolated_laws(
-            model,
+            self.model_alone(),
             self.patches,
             closure_ends=self.largest_closures,
             love=self.scene.coupling.love,
@@ -262,14 +259,15 @@ class IsolatedCoupling(PatchLaws):
             observe=observe,
         )
 
+    def model_alone(self) -> MicroModel:
+        """Return the micro model on a half-space, which patches are pressed on alone."""
+        if not isinstance(self.micro, HalfSpaceModel):
+            return self.micro
+        return on_body(None, self.materials, None)(self.micro, 0)
+
     def model_behind_laws(self) -> MicroModel:
         """Return the micro model on the body where it is half-space, and else alone."""
         return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro
-
-    def contact_memory(self) -> dict[str, float]:
-        """Return the memory of the contact problem of one patch [B]."""
-        parts = super().contact_memory()
-        return {part: size / self.patches.count for part, size in parts.items()}
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""

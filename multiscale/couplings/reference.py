@@ -320,7 +320,7 @@ class ReferenceCoupling(PressedSurface):
         yield from super().memory_requests()
         yield from reference_requests(self.scene, self.rough_meshes)
 
-    def work(self, ranks: int = 1, *, solves_face: bool = False) -> Work:
+    def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
         unknowns = sum(self.rough_meshes.unknowns)
         steps = step_count(self.scene.loading.load_history)

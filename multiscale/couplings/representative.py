@@ -22,7 +22,14 @@ from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling, Facts
 from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
-from multiscale.couplings.work import PRODUCTS, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
+from multiscale.couplings.work import (
+    BYTES_PER_CELL,
+    PRODUCTS,
+    SET_UP_CYCLES,
+    SLOPES_PRODUCTS,
+    SOLUTIONS_OF_LAWS,
+    Work,
+)
 from multiscale.inputs.block import LAW_BLOCK_CELLS, Cells, make_shape
 from multiscale.inputs.body_facts import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
@@ -62,8 +69,6 @@ _MANY_SAMPLES = 4.0
 """Sides of a face over those of its sample below which its law is hardly representative."""
 _HALF_SPACE = 0.95
 """Mean displacement of a square of a half-space by a uniform pressure, times E*, over its side."""
-_SOLVED, _MAPS, _OF_SLOPES = 90.0, 35.0, 40.0
-"""Memory per cell of a contact problem, of maps, and of finite slopes [B]."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -190,7 +195,7 @@ class RepresentativeCoupling(LawCoupling):
         """Choose the Newton that load steps are found with."""
         return NewtonChoice(False, "laws of samples hold at the points of the mesh")
 
-    def work(self, ranks: int = 1, *, solves_face: bool = False) -> Work:
+    def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
         steps, size = step_count(self.scene.loading.load_history), self.surface.heights.size
         rows = SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
@@ -199,16 +204,12 @@ class RepresentativeCoupling(LawCoupling):
             size=int(size),
             solutions=float(rows),
             rows=rows,
-            products=rows * size * PRODUCTS * (2.4 if self.finite_slopes else 1.0),
+            products=rows * size * PRODUCTS * (SLOPES_PRODUCTS if self.finite_slopes else 1.0),
             unknowns=unknowns,
             cycles=unknowns * (SET_UP_CYCLES + steps * _CYCLES_AT_POINTS),
             ranks=ranks,
+            memory=BYTES_PER_CELL * size,
         )
-
-    def contact_memory(self) -> dict[str, float]:
-        """Return the memory of the contact problem of a sample [B]."""
-        each = _SOLVED + _MAPS + _OF_SLOPES * self.finite_slopes
-        return {"contact problem": each * self.surface.heights.size}
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps."""

@@ -26,6 +26,8 @@ UNKNOWN_CYCLES = 1e6
 2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
 PRODUCTS = 30.0
 """Products of a solution, 15 to 60 on 64² to 1024² cells."""
+SLOPES_PRODUCTS = 2.4
+"""Factor of the products of a solution with finite slopes."""
 SOLUTIONS_OF_LAWS = 84
 """Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
 45 to 65 rows, models of summits 60 to 150."""
@@ -37,14 +39,14 @@ _START, _PICTURES = 2.0, 4.0
 _ORDERS = (1, 3, 10, 30, 120, 300, 900, 3600, 3 * 3600, 10 * 3600, 24 * 3600, 72 * 3600, 240 * 3600)
 """Times that are said [s]."""
 
+BYTES_PER_CELL = 165.0
+"""Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
+load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
+and of 1024² cells could; free sides and body add 40, finite slopes 40."""
 _LIBRARIES = 70e6
 """Memory of dolfinx, and of matplotlib [B]."""
-_SURFACE, _SUMMITS, _FIGURES = 37.0, 100.0, 25.0
-"""Memory per height of the surface with its spline, of finding its summits, and of figures [B]."""
-_FACE, _CUBE, _FACTORISATION = 1.25e9, 11_271, 1.2
-"""Memory of the compliance of the face of a cube in 64 modes [B], the unknowns of its 16 × 16 × 12
-trilinear hexahedra, which are raised to quadratic ones and whose stiffness is factorised, and the
-power of them that the memory grows with."""
+_HEIGHT = 87.0
+"""Memory per height of the surface with its spline, and of figures [B]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,6 +62,7 @@ class Work:
         unknowns: Degrees of freedom of all meshes; 0 without meshes.
         cycles: Unknowns times multigrid cycles, of all meshes.
         ranks: Processes that share the meshes.
+        memory: Memory of the largest contact problem [B].
         of_pairs: Whether pairs of asperities are counted instead of cells.
     """
 
@@ -70,6 +73,7 @@ class Work:
     unknowns: int = 0
     cycles: float = 0.0
     ranks: int = 1
+    memory: float = 0.0
     of_pairs: bool = False
 
     @property
@@ -100,21 +104,18 @@ class Work:
             yield "work", "; ".join(counted)
 
 
-def cost_statements(
-    coupling: Coupling, program: float, ranks: int, *, solves_face: bool
-) -> Iterator[tuple[str, str]]:
+def cost_statements(coupling: Coupling, program: float, ranks: int) -> Iterator[tuple[str, str]]:
     """Yield what a run computes, the order of magnitude of its time, and its memory.
 
     Args:
         coupling: The coupling.
         program: Memory of a process before anything of the scene is in it [B].
         ranks: Processes of the MPI job.
-        solves_face: Whether the compliance of a meshed body is yet to be solved for.
     """
-    work, output = coupling.work(ranks, solves_face=solves_face), coupling.scene.output
+    work, output = coupling.work(ranks), coupling.scene.output
     yield from work.statements()
     seconds = work.computing + _START + _PICTURES * bool(output.figures or output.report)
-    parts = memory_parts(coupling, program, ranks, solves_face=solves_face)
+    parts = memory_parts(coupling, work, program)
     largest = max(parts, key=lambda part: parts[part])
     yield (
         "cost",
@@ -124,43 +125,24 @@ def cost_statements(
     )
 
 
-def memory_parts(
-    coupling: Coupling, program: float, ranks: int = 1, *, solves_face: bool = False
-) -> dict[str, float]:
-    """Return the memory of the parts of the first process that are held at its largest [B].
+def memory_parts(coupling: Coupling, work: Work, program: float) -> dict[str, float]:
+    """Return the memory of the first process by part [B].
 
     Args:
         coupling: The coupling.
+        work: What it computes.
         program: Memory of a process before anything of the scene is in it [B].
-        ranks: Processes of the MPI job.
-        solves_face: Whether the compliance of a meshed body is yet to be solved for.
     """
-    output, heights = coupling.scene.output, coupling.surface.heights.size
-    figures = _FIGURES * heights
-    if output.figures:
-        figures += _FIGURES * heights + _LIBRARIES
-    requests = [one for one in coupling.memory_requests() if not one.key.startswith("surface")]
-    asked = sum(one.shared / ranks + one.per_rank + one.root_only for one in requests)
-    summits = _SUMMITS if coupling.summits is not None else 0.0
-    contact = coupling.contact_memory()
-    if contact.get("error check", 0.0) > contact.get("contact problem", 0.0) + figures:
-        contact, figures = {"error check": contact["error check"]}, 0.0
-    else:
-        contact.pop("error check", None)
-    parts = {
-        "program": program + _LIBRARIES * coupling.has_body,
-        "surface": (_SURFACE + summits) * heights,
-        "meshes and laws": asked,
-        "body term": _face_bytes(coupling) if solves_face else 0.0,
-        **contact,
-        "figures": figures,
+    libraries = coupling.has_body + bool(coupling.scene.output.figures)
+    asked = (one for one in coupling.memory_requests() if not one.key.startswith("surface"))
+    return {
+        "program": program + _LIBRARIES * libraries,
+        "surface": _HEIGHT * coupling.surface.heights.size,
+        "meshes and laws": sum(
+            one.shared / work.ranks + one.per_rank + one.root_only for one in asked
+        ),
+        "contact problem": work.memory,
     }
-    return {part: size for part, size in parts.items() if size}
-
-
-def _face_bytes(coupling: Coupling) -> float:
-    """Return the memory of the compliance of the meshed bodies' faces [B]."""
-    return _FACE * sum((one.unknowns / _CUBE) ** _FACTORISATION for one in coupling.meshes)
 
 
 def magnitude(seconds: float) -> str:

@@ -10,21 +10,26 @@ from multiscale.readable import Observer
 
 
 class Clock:
-    """Measures the wall time of phases, each without that of phases within it.
-
-    Args:
-        seconds: Wall time of phases so far [s].
+    """Measures the wall time of phases from now on, each without that of phases within it.
 
     Attributes:
         seconds: Wall time of each phase that ended [s].
         observe: Told what the run is at; None without anybody to tell.
     """
 
-    def __init__(self, seconds: Mapping[str, float] | None = None) -> None:
-        self.seconds = dict(seconds or {})
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
         self.observe: Observer | None = None
+        self._began = self._until = time.perf_counter()
+
+    def add(self, seconds: Mapping[str, float]) -> None:
+        """Add phases that were measured elsewhere and end now.
+
+        Args:
+            seconds: Their wall times by name [s].
+        """
+        self.seconds |= seconds
         self._until = time.perf_counter()
-        self._began = self._until - sum(self.seconds.values())
 
     @contextmanager
     def phase(self, name: str) -> Iterator[None]:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 
@@ -19,10 +19,11 @@ _MOST_HALVINGS = 8
 
 
 class Solver(Protocol):
-    """Anything that finds the equilibrium under a rigid plane."""
+    """Anything that finds the equilibrium under a rigid plane.
 
-    past: Any
-    """What the load steps so far left behind beyond initial guesses; set to take them back."""
+    Where load steps depend on those before them beyond initial guesses, an attribute ``past`` is
+    what these left behind; setting it takes load steps back.
+    """
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step, whose number is still 0.
@@ -222,10 +223,11 @@ class LoadStepper:
         by_force = self._load_history.quantity == "force"
         if divisible and by_force and self._exceeds_limit(target):
             return None
-        past = self._solver.past
+        past = getattr(self._solver, "past", None)
         step = self._reached(target)
         if divisible and self._exceeds_limit(step.force_N):
-            self._solver.past = past
+            if past is not None:
+                setattr(self._solver, "past", past)  # noqa: B010
             return None
         return step
 
