@@ -16,12 +16,13 @@ from multiscale.cli.new_scene import (
     scene_text,
     sensible_force,
 )
+from multiscale.inputs.block import block_section
+from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import refuse_detached_processes
 from multiscale.output import terminal
 from multiscale.readable import quantity
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
-from multiscale.setup.surface_and_block import block_section, make_surface
 from multiscale.storage import write_text
 from support.collective import on_root
 from support.errors import InputError

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from multiscale import Scene, make_setup
+from multiscale.auto.keys import auto_keys, resolved_sections
 from multiscale.machine import ClusterNodes
-from multiscale.planning.auto_keys import auto_keys, resolved_sections
-from multiscale.planning.plan import statements, warnings
 from multiscale.scene.keys import scene_schema
 from support.errors import InputError
 
@@ -51,7 +50,7 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     assert grids[0] < grids[-1]
     for setup in found:
         assert setup.decision.kept
-        assert not [text for text in warnings(setup) if "accuracy" in text]
+        assert not [text for text in setup.warnings() if "accuracy" in text]
 
 
 def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
@@ -64,14 +63,14 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     assert resolved.block.cells == "auto"  # of no mesh
     assert set(setup.decision.errors) == {"body", "slopes", "zero", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
-    assert dict(statements(setup))["choice"] == setup.decision.sentence
+    assert dict(setup.statements())["choice"] == setup.decision.sentence
 
 
 def test_what_a_run_began_with_is_what_it_goes_on_with():
     given = scene(accuracy=0.05)
     setup = make_setup(given)
     kept = json.loads(json.dumps(resolved_sections(setup, given)))
-    again = make_setup(given, kept)
+    again = make_setup(given, resolved=kept)
     assert again.scene == setup.scene
     np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
     assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
@@ -88,7 +87,7 @@ def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
     setup = make_setup(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
     assert setup.decision.errors["slopes"] > 0.01
-    (said,) = [text for text in warnings(setup) if "accuracy" in text]
+    (said,) = [text for text in setup.warnings() if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
     assert "most of it by slopes" in said
 
@@ -164,13 +163,13 @@ def test_models_without_measure_say_so():
     assert not setup.decision.errors
     assert not setup.decision.kept
     assert "which is not measured beforehand" in setup.decision.sentence
-    assert dict(statements(setup))["error"].startswith("not measured: elliptic")
+    assert dict(setup.statements())["error"].startswith("not measured: elliptic")
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
     setup = make_setup(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
-    assert setup.micro is None
+    assert setup.cells is None
     assert setup.decision.kept
     assert sum(setup.decision.missed.values()) > 0.0015
     assert "without meshing the roughness measured" in setup.decision.sentence
@@ -244,5 +243,5 @@ def test_auto_values_survive_a_dump_and_are_in_the_schema():
 
 
 def test_the_plan_says_how_fine_the_heights_are():
-    said = dict(statements(make_setup(scene())))["surface"]
+    said = dict(make_setup(scene()).statements())["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves
