@@ -24,9 +24,10 @@ from multiscale.auto.keys import (
     with_value,
 )
 from multiscale.auto.mesh_search import Build, Errors, MeshError, MeshSearch, refinement
-from multiscale.couplings.coupling import Coupling, Decision
+from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.couplings.scene_parts import Decision
 from multiscale.inputs.loads import load_history_on
 from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.surfaces import make_surface

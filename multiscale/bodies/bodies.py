@@ -9,7 +9,6 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -24,14 +23,13 @@ from multiscale.bodies.mesh import MeshTerms, PairTerms
 from multiscale.bodies.scene_body import SceneBody
 from multiscale.inputs.block import block_section
 from multiscale.inputs.body_facts import BodyFacts
+from multiscale.laws.consistent import Displacements
 from multiscale.scene.scene import Scene
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LoadedFace
 
 Array = NDArray[np.float64]
-Displacements = Callable[[Array], Array]
-"""From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

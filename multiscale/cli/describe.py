@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings import describe
+from multiscale.couplings.cost import cost_statements
 from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import load_finite_elements
-from multiscale.couplings.work import cost_statements
+from multiscale.couplings.dispatch import coupling_class, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
 from multiscale.inputs.memory import shortage_warnings
 from multiscale.laws.law_file import write_laws
@@ -73,6 +73,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     with locked(folder, comm):
         if not choice.overwrite:
             on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
+        coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.coupling)
         with terminal.following(comm) as (begun, _):

@@ -12,27 +12,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import (
-    Asperities,
     Control,
     InputError,
-    MaterialPair,
-    PatchGrid,
-    Regions,
     Surface,
-    find_asperities,
 )
-from geometry.zero import Zero
 from micro.contact_detail import ContactDetail
 from micro.model import Stiffness
 from multiscale.bodies.bodies import Bodies
 from multiscale.bodies.scene_body import SceneBody
 from multiscale.couplings import describe
+from multiscale.couplings.scene_parts import SceneParts
+from multiscale.couplings.work import Work
 from multiscale.inputs.block import FIELD_CELLS, Cells, block_cells
 from multiscale.inputs.body_facts import BodyFacts
 from multiscale.inputs.memory import (
@@ -44,7 +40,6 @@ from multiscale.inputs.memory import (
 )
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.clock import Clock
-from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
@@ -54,104 +49,23 @@ from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.checked_store import Arrays
 
-if TYPE_CHECKING:
-    from multiscale.couplings.work import Work
-
 Array = NDArray[np.float64]
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Decision:
-    """What was taken, and the errors that were measured for it before the run.
-
-    Attributes:
-        accuracy: Relative error of the force that was requested.
-        taken: The coupling, and the cells, meshes or micro model that it works on.
-        why: Why this coupling was taken; empty where the scene states it or it was missed for.
-        errors: Measured errors of the force by cause, relative to it, at the load where they are
-            worst; empty where they cannot be measured beforehand. That of laws is among them only
-            after the run.
-        missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
-    """
-
-    accuracy: float
-    taken: str
-    errors: Mapping[str, float]
-    why: str = ""
-    missed: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def error(self) -> float:
-        """Measured relative error of the force; 0 where it was not measured."""
-        return sum(self.errors.values())
-
-    @property
-    def kept(self) -> bool:
-        """Whether the measured error is within the accuracy."""
-        return bool(self.errors) and self.error <= self.accuracy
-
-    @property
-    def sentence(self) -> str:
-        """What was taken, why, and what was measured for it."""
-        parts = [
-            self.taken + f" ({self.why})" * bool(self.why),
-            f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
-        ]
-        if self.missed:
-            parts.append(f"without meshing the roughness {_listed(self.missed)}")
-        return "; ".join(parts)
-
-    @property
-    def warning(self) -> str | None:
-        """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
-        if self.kept or not self.errors:
-            return None
-        largest = max(self.errors, key=lambda cause: self.errors[cause])
-        return (
-            f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
-            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
-        )
-
-
 @dataclass(kw_only=True, eq=False)
-class Coupling(ABC):
+class Coupling(SceneParts, ABC):
     """A scene on its way to load steps.
 
     The attributes up to `seconds` are made from the scene alone; they do not change.
 
     Attributes:
-        scene: The scene with its auto values resolved.
-        surface: Its rough surface, with the heights of both sides where both are rough; under laws
-            of samples the first sample.
-        patches: Partition of the interface.
-        materials: The materials on both sides of the interface.
-        body: What is known of the body below the surface.
-        counter: The same of a counter-body on a mesh; None where that is rigid or a half-space.
-        load_history: The loads, counted from first touch.
-        decision: Why the auto values became what they are, where measured errors decided.
-        seconds: Wall time of each part of making it [s].
         comm: MPI communicator; None for this process alone.
         clock: Measures the phases of the run.
-        observe: Told what the run is at; None without anybody to tell.
         table: The patch laws, once made, counted from first touch; None without laws.
     """
 
-    has_body: ClassVar[bool] = True
-    """Whether the surface is on a body instead of a half-space."""
-    has_laws: ClassVar[bool] = False
-    """Whether load steps use laws."""
-
-    scene: Scene
-    surface: Surface
-    patches: PatchGrid
-    materials: MaterialPair
-    body: BodyFacts
-    counter: BodyFacts | None = None
-    load_history: LoadHistory
-    decision: Decision | None = None
-    seconds: Mapping[str, float] = field(default_factory=dict)
     comm: Any = field(default=None, init=False)
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
@@ -264,51 +178,6 @@ class Coupling(ABC):
         )
 
     @property
-    def regions(self) -> Regions | None:
-        """The regions of a face under laws of samples; None with other laws."""
-        return None
-
-    @property
-    def area(self) -> float:
-        """Nominal contact area [mm²]."""
-        return self.patches.area * self.patches.count
-
-    @property
-    def rough_surfaces(self) -> tuple[Surface, ...]:
-        """The surface, or all samples of all regions."""
-        return (self.surface,)
-
-    @property
-    def shown_bodies(self) -> list[BodyFacts]:
-        """What is known of the bodies that the record of a run tells: those on meshes."""
-        return self.meshes
-
-    @property
-    def both_elastic(self) -> bool:
-        """Whether the counter-body is an elastic half-space."""
-        return self.materials.second is not None and self.counter is None
-
-    @property
-    def zero(self) -> float:
-        """Approach from first touch of the height that approaches are shown from [mm]."""
-        return self.load_history.depth
-
-    @cached_property
-    def zero_error(self) -> float:
-        """Error of that height [mm]."""
-        return Zero(self.scene.loading.zero).error(self.surface)
-
-    @cached_property
-    def asperities(self) -> Asperities:
-        """The surface's summits; found when first needed, which takes seconds on 4096² heights."""
-        return find_asperities(self.surface, periodic=False)  # the block's sides are free
-
-    @property
-    def summits(self) -> Asperities | None:
-        """The summits that the micro model consists of; None where it knows the whole surface."""
-        return None
-
-    @property
     def cells(self) -> tuple[int, int] | None:
         """Cells of the half-space of contact problems; None where these have no cells."""
         return None
@@ -317,16 +186,6 @@ class Coupling(ABC):
     @abstractmethod
     def label(self) -> str:
         """The coupling, and the cells, meshes or micro model that it works on, in few words."""
-
-    @property
-    def finite_slopes(self) -> bool:
-        """Whether finite slopes of the surface count."""
-        return False
-
-    @property
-    def meshes(self) -> list[BodyFacts]:
-        """What is known of the bodies that are meshes of their own."""
-        return [one for one in (self.body, self.counter) if one is not None and one.on_mesh]
 
     def statements(self, cost: Iterable[tuple[str, str]] = ()) -> Iterator[tuple[str, str]]:
         """Yield pairs of topic and sentence that say what will be done and why.
@@ -430,6 +289,24 @@ class Coupling(ABC):
 
     # --- load steps
 
+    @classmethod
+    def check_has_laws(cls, scene: Scene) -> None:
+        """Refuse a coupling without laws.
+
+        Args:
+            scene: The scene.
+
+        Raises:
+            InputError: When the coupling has no laws.
+        """
+        raise InputError(
+            "has no laws",
+            key="coupling.kind",
+            value=scene.kind,
+            allowed="isolated, consistent",
+            file=scene.file,
+        )
+
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once.
 
@@ -440,13 +317,8 @@ class Coupling(ABC):
         Note:
             Collective.
         """
-        raise InputError(
-            "has no laws",
-            key="coupling.kind",
-            value=self.scene.kind,
-            allowed="isolated, consistent",
-            file=self.scene.file,
-        )
+        self.check_has_laws(self.scene)
+        raise NotImplementedError
 
     @abstractmethod
     def prepare(self) -> None:
@@ -691,10 +563,3 @@ class Coupling(ABC):
     @abstractmethod
     def _drop_solvers(self) -> None:
         """Let go of what holds the bodies, whose matrices stay in memory until then."""
-
-
-def _listed(errors: Mapping[str, float]) -> str:
-    if not errors:
-        return "which is not measured beforehand"
-    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
-    return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"

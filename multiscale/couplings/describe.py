@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING
 
 from geometry.materials import Material
 from geometry.meshes.block import misalignment
 from geometry.statistics import roughness
+from multiscale.couplings.scene_parts import SceneParts
 from multiscale.inputs.block import block_section
 from multiscale.inputs.body_facts import BodyFacts
 from multiscale.inputs.spectrum import heights_per_wave
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
-
-if TYPE_CHECKING:
-    from multiscale.couplings.coupling import Coupling
 
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
@@ -27,34 +24,34 @@ LEAST_CELLS_PER_PATCH = 4
 """Linear cells along a patch below which the block is too stiff under a patch's pressure."""
 
 
-def materials(coupling: Coupling) -> str:
+def materials(parts: SceneParts) -> str:
     """Say the elastic constants of both sides."""
-    second = coupling.materials.second
-    other = "a half-space" if coupling.both_elastic else "a body"
+    second = parts.materials.second
+    other = "a half-space" if parts.both_elastic else "a body"
     against = f", against {other} with {_constants(second)}" if second else ""
-    return f"{_constants(coupling.materials.first)}{against}"
+    return f"{_constants(parts.materials.first)}{against}"
 
 
-def dimensions(coupling: Coupling) -> str:
+def dimensions(parts: SceneParts) -> str:
     """Say the dimensions of the surface and of what it lies on."""
-    lx, ly = (quantity(side, "mm") for side in coupling.surface.lengths)
-    what = "body" if coupling.body.on_mesh else "block"
+    lx, ly = (quantity(side, "mm") for side in parts.surface.lengths)
+    what = "body" if parts.body.on_mesh else "block"
     solid = "a half-space"
-    if coupling.has_body:
-        solid = f"a {what} {quantity(coupling.body.depth, 'mm')} high"
-    return f"{lx} × {ly} on {solid}{' as sample' if coupling.regions else ''}"
+    if parts.has_body:
+        solid = f"a {what} {quantity(parts.body.depth, 'mm')} high"
+    return f"{lx} × {ly} on {solid}{' as sample' if parts.regions else ''}"
 
 
 def _constants(material: Material) -> str:
     return f"E = {quantity(material.young_modulus, 'MPa')}, ν = {material.poisson_ratio:g}"
 
 
-def surface(coupling: Coupling) -> str:
+def surface(parts: SceneParts) -> str:
     """Say what the surface is."""
-    rough_surface, spectrum = coupling.surface, coupling.scene.surface.spectrum
+    rough_surface, spectrum = parts.surface, parts.scene.surface.spectrum
     rough = roughness(rough_surface)
     lx, ly = (quantity(side, "mm") for side in rough_surface.lengths)
-    continued = ", continued periodically" if coupling.scene.surface.periodic else ""
+    continued = ", continued periodically" if parts.scene.surface.periodic else ""
     text = (
         f"{rough_surface.source}; {rough_surface.grid[0]} × {rough_surface.grid[1]} heights on "
         f"{lx} × {ly}{continued}, "
@@ -66,9 +63,9 @@ def surface(coupling: Coupling) -> str:
     return f"{text}, {waves:.3g} heights along the shortest wavelength"
 
 
-def two_sides(coupling: Coupling) -> str:
+def two_sides(parts: SceneParts) -> str:
     """Say how two rough sides lie on each other, and whose slopes count."""
-    section = coupling.scene.counter_surface
+    section = parts.scene.counter_surface
     text = "[counter_surface], turned over, lies on [surface]"
     if section is not None and section.rotation:
         text += f", turned by {section.rotation:g}°"
@@ -76,25 +73,25 @@ def two_sides(coupling: Coupling) -> str:
         text += (
             f", moved by {quantity(section.shift[0], 'mm')} and {quantity(section.shift[1], 'mm')}"
         )
-    if not coupling.finite_slopes or coupling.regions:
+    if not parts.finite_slopes or parts.regions:
         return f"{text}; the heights of both add"
-    if coupling.materials.second is None:
+    if parts.materials.second is None:
         rigid = "the slopes of [surface] alone count: the other side is rigid"
         return f"{text}; the heights of both add, {rigid}"
     return f"{text}; the heights of both add, and the slopes of each count on its own body"
 
 
-def load(coupling: Coupling) -> str:
+def load(parts: SceneParts) -> str:
     """Say the load steps."""
-    history = coupling.scene.loading
+    history = parts.scene.loading
     forced = history.quantity == "force"
     unit, what = ("N", "a force") if forced else ("mm", "an approach")
     way = ", ".join(quantity(point, unit, 6) for point in history.points)
     again = f", {history.cycles} times" * (history.cycles > 1)
     text = f"{history.count} steps to {what} of {way}{again}"
-    if coupling.zero:
-        depth = quantity(coupling.zero, "mm", 4)
-        text += f", approaches from the {coupling.scene.loading.zero}, {depth} below first touch"
+    if parts.zero:
+        depth = quantity(parts.zero, "mm", 4)
+        text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
     if history.force_change is not None:
         text += f", halved where the force changes by more than {history.force_change:.3g}"
     if history.slopes is None:
@@ -105,12 +102,12 @@ def load(coupling: Coupling) -> str:
     return text
 
 
-def body(coupling: Coupling) -> str:
+def body(parts: SceneParts) -> str:
     """Say what the bodies are made of, of meshes or under laws of samples."""
-    modulus = quantity(coupling.materials.contact_modulus, "MPa")
-    text = f"{_mesh(coupling.body)}, contact modulus {modulus}"
-    if coupling.counter is not None:
-        text += f"; counter-body {_mesh(coupling.counter)}; unknowns of both are one problem"
+    modulus = quantity(parts.materials.contact_modulus, "MPa")
+    text = f"{_mesh(parts.body)}, contact modulus {modulus}"
+    if parts.counter is not None:
+        text += f"; counter-body {_mesh(parts.counter)}; unknowns of both are one problem"
     return text
 
 
@@ -123,9 +120,9 @@ def _mesh(facts: BodyFacts) -> str:
     )
 
 
-def body_term(coupling: Coupling) -> str:
+def body_term(parts: SceneParts) -> str:
     """Say how contact problems of the whole surface see a body on a mesh, and why."""
-    if coupling.body.above:
+    if parts.body.above:
         return (
             "the compliance of the mesh itself under smooth modes of pressure, as parts of the "
             "body lie above the plane of its contact face, where no half-space is"
@@ -136,17 +133,17 @@ def body_term(coupling: Coupling) -> str:
     )
 
 
-def block(coupling: Coupling) -> str:
+def block(parts: SceneParts) -> str:
     """Say what a block is made of."""
-    shape = coupling.body.shape
+    shape = parts.body.shape
     assert shape is not None
-    sizes = [quantity(side, "mm") for side in (*coupling.surface.lengths, shape.height)]
-    sides, modulus = block_section(coupling.scene).sides, coupling.materials.contact_modulus
+    sizes = [quantity(side, "mm") for side in (*parts.surface.lengths, shape.height)]
+    sides, modulus = block_section(parts.scene).sides, parts.materials.contact_modulus
     text = (
         "decomposed: the half-space's own near field, and what the finite block adds to it in "
         "smooth modes of its contact face, from finite elements of high order"
     )
-    if not coupling.scene.decomposed:
+    if not parts.scene.decomposed:
         split = "" if shape.hexahedral else " split into tetrahedra"
         margin = f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells"
         text = (
@@ -160,19 +157,19 @@ def block(coupling: Coupling) -> str:
     )
 
 
-def surface_warnings(coupling: Coupling, size: float) -> Iterator[str]:
+def surface_warnings(parts: SceneParts, size: float) -> Iterator[str]:
     """Yield what a user should know about the surface and the numbers of the scene.
 
     Args:
-        coupling: The coupling.
+        parts: What is known of the scene.
         size: What the interpolant may exceed the heights by a tenth of [mm].
     """
-    rough_surface = coupling.surface
+    rough_surface = parts.surface
     yield from rough_surface.notes
-    if bare := list(bare_quantities(coupling.scene.written)):
+    if bare := list(bare_quantities(parts.scene.written)):
         yield f"numbers without a unit: {', '.join(bare)}"
     excess = rough_surface.highest - rough_surface.heights.max()
-    if not coupling.zero and excess > 0.1 * size:
+    if not parts.zero and excess > 0.1 * size:
         x, y = rough_surface.highest_point
         yield (
             "the approach counts from the interpolant's highest point, "
@@ -181,15 +178,15 @@ def surface_warnings(coupling: Coupling, size: float) -> Iterator[str]:
         )
 
 
-def output_warnings(coupling: Coupling, *, cells: bool) -> Iterator[str]:
+def output_warnings(parts: SceneParts, *, cells: bool) -> Iterator[str]:
     """Yield what of the requested output there will not be.
 
     Args:
-        coupling: The coupling.
+        parts: What is known of the scene.
         cells: Whether pressures of the surface's cells will be known.
     """
-    output = coupling.scene.output
-    if output.fields and not coupling.has_body:
+    output = parts.scene.output
+    if output.fields and not parts.has_body:
         yield (
             "output.fields: there is no block, and no fields are written; the analytic coupling "
             "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
@@ -202,9 +199,9 @@ def output_warnings(coupling: Coupling, *, cells: bool) -> Iterator[str]:
         )
 
 
-def mesh_warnings(coupling: Coupling) -> Iterator[str]:
+def mesh_warnings(parts: SceneParts) -> Iterator[str]:
     """Yield what a user should know about bodies on meshes, or under laws of samples."""
-    for facts in filter(None, (coupling.body, coupling.counter)):
+    for facts in filter(None, (parts.body, parts.counter)):
         yield from facts.notes
         if facts.degree == 1 and facts.poisson_ratio > LOCKING_FROM:
             yield (
@@ -214,11 +211,11 @@ def mesh_warnings(coupling: Coupling) -> Iterator[str]:
             )
 
 
-def proportions(coupling: Coupling) -> Iterator[str]:
+def proportions(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the proportions of a block."""
-    shape = coupling.body.shape
+    shape = parts.body.shape
     assert shape is not None
-    widths = [side + 2.0 * shape.margin for side in coupling.surface.lengths]
+    widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
     (least, most), high, height = sorted(widths), shape.height, ""
     if high > MOST_UNEQUAL * least:
         height = "most of the approach may be the compression of the column below the surface"
@@ -252,11 +249,11 @@ def locking(poisson_ratio: float, degree: int) -> Iterator[str]:
         )
 
 
-def coarse_cells(coupling: Coupling) -> Iterator[str]:
+def coarse_cells(parts: SceneParts) -> Iterator[str]:
     """Yield what is doubtful of the cells of a meshed block under its patches."""
-    shape = coupling.body.shape
+    shape = parts.body.shape
     assert shape is not None
-    counts = zip(shape.cells[:2], coupling.patches.grid, strict=True)
+    counts = zip(shape.cells[:2], parts.patches.grid, strict=True)
     cells = min(cells / patches for cells, patches in counts)
     if cells * shape.degree < LEAST_CELLS_PER_PATCH:
         yield (
@@ -264,8 +261,8 @@ def coarse_cells(coupling: Coupling) -> Iterator[str]:
             "make the block stiffer by several per cent under a patch's pressure; refine "
             "block.cells"
         )
-    yield from locking(coupling.materials.first.poisson_ratio, shape.degree)
-    if sentence := misalignment(shape, coupling.patches):
+    yield from locking(parts.materials.first.poisson_ratio, shape.degree)
+    if sentence := misalignment(shape, parts.patches):
         yield sentence
 
 

@@ -8,15 +8,10 @@ first load step.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from multiscale.readable import duration, number
-
-if TYPE_CHECKING:
-    from multiscale.couplings.coupling import Coupling
+from multiscale.readable import number
 
 CELL_PRODUCTS = 3e7
 """Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
@@ -34,19 +29,10 @@ SOLUTIONS_OF_LAWS = 84
 SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
 """Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
 the compliance of a meshed body's face in 64 modes."""
-_START, _PICTURES = 2.0, 4.0
-"""Time of imports and tables, and of figures and report [s]."""
-_ORDERS = (1, 3, 10, 30, 120, 300, 900, 3600, 3 * 3600, 10 * 3600, 24 * 3600, 72 * 3600, 240 * 3600)
-"""Times that are said [s]."""
-
 BYTES_PER_CELL = 165.0
 """Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
 load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
 and of 1024² cells could; free sides and body add 40, finite slopes 40."""
-_LIBRARIES = 70e6
-"""Memory of dolfinx, and of matplotlib [B]."""
-_HEIGHT = 87.0
-"""Memory per height of the surface with its spline, and of figures [B]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -102,56 +88,6 @@ class Work:
             )
         if counted:
             yield "work", "; ".join(counted)
-
-
-def cost_statements(coupling: Coupling, program: float, ranks: int) -> Iterator[tuple[str, str]]:
-    """Yield what a run computes, the order of magnitude of its time, and its memory.
-
-    Args:
-        coupling: The coupling.
-        program: Memory of a process before anything of the scene is in it [B].
-        ranks: Processes of the MPI job.
-    """
-    work, output = coupling.work(ranks), coupling.scene.output
-    yield from work.statements()
-    seconds = work.computing + _START + _PICTURES * bool(output.figures or output.report)
-    parts = memory_parts(coupling, work, program)
-    largest = max(parts, key=lambda part: parts[part])
-    yield (
-        "cost",
-        f"of the order of {magnitude(seconds)}, more on slow or busy cores; the run tells its own "
-        f"pace after its first load step; {sum(parts.values()) / 1e6:.0f} MB, most of it for the "
-        f"{largest}",
-    )
-
-
-def memory_parts(coupling: Coupling, work: Work, program: float) -> dict[str, float]:
-    """Return the memory of the first process by part [B].
-
-    Args:
-        coupling: The coupling.
-        work: What it computes.
-        program: Memory of a process before anything of the scene is in it [B].
-    """
-    libraries = coupling.has_body + bool(coupling.scene.output.figures)
-    asked = (one for one in coupling.memory_requests() if not one.key.startswith("surface"))
-    return {
-        "program": program + _LIBRARIES * libraries,
-        "surface": _HEIGHT * coupling.surface.heights.size,
-        "meshes and laws": sum(
-            one.shared / work.ranks + one.per_rank + one.root_only for one in asked
-        ),
-        "contact problem": work.memory,
-    }
-
-
-def magnitude(seconds: float) -> str:
-    """Return the order of magnitude of a time, such as ``10 s`` or ``3 h``.
-
-    Args:
-        seconds: The time [s].
-    """
-    return duration(min(_ORDERS, key=lambda one: abs(math.log(one / max(seconds, 1e-3)))))
 
 
 def _millions(count: float) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 
 from geometry import Control, NotConverged, RigidPlane
 from micro.model import Stiffness
-from multiscale.bodies.bodies import Displacements
 from multiscale.law_solvers.law_range import ROUNDING, beyond_law
+from multiscale.laws.consistent import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws

@@ -8,7 +8,7 @@ import re
 import numpy as np
 from hypothesis import strategies as st
 
-from multiscale.couplings.work import cost_statements, memory_parts
+from multiscale.couplings.cost import cost_statements, memory_parts
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
@@ -258,7 +258,7 @@ def ran(path):
             or setup.patches.count > 16
             or scene.loading.steps > 9
             or sum(meshes) > 5000
-            or math.prod(setup.shape.cells) > 800
+            or math.prod(setup.body.shape.cells) > 800
         )
         if large or (scene.block.margin and scene.block.margin_cells > 4):
             return "not tried"

@@ -15,7 +15,7 @@ from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel, HalfSpaceState
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
-from multiscale.couplings.work import cost_statements
+from multiscale.couplings.cost import cost_statements
 from multiscale.output.results import write_results
 from multiscale.results.contact_record import ContactRecord
 

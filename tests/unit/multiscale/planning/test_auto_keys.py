@@ -100,7 +100,7 @@ def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
     assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
     stated = scene(accuracy=0.2, coupling={"kind": "consistent"}, load=load)
     begun = make_setup(stated)
-    again = make_setup(stated, json.loads(json.dumps(resolved_sections(begun, stated))))
+    again = make_setup(stated, resolved=json.loads(json.dumps(resolved_sections(begun, stated))))
     assert again.table_tolerance == begun.table_tolerance == setup.table_tolerance
 
 
@@ -178,13 +178,13 @@ def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
 def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
     def made(accuracy, **reference):
         given = scene(accuracy=accuracy, coupling={"kind": "reference"}, reference=reference)
-        return make_setup(given, mesh_error=lambda s: (float(s.meshes.sizes[-1]) / 0.03) ** 3)
+        return make_setup(given, mesh_error=lambda s: (float(s.rough_meshes.sizes[-1]) / 0.03) ** 3)
 
     coarse, fine = made(0.1), made(0.01)
-    assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
+    assert fine.rough_meshes.sizes[-1] < coarse.rough_meshes.sizes[-1]
     assert fine.decision.error <= 0.01
     stated = made(0.01, fine=0.03)
-    assert stated.meshes.sizes[-1] == pytest.approx(0.03)
+    assert stated.rough_meshes.sizes[-1] == pytest.approx(0.03)
     assert "most of it by mesh" in stated.decision.warning
 
 

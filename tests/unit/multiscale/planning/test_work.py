@@ -12,7 +12,8 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.couplings import patch_laws, work
-from multiscale.couplings.work import SOLUTIONS_OF_LAWS, cost_statements, magnitude, memory_parts
+from multiscale.couplings.cost import cost_statements, magnitude, memory_parts
+from multiscale.couplings.work import SOLUTIONS_OF_LAWS
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
