@@ -153,13 +153,6 @@ class CounterBodySection:
             return None
         return Material(young_modulus=self.young_modulus, poisson_ratio=self.poisson_ratio)
 
-    @property
-    def faces(self) -> set[str | int]:
-        """All faces that are named."""
-        held = {one.surface for one in self.supports}
-        loaded = {one.surface for one in self.tractions}
-        return held | loaded if self.contact is None else held | loaded | {self.contact}
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BodySection(CounterBodySection):

@@ -34,7 +34,8 @@ def identity(scene: Scene) -> dict[str, Any]:
     Args:
         scene: The scene; what it wants drawn is left out.
     """
-    return flat_identity(scene.to_dict(), file_digests(scene), version("patchlaw"))
+    digests = {key: content_digest(path)[:_DIGITS] for key, path in scene.files().items()}
+    return flat_identity(scene.to_dict(), digests, version("patchlaw"))
 
 
 def flat_identity(
@@ -44,7 +45,7 @@ def flat_identity(
 
     Args:
         sections: The sections of the scene, as JSON holds them.
-        files: What `file_digests` returned then.
+        files: What stood for the content of the files that it names, by dotted key.
         release: Version of patchlaw.
     """
     keys = {key: value for key, value in dotted(sections) if key not in _DRAWN}
@@ -74,15 +75,6 @@ def told(differing: list[Change]) -> str:
     """Return the first changes as the end of a sentence that begins with "where"."""
     shown = ", ".join(f"{key} was {old!r}" for key, _, old in differing[:_MOST_SHOWN])
     return shown + f" and {len(differing) - _MOST_SHOWN} more" * (len(differing) > _MOST_SHOWN)
-
-
-def file_digests(scene: Scene) -> dict[str, str]:
-    """Return what stands for the content of all files that a scene names, by dotted key.
-
-    Args:
-        scene: The scene.
-    """
-    return {key: content_digest(path)[:_DIGITS] for key, path in scene.files().items()}
 
 
 def content_digest(path: Path) -> str:

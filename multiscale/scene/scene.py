@@ -117,11 +117,6 @@ class Scene(SceneSections):
         named = dict(_named_files(self, ""))
         return {key: path for key, name in named.items() if (path := self.path_of(name))}
 
-    @property
-    def surface_path(self) -> Path | None:
-        """Path of the heights, relative paths taken from the scene's folder."""
-        return self.path_of(self.surface.file)
-
     def path_of(self, file: str | None) -> Path | None:
         """Return the path of a file that the scene names; relative ones start in its folder.
 

@@ -135,11 +135,6 @@ class CouplingSection:
             return self.compliance == "decomposed"
         return self.kind != "isolated" and self.interface != "pointwise" and self.newton != "full"
 
-    @property
-    def on_mesh(self) -> bool:
-        """Whether laws lie on finite elements of the block, plain or condensed."""
-        return self.kind in ("isolated", "consistent", "auto") and not self.decomposed
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReferenceSection:

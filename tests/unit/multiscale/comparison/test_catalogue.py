@@ -195,7 +195,7 @@ def test_all_configurations_but_one_of_low_heights_see_the_true_ones():
 
 def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
     for one in made():
-        assert (one.scene.block.cells is None) != one.scene.coupling.on_mesh
+        assert (one.scene.block.cells is None) != one.scene.on_mesh
         assert one.scene.reference.cells is None
     hexahedra = made("reference.cells=[16, 16, 8]")
     assert {one.scene.reference.cells for one in hexahedra} == {(16, 16, 8)}

@@ -246,7 +246,8 @@ def test_paths_start_in_the_folder_of_the_scene(tmp_path):
     path = tmp_path / "scene.toml"
     text = PAPER.read_text(encoding="utf-8").replace("spectrum = {", 'file = "scan.npy" # {')
     path.write_text(text, encoding="utf-8")
-    assert Scene.load(path).surface_path == tmp_path / "scan.npy"
+    scene = Scene.load(path)
+    assert scene.path_of(scene.surface.file) == tmp_path / "scan.npy"
 
 
 @pytest.mark.parametrize(
@@ -266,8 +267,9 @@ def test_where_files_of_heights_are_looked_for(tmp_path, named, found):
     text += "block = { young_modulus = 4e3, poisson_ratio = 0.3 }\npatches.grid = [1, 1]\n"
     path.write_text(text + "load.approach = 0.01\n", encoding="utf-8")
     scene = Scene.load(path)
-    assert scene.surface_path.resolve() == tmp_path / found
-    assert make_setup(scene).surface.source == f"{scene.surface_path}, heights taken in mm"
+    path = scene.path_of(scene.surface.file)
+    assert path.resolve() == tmp_path / found
+    assert make_setup(scene).surface.source == f"{path}, heights taken in mm"
 
 
 def test_scene_is_frozen():
@@ -313,7 +315,10 @@ def test_a_key_replaces_the_one_that_it_excludes():
     assert (scene.loading.approach, scene.loading.force) == (None, (2.0,))
     scene = scene.with_({"load.approach": "4 um", "surface.file": "scan.npy"})
     assert (scene.loading.approach, scene.loading.force) == ((4e-3,), None)
-    assert (scene.surface.spectrum, scene.surface_path) == (None, PAPER.parent / "scan.npy")
+    assert (scene.surface.spectrum, scene.path_of(scene.surface.file)) == (
+        None,
+        PAPER.parent / "scan.npy",
+    )
 
 
 @pytest.mark.parametrize("name", ["map.npy", "map.txt", "map.csv", "large.csv", "map"])
