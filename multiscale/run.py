@@ -35,8 +35,7 @@ from multiscale.results.yielding_notes import energy_notes, yielding_notes
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import digest
-from support.checked_store import Arrays
+from support.checked_store import fingerprint
 from support.collective import on_root
 from support.packages import optional_packages
 
@@ -80,7 +79,7 @@ class Run:
         self.position = LoadPosition()
         self.table: LawTable | None = None
         self.coupling: Coupling | None = None
-        self._start: Arrays = {}
+        self._start: Any = None
         self._notes: list[str] = []
         self._on_body: OnBody | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
@@ -126,7 +125,7 @@ class Run:
                 if self.setup.micro is not None:
                     made = self.make_laws() if self.setup.uses_laws else self.make_model()
                 coupling = assembly.assemble(self.setup, made, self.comm)
-                if self._start and isinstance(coupling, Restorable):
+                if self._start is not None and isinstance(coupling, Restorable):
                     coupling.restore(self._start)
                 self.coupling = coupling
         return self.coupling
@@ -224,7 +223,7 @@ class Run:
         """Values of the scene's auto keys."""
         return resolved_sections(self.setup, self.given)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the coupling's next load step starts from.
 
         Note:
@@ -236,7 +235,7 @@ class Run:
         self,
         steps: Sequence[LoadStep],
         position: LoadPosition,
-        state: Arrays,
+        state: Any,
         laws: bytes,
         contacts: Sequence[ContactRecord] = (),
     ) -> None:
@@ -258,10 +257,8 @@ class Run:
     @cached_property
     def heights(self) -> str:
         """SHA-256 of the surface's heights, or of those of all samples."""
-        arrays = {"heights": self.setup.surface.heights}
-        for k, region in enumerate(self.setup.samples):
-            arrays |= {f"{k} {j}": one.heights for j, one in enumerate(region.surfaces)}
-        return digest(arrays)
+        samples = [one.heights for region in self.setup.samples for one in region.surfaces]
+        return fingerprint([self.setup.surface.heights, *samples])
 
     @property
     def laws(self) -> LawTable | None:

@@ -22,9 +22,9 @@ from multiscale.scene.new_scene import (
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
 from multiscale.setup.surface_and_block import block_material, block_section, make_surface
-from multiscale.storage import write_text
 from support.collective import on_root
 from support.errors import InputError
+from support.whole_files import write_text
 
 _KEYS = {
     "force": "load.force",

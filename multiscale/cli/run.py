@@ -87,7 +87,7 @@ def _run(
     comm, folder = run.comm, checkpoints.path.parent
     failure = _make_load_steps(run, checkpoints, interruption)
     if run.steps:
-        checkpoints.write_pending()  # writing results may fail
+        checkpoints.finish()  # writing results may fail
     if failure is not None and on_root(comm, lambda: is_finished(folder, run.identity)):
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
@@ -114,13 +114,13 @@ def _make_load_steps(
         try:
             if run.setup.uses_laws:
                 run.make_laws()
-            checkpoints.write()
+            checkpoints.accept()
             interruption.check("before the block was made")
             with optional_packages():
                 run.make_coupling()
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
-                checkpoints.accept()
+                checkpoints.accept(step)
                 advance(step)
                 if not run.finished:
                     interruption.check(f"after load step {step.step}", step.wall_s)

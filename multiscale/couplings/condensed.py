@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,9 @@ from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
 from multiscale.couplings.law_couplings import ROUNDING, beyond_law
 from multiscale.couplings.loaded_patches import TOLERANCE, DenseState, LoadedPatches
-from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 Array = NDArray[np.float64]
 
@@ -83,13 +81,13 @@ class CondensedCoupling:
         turns = self._control.tilt is None
         return Stiffness(normal_stiffness(problem.stiffness(self._last), turns=turns), 1)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest equilibrium; see `Restorable`."""
-        return packed(self._last)
+        return self._last
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from an equilibrium; see `Restorable`."""
-        self._last = unpacked(state, (DenseState, LawPoint))
+        self._last = state
 
 
 def equilibrium(

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
 from micro import (
-    START_KINDS,
     FiniteSlopes,
     HalfSpaceModel,
     HalfSpaceState,
@@ -26,8 +25,6 @@ from micro.model import SolvedContact, Stiffness
 from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 from support.collective import on_root, on_root_alone
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -193,13 +190,13 @@ class ContactCoupling:
         """Return the contact of a load step in detail; see `HasContact`."""
         return on_root_alone(self._comm, lambda: latest.detail)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""
-        return packed(self._start)
+        return self._start
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a solution; see `Restorable`."""
-        self._start = unpacked(state, START_KINDS)
+        self._start = state
 
 
 def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:

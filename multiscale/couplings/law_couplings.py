@@ -18,8 +18,6 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
@@ -107,18 +105,18 @@ class EmbeddedCoupling:
         self._last = state
         return step
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return {} if last is None else packed((last.approach, last.tilt, last.pressure))
+        return None if last is None else (last.approach, last.tilt, last.pressure)
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures; see `Restorable`.
 
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
-        if state:
-            approach, tilt, pressure = unpacked(state, ())
+        if state is not None:
+            approach, tilt, pressure = state
             if isinstance(self.table.patches, PatchGrid) or len(self.blocks) == 1:
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))

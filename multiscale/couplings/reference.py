@@ -17,8 +17,6 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
 from multiscale.setup.surface_and_block import block_material, block_section, located
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ElasticBody, MeshQuality, UnilateralContactProblem, UnilateralContactState
@@ -126,16 +124,15 @@ class ReferenceCoupling:
             gap=nodes.gap[some],
         )
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the plane on every mesh; see `Restorable`."""
-        return packed(tuple((state.approach, *state.tilt) for state in self._last))
+        return tuple((state.approach, *state.tilt) for state in self._last)
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Press every mesh by its plane again; see `Restorable`."""
-        planes = unpacked(state, ()) if state else ()
         self._last = tuple(
             problem.solve(Control(approach=approach, tilt=(tx, ty)))
-            for problem, (approach, tx, ty) in zip(self._problems, planes, strict=False)
+            for problem, (approach, tx, ty) in zip(self._problems, state, strict=False)
         )
 
     def record(self, steps: Sequence[LoadStep]) -> ReferenceRecord:

@@ -14,7 +14,6 @@ from geometry import Control, NotConverged
 from micro.contact_detail import ContactDetail
 from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
-from support.checked_store import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
@@ -42,14 +41,16 @@ class Restorable(Protocol):
     Any other coupling finds the same equilibrium without them.
     """
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the next load step starts from; it does not depend on the number of ranks.
+
+        It is made of numbers, texts, arrays and records of them, or None where there is nothing.
 
         Note:
             Collective.
         """
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a state, in a coupling newly made from the same scene.
 
         Args:

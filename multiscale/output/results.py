@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -10,17 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.couplings.law_couplings import EmbeddedCoupling
-from multiscale.laws.law_file import write_laws
+from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 from support.collective import on_root, shared
 from support.errors import NotInstalled
 from support.packages import optional_packages
-from support.whole_files import write_bytes, write_whole, written
+from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -79,9 +79,10 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     history, table = run.history(), run.laws
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
-        files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
+        files.append(write_laws(folder / "laws.h5", table))
     files += write_pictures(folder, pictures)
-    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
+    content = json.dumps(provenance(run, options=options), indent=2)
+    files.append(write_text(folder / "provenance.json", content + "\n"))
     if run.scene.output.report:
         files.append(
             write_text(folder / "report.html", report_html(run, pictures, options=options))
@@ -138,7 +139,7 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
                     group.create_dataset(name, data=data, compression=_COMPRESSION)
 
     if contacts[0].pressure_MPa is not None:
-        files.append(write_bytes(folder / "contact.h5", checksummed(fill)))
+        files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
 
 

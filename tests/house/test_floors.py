@@ -53,7 +53,7 @@ FLOORS = {
     ],
     "multiscale": [
         "readable removed",
-        "figures installation machine storage",
+        "figures installation machine",
         "doctor laws loading",
         "compiled_forms exports results scene",
         "setup",

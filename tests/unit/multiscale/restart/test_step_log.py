@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.restart.step_log import StepLog, read_steps
+from multiscale.restart.checkpoint import StepLog, read_steps
 from support.checked_store import Mark
 from support.errors import InputError, NotWritten
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multiscale.laws.law_file import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
-from multiscale.storage import checksum
+from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
 few = settings(
@@ -47,7 +47,7 @@ def changed_laws(tmp_path, whole, change):
     path.write_bytes(whole[0])
     with h5py.File(path, "r+") as file:
         change(file)
-    path.write_bytes(checksum(path.read_bytes()))
+    path.write_bytes(checksum_hdf5(path.read_bytes()))
     with pytest.raises(InputError) as refusal:
         read_laws(path)
     return str(refusal.value).removeprefix(f"{path}: ")
