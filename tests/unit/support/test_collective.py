@@ -1,27 +1,27 @@
-"""Tasks dealt to ranks by what they cost."""
+"""Tasks distributed over ranks by what they cost."""
 
 import itertools
 
 import numpy as np
 import pytest
 
-from support.collective import dealt, shared
+from support.collective import distributed, shared
 
 
-def test_equal_tasks_are_dealt_in_turn():
-    assert dealt(7, 3) == [[0, 3, 6], [1, 4], [2, 5]]
-    assert dealt(2, 3) == [[0], [1], []]
+def test_equal_tasks_are_distributed_in_turn():
+    assert distributed(7, 3) == [[0, 3, 6], [1, 4], [2, 5]]
+    assert distributed(2, 3) == [[0], [1], []]
 
 
 def test_costly_tasks_come_first():
-    assert dealt(5, 2, [1.0, 9.0, 2.0, 5.0, 4.0]) == [[1, 2], [3, 4, 0]]
+    assert distributed(5, 2, [1.0, 9.0, 2.0, 5.0, 4.0]) == [[1, 2], [3, 4, 0]]
 
 
 @pytest.mark.parametrize("ranks", [2, 3])
 def test_the_last_rank_ends_at_most_a_third_later_than_it_must(ranks):
     dice = np.random.default_rng(3)
     for costs in dice.exponential(size=(20, 7)):
-        parts = dealt(7, ranks, list(costs))
+        parts = distributed(7, ranks, list(costs))
         assert sorted(itertools.chain(*parts)) == list(range(7))
         owners = itertools.product(range(ranks), repeat=7)
         ends = (np.bincount(owner, costs, minlength=ranks).max() for owner in owners)
