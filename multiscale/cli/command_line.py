@@ -10,9 +10,9 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from multiscale.cli.signals import ended_if_told, signals_raise
 from multiscale.cli.words import UsageError, command_parser
 from multiscale.output.streams import sturdy_streams
+from multiscale.restart.interruption import ended_if_told, signals_raise
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
 

@@ -12,7 +12,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from multiscale.cli.signals import ended_if_told
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -20,6 +19,7 @@ from multiscale.machine import (
     world,
 )
 from multiscale.output import terminal
+from multiscale.restart.interruption import ended_if_told
 from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.cores import hold_blas

@@ -11,7 +11,7 @@ from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import Checkpoint, CheckpointWriter
-from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (
     find_checkpoint,
     is_finished,
@@ -34,7 +34,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    with Interruption(comm, choice.max_time) as interruption:
+    with watching(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
             found = on_root(comm, lambda: _earlier(choice, folder, scene))
