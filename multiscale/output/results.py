@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import hdf5_bytes, write_laws
@@ -55,17 +53,9 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     drawn: list[Pictures] = []
     if run.scene.output.figures and run.steps:
-        names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
-        face = _face_pressures(run)
-        names += ["face"] * (face is not None)
-        names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
-        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
+        figures = list(_figures(run).items())
         with run.phase("output"):
-            drawn = shared(
-                run.comm,
-                len(names),
-                lambda index: pictures_of(names[index], lambda: _figure(run, names[index], face)),
-            )
+            drawn = shared(run.comm, len(figures), lambda index: pictures_of(*figures[index]))
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = {name: content for one in drawn for name, content in one.files.items()}
     with run.phase("writing"):
@@ -143,12 +133,6 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
     return files
 
 
-def has_block_figure(run: Run) -> bool:
-    """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
-    pressure = run.contacts[-1].pressure_MPa if run.contacts else None
-    return pressure is not None and pressure.shape == run.setup.surface.grid
-
-
 class Pictures(NamedTuple):
     """The files of figures.
 
@@ -193,31 +177,32 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
     return [write_bytes(folder / name, content) for name, content in pictures.items()]
 
 
-def _face_pressures(run: Run) -> NDArray[np.float64] | None:
-    """Return the pressures at the points of a face with laws of samples, where they are known."""
-    if run.setup.samples and isinstance(run.coupling, EmbeddedCoupling):
-        return run.coupling.face_pressures()
-    return None
+def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each figure of a run; matplotlib is loaded only by ranks that draw."""
+    setup, history, laws = run.setup, run.history(), run.laws
+    face = None
+    if setup.samples and isinstance(run.coupling, EmbeddedCoupling):
+        face = run.coupling.face_pressures()
 
+    def by(name: str, *content: Any) -> Callable[[], Figure]:
+        """Draw by a function of `multiscale.output.figures`."""
+        return lambda: getattr(import_module("multiscale.output.figures"), name)(*content)
 
-def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
-    """Draw one figure; matplotlib is loaded only by ranks that draw."""
-    from multiscale.output import figures
-
-    setup = run.setup
-    if name == "overview":
-        return figures.overview_figure(setup, run.history(), face)
-    if name == "surface":
-        return figures.surface_figure_of(setup)
-    if name == "curves":
-        return run.history().plot(run.scene.kind)
-    if name == "block":
-        return figures.block_figure_of(setup, run.contacts[-1])
-    if name == "contact":
-        return run.contacts[-1].plot()
-    if name == "face" and face is not None:
-        return figures.face_figure(face, run.history().steps[-1])
-    if name == "pressures":
-        return figures.pressure_figure(run.history())
-    assert run.laws is not None
-    return figures.law_figure(run.laws)
+    figures = {
+        "overview": by("overview_figure", setup, history, face),
+        "surface": by("surface_figure_of", setup),
+        "curves": lambda: history.plot(run.scene.kind),
+    }
+    if not setup.samples:
+        figures["pressures"] = by("pressure_figure", history)
+    if face is not None:
+        figures["face"] = by("face_figure", face, history.steps[-1])
+    if run.contacts:
+        contact = run.contacts[-1]
+        figures["contact"] = contact.plot
+        of_cells = getattr(contact.pressure_MPa, "shape", None) == setup.surface.grid
+        if run.scene.output.figures == "all" and of_cells:
+            figures["block"] = by("block_figure_of", setup, contact)
+    if laws is not None:
+        figures["laws"] = by("law_figure", laws)
+    return figures
