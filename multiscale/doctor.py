@@ -130,22 +130,6 @@ def petsc(comm: Any) -> CheckResult:
     return CheckResult("fail" if remedy else "ok", text, remedy)
 
 
-def blas(comm: Any, libraries: Sequence[dict[str, Any]] | None = None) -> CheckResult:
-    """Name the BLAS that this process has loaded.
-
-    Args:
-        comm: MPI communicator, or None.
-        libraries: What threadpoolctl tells of loaded libraries; by default those of this process.
-    """
-    import_module("scipy.linalg")  # loads it
-    for library in threadpoolctl.threadpool_info() if libraries is None else libraries:
-        if library["user_api"] == "blas":
-            name = Path(library["filepath"]).name
-            return CheckResult("ok", f"{name}, {library['num_threads']} thread(s)")
-    remedy = "apt-get install libopenblas0-pthread (factorisations are 5 to 8 times faster)"
-    return CheckResult("warning", "the reference BLAS", remedy)
-
-
 def launcher(comm: Any) -> CheckResult:
     """Compare the MPI that mpi4py was built with and the launcher on PATH.
 
@@ -194,41 +178,39 @@ def _mpi(text: str) -> tuple[str, str]:
 
 
 def ranks(comm: Any) -> CheckResult:
-    """Count the ranks on every host.
+    """Count the ranks on every host, and tell the memory for each of them where it is least.
 
     Args:
         comm: MPI communicator, or None.
     """
     hosts = Counter([platform.node()] if comm is None else comm.allgather(platform.node()))
     places = ", ".join(f"{count} on {host}" for host, count in hosts.items())
-    return CheckResult("ok", f"{hosts.total()}: {places}")
+    nodes = cluster_nodes(comm)
+    each = nodes.memory / max(nodes.ranks)
+    remedy = "take fewer ranks per node or a larger node" if each < _LEAST_MEMORY else ""
+    text = f"{hosts.total()}: {places}, {each / 1e9:.1f} GB of memory for each"
+    return CheckResult("warning" if remedy else "ok", text, remedy)
 
 
-def threads(comm: Any) -> CheckResult:
-    """Compare the threads of all ranks on this host with the cores that it gives them.
+def threads(comm: Any, libraries: Sequence[dict[str, Any]] | None = None) -> CheckResult:
+    """Compare the threads of all ranks on this host with its cores, and name the BLAS.
 
     Args:
         comm: MPI communicator, or None.
+        libraries: What threadpoolctl tells of loaded libraries; by default those of this process.
     """
+    import_module("scipy.linalg")  # loads BLAS
     here, text = node_cores(comm), cores_statement(comm)
     if here.threads > len(here.granted):
         problem = f"{here.threads} threads of all ranks on {len(here.granted)} core(s) of a host"
         remedy = "export OMP_NUM_THREADS=1 and start no more ranks than cores"
         return CheckResult("warning", problem, remedy)
-    stated = os.environ.get("OMP_NUM_THREADS") or "not set"
-    return CheckResult("ok", f"{text} (OMP_NUM_THREADS {stated})")
-
-
-def memory(comm: Any) -> CheckResult:
-    """Tell the memory of a host for each of its ranks, where it is least.
-
-    Args:
-        comm: MPI communicator, or None.
-    """
-    nodes = cluster_nodes(comm)
-    each = nodes.memory / max(nodes.ranks)
-    remedy = "take fewer ranks per node or a larger node" if each < _LEAST_MEMORY else ""
-    return CheckResult("warning" if remedy else "ok", f"{each / 1e9:.1f} GB for a rank", remedy)
+    text = f"{text} (OMP_NUM_THREADS {os.environ.get('OMP_NUM_THREADS') or 'not set'})"
+    for library in threadpoolctl.threadpool_info() if libraries is None else libraries:
+        if library["user_api"] == "blas":
+            return CheckResult("ok", f"{text}; {Path(library['filepath']).name}")
+    remedy = "apt-get install libopenblas0-pthread (factorisations are 5 to 8 times faster)"
+    return CheckResult("warning", f"{text}; the reference BLAS", remedy)
 
 
 def known_solve(comm: Any) -> CheckResult:

@@ -115,7 +115,7 @@ def shared(
     costs: Sequence[float] | None = None,
     observe: Callable[[int], None] | None = None,
 ) -> list[T]:
-    """Do tasks of a list on all ranks.
+    """Do tasks of a list on all ranks; a single one on rank 0 with all cores of its node.
 
     Args:
         comm: MPI communicator (mpi4py), or None.
@@ -148,6 +148,8 @@ def shared(
 
     if size == 1:
         gathered = [work_off()]
+    elif count == 1:
+        return on_root_alone(comm, work_off)
     else:
         done = _attempt(work_off)
         _sleep_until_all_arrive(comm)

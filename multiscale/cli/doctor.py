@@ -18,11 +18,9 @@ from support.errors import InputError
 CHECKS: dict[str, Check] = {
     "packages": doctor.packages,
     "PETSc": doctor.petsc,
-    "BLAS": doctor.blas,
     "launcher": doctor.launcher,
     "ranks": doctor.ranks,
     "threads": doctor.threads,
-    "memory": doctor.memory,
     "form cache": compiled_forms.form_cache,
     "test solve": doctor.known_solve,
 }

@@ -20,14 +20,14 @@ OPEN_MPI = "Open MPI v4.1.4"
 def test_a_tested_machine_is_well(capsys):
     assert main(["doctor", "--json"]) == 0
     findings = {found["topic"]: found for found in json.loads(capsys.readouterr().out)}
-    assert {"packages", "PETSc", "ranks", "threads", "memory", "form cache"} <= set(findings)
+    assert {"packages", "PETSc", "ranks", "threads", "form cache"} <= set(findings)
     assert all(found["state"] != "fail" for found in findings.values())
     assert findings["test solve"]["state"] == "ok"
     assert "dolfinx" in findings["packages"]["text"]
 
 
 def test_lines_come_with_remedies(capsys):
-    command.show("BLAS", CheckResult("warning", "the reference [BLAS]", "apt-get install it"))
+    command.show("threads", CheckResult("warning", "the reference [BLAS]", "apt-get install it"))
     shown = capsys.readouterr().out
     assert "the reference [BLAS]" in shown  # no markup
     assert "→ apt-get install it" in shown
@@ -40,18 +40,18 @@ def test_a_check_that_raises_has_failed(monkeypatch, capsys):
     def refused(comm):
         raise InputError("has none", key="HOME")
 
-    checks = {"memory": broken, "ranks": doctor.ranks, "form cache": refused}
-    memory, ranks, cache = dict(examine(None, checks)).values()
-    assert (memory.state, memory.text) == ("fail", "RuntimeError: no such device")
+    checks = {"PETSc": broken, "ranks": doctor.ranks, "form cache": refused}
+    petsc, ranks, cache = dict(examine(None, checks)).values()
+    assert (petsc.state, petsc.text) == ("fail", "RuntimeError: no such device")
     assert ranks.text.startswith("1: 1 on ")
     assert (cache.state, cache.text) == ("fail", "HOME: has none")
     monkeypatch.setattr(command, "CHECKS", checks)
     assert main(["doctor"]) == 2
-    assert capsys.readouterr().err == "patchlaw: doctor: not fit to run: memory, form cache\n"
+    assert capsys.readouterr().err == "patchlaw: doctor: not fit to run: PETSc, form cache\n"
 
 
 def test_a_warning_is_no_failure(monkeypatch, capsys):
-    monkeypatch.setattr(command, "CHECKS", {"BLAS": lambda comm: CheckResult("warning", "slow")})
+    monkeypatch.setattr(command, "CHECKS", {"threads": lambda comm: CheckResult("warning", "slow")})
     assert main(["doctor"]) == 0
     assert "slow" in capsys.readouterr().out
 
@@ -111,17 +111,18 @@ def test_threads_of_all_ranks_count(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("ranks", "state", "text"), [((1,), "ok", "1.5 GB for a rank"), ((1, 2), "warning", "0.8 GB")]
+    ("ranks", "state", "text"),
+    [((1,), "ok", "1.5 GB of memory for each"), ((1, 2), "warning", "0.8 GB")],
 )
 def test_memory_is_shared_by_the_ranks_of_a_host(monkeypatch, ranks, state, text):
     nodes = ClusterNodes(ranks=ranks, memory=1.5e9)
     monkeypatch.setattr(doctor, "cluster_nodes", lambda comm: nodes)
-    found = doctor.memory(None)
+    found = doctor.ranks(None)
     assert (found.state, text in found.text) == (state, True)
 
 
 def test_reference_blas_is_told():
-    found = doctor.blas(None, libraries=[])
+    found = doctor.threads(None, libraries=[])
     assert "libopenblas0" in found.remedy
 
 

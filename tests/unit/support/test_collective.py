@@ -1,11 +1,14 @@
 """Tasks distributed over ranks by what they cost."""
 
 import itertools
+import os
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from support.collective import distributed, shared
+from support.cores import cores
 
 
 def test_equal_tasks_are_distributed_in_turn():
@@ -27,6 +30,19 @@ def test_the_last_rank_ends_at_most_a_third_later_than_it_must(ranks):
         ends = (np.bincount(owner, costs, minlength=ranks).max() for owner in owners)
         best = min(ends)
         assert max(sum(costs[k] for k in part) for part in parts) <= (4 / 3) * best * (1 + 1e-12)
+
+
+def test_a_single_task_takes_the_cores_of_the_node(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    arrived = SimpleNamespace(Test=lambda: True)
+    ranks = SimpleNamespace(
+        rank=0, size=2, allgather=lambda mine: [mine, mine], Ibarrier=lambda: arrived,
+        bcast=lambda content, root: content,
+    )  # fmt: skip
+    told = []
+    (used,) = shared(ranks, 1, lambda index: cores(), observe=told.append)
+    assert used == min(2, len(os.sched_getaffinity(0)))
+    assert told == [1]
 
 
 def test_results_come_in_the_order_of_the_tasks():
