@@ -160,6 +160,8 @@ def _table(file: Any) -> LawTable:
 
 
 def _law(group: Any) -> PatchLaw:
+    if not isinstance(group, h5py.Group):  # h5py would look for names among all its numbers
+        raise InputError(f"{group.name} is no group of columns")
     found = {
         one.name: _numbers(group[name])
         for name, one in _COLUMNS.items()
