@@ -35,6 +35,9 @@ LEAST_INTERVAL = 1.0
 LEAST_RATIO = 20.0
 """Least wall time between two writes over that of a write; so writing takes 5 % at most."""
 
+LOG_SUFFIX = ".steps"
+"""Suffix of the log of load steps, whose name is that of the checkpoint."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Checkpoint:
@@ -83,20 +86,18 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
     )
 
 
-def write_checkpoint(path: Path, checkpoint: Checkpoint, log: StepLog | None = None) -> Path:
-    """Write a checkpoint whole, or leave the earlier one.
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
+    """Write a checkpoint whole, or leave the earlier one, with a new log of its load steps.
 
     Args:
         path: File to write.
         checkpoint: Its content.
-        log: The log of its load steps; by default it is written anew.
 
     Raises:
         NotWritten: When a file cannot be written.
     """
-    log = log or StepLog.beside(path)
-    log.write(checkpoint.steps)
-    return write_record(path, replace(checkpoint, steps=(), log=log.mark))
+    _write(path, checkpoint, START)
+    return path
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -114,7 +115,7 @@ def read_checkpoint(path: Path) -> Checkpoint:
         found = read_record(path.read_bytes(), _KINDS)
         if not isinstance(found, Checkpoint):
             raise InputError("is no checkpoint")
-        return replace(found, steps=read_steps(StepLog.beside(path).path, found.log))
+        return replace(found, steps=read_steps(path.with_suffix(LOG_SUFFIX), found.log))
     except InputError as error:
         problem = error.problem
     except OSError as error:
@@ -122,38 +123,25 @@ def read_checkpoint(path: Path) -> Checkpoint:
     raise InputError(f"{problem}; remove it, or begin anew with --overwrite", file=str(path))
 
 
-class StepLog:
-    """Writes load steps to a checked file, each once.
+def write_steps(path: Path, steps: Sequence[LoadStep], mark: Mark = START) -> Mark:
+    """Write those load steps to a log that are not in it yet.
 
     Args:
         path: The file.
+        steps: All load steps so far. Where the file has gone, or is another run's, all are written
+            again.
+        mark: How far the file is written.
 
-    Attributes:
-        mark: How far it is written.
+    Returns:
+        How far it is written now.
+
+    Raises:
+        NotWritten: When the file cannot be written; what was in it counts as before.
     """
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.mark = path, START
-
-    @classmethod
-    def beside(cls, path: Path) -> StepLog:
-        """Return the log that belongs to the checkpoint of a name."""
-        return cls(path.with_suffix(".steps"))
-
-    def write(self, steps: Sequence[LoadStep]) -> None:
-        """Write those load steps that are not in the file yet.
-
-        Args:
-            steps: All load steps so far. Where the file has gone, or is another run's, all are
-                written again.
-
-        Raises:
-            NotWritten: When the file cannot be written; what was in it counts as before.
-        """
-        here = self.path.stat().st_size if self.path.is_file() else 0
-        mark = self.mark if here >= self.mark.size else START
-        if new := steps[mark.records :]:
-            self.mark = append(self.path, new, mark)
+    here = path.stat().st_size if path.is_file() else 0
+    mark = mark if here >= mark.size else START
+    new = steps[mark.records :]
+    return append(path, new, mark) if new else mark
 
 
 def read_steps(path: Path, mark: Mark) -> tuple[LoadStep, ...]:
@@ -197,7 +185,7 @@ class CheckpointWriter:
     def __init__(self, folder: Path, run: Run, hold: Callable[[], None]) -> None:
         self.path = folder / FILE_NAME
         self._run, self._hold = run, hold
-        self._log = StepLog.beside(self.path)
+        self._log = START
         self._pending: Checkpoint | None = None
         self._due = 0.0
 
@@ -251,7 +239,7 @@ class CheckpointWriter:
         self._pending = None
 
         def unlink() -> None:
-            for path in (self.path, self._log.path):
+            for path in (self.path, self.path.with_suffix(LOG_SUFFIX)):
                 path.unlink(missing_ok=True)
 
         on_root(self._run.comm, unlink)
@@ -265,8 +253,15 @@ class CheckpointWriter:
         except InputError as error:  # the folder was good when the run began
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
-        write_checkpoint(self.path, self._pending, self._log)
+        self._log = _write(self.path, self._pending, self._log)
         self.path.with_name(FORMER_NAME).unlink(missing_ok=True)
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))
+
+
+def _write(path: Path, checkpoint: Checkpoint, mark: Mark) -> Mark:
+    """Write a checkpoint, and its load steps behind a mark of their log; return the new mark."""
+    mark = write_steps(path.with_suffix(LOG_SUFFIX), checkpoint.steps, mark)
+    write_record(path, replace(checkpoint, steps=(), log=mark))
+    return mark
