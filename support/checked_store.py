@@ -38,6 +38,7 @@ from support.whole_files import write_bytes, written
 _HEAD = re.compile(rb"([0-9a-f]{64}) (\d{1,18})\n")
 _LONGEST_HEAD = 84  # bytes
 _STORED = "biufcSU"  # kinds of arrays whose bytes are their values
+_PLAIN = (float, int, str)  # what JSON knows, and most of a value
 _KIND = "="  # key of JSON objects that stand for what JSON does not know
 _HDF5_MARK = b"patchlaw, SHA-256 of all bytes from 512 on: "
 
@@ -225,6 +226,8 @@ def check_hdf5(content: bytes) -> None:
 
 def _apart(value: Any, arrays: list[NDArray[Any]]) -> Any:
     """Return a value as JSON; its arrays are added to a list, in the order of their places."""
+    if isinstance(value, _PLAIN):
+        return value
     if isinstance(value, bytes):
         return _apart(np.frombuffer(value, np.uint8), arrays) | {_KIND: "bytes"}
     if isinstance(value, np.ndarray):
