@@ -46,7 +46,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                 run = Run(scene, comm, None if kept is None else kept.resolved)
             if kept is not None:
                 run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
-            terminal.show_plan(comm, run.setup)
+            terminal.show_plan(comm, run.coupling)
             if notice:
                 terminal.say(comm, notice)
             with CheckpointWriter(folder, run, lock.hold) as checkpoints:
@@ -88,14 +88,14 @@ def _make_load_steps(
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
     load_history = run.scene.loading.load_history
-    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.observe):
+    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.setup.uses_laws:
+            if run.coupling.has_laws:
                 run.make_laws()
             checkpoints.accept()
             interruption.check("before the block was made")
             with optional_packages():
-                run.make_coupling()
+                run.prepare()
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
                 checkpoints.accept(step)
@@ -122,10 +122,10 @@ def _write(folder: Path, run: Run, failure: PatchlawError | None, options: list[
     if failure is not None and _is_finished(folder, run.given, comm):
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
-        run.make_contact()
+        run.finish()
         files = write_results(folder, run, options=options)
         if run.scene.output.fields:
             files += write_fields(folder, run)
         terminal.show_history(comm, run.history())
-        terminal.show_times(comm, run.times)
+        terminal.show_times(comm, run.clock.times)
         terminal.show_files(comm, files)

@@ -8,7 +8,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
@@ -179,30 +178,28 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
 
 def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
     """Return what draws each figure of a run; matplotlib is loaded only by ranks that draw."""
-    setup, history, laws = run.setup, run.history(), run.laws
-    face = None
-    if setup.samples and isinstance(run.coupling, EmbeddedCoupling):
-        face = run.coupling.face_pressures()
+    coupling, history, laws = run.coupling, run.history(), run.laws
+    face = coupling.face_pressures()
 
     def by(name: str, *content: Any) -> Callable[[], Figure]:
         """Draw by a function of `multiscale.output.figures`."""
         return lambda: getattr(import_module("multiscale.output.figures"), name)(*content)
 
     figures = {
-        "overview": by("overview_figure", setup, history, face),
-        "surface": by("surface_figure_of", setup),
+        "overview": by("overview_figure", coupling, history, face),
+        "surface": by("surface_figure_of", coupling),
         "curves": lambda: history.plot(run.scene.kind),
     }
-    if not setup.samples:
+    if coupling.regions is None:
         figures["pressures"] = by("pressure_figure", history)
     if face is not None:
         figures["face"] = by("face_figure", face, history.steps[-1])
     if run.contacts:
         contact = run.contacts[-1]
         figures["contact"] = contact.plot
-        of_cells = getattr(contact.pressure_MPa, "shape", None) == setup.surface.grid
+        of_cells = getattr(contact.pressure_MPa, "shape", None) == coupling.surface.grid
         if run.scene.output.figures == "all" and of_cells:
-            figures["block"] = by("block_figure_of", setup, contact)
+            figures["block"] = by("block_figure_of", coupling, contact)
     if laws is not None:
         figures["laws"] = by("law_figure", laws)
     return figures

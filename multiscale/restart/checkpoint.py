@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from micro import START_KINDS
-from multiscale.couplings.loaded_patches import DenseState
+from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
