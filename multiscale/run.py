@@ -155,7 +155,7 @@ class Run:
         Note:
             Collective.
         """
-        return self._start or self.coupling.state()
+        return self.coupling.state() if self._start is None else self._start
 
     def resume(
         self,
