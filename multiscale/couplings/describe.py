@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 
 from geometry.materials import Material
 from geometry.meshes.block import misalignment
@@ -264,12 +264,6 @@ def coarse_cells(parts: SceneParts) -> Iterator[str]:
     yield from locking(parts.materials.first.poisson_ratio, shape.degree)
     if sentence := misalignment(shape, parts.patches):
         yield sentence
-
-
-def listed(parts: Iterable[str]) -> str:
-    """Return parts as a list in words."""
-    *first, last = parts
-    return f"{', '.join(first)} and {last}" if first else last
 
 
 def times(counts: tuple[int, ...]) -> str:

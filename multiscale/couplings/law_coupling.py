@@ -163,5 +163,5 @@ class LawCoupling(Coupling):
         return [face.body.body, face.body.counter] if hasattr(face.body, "counter") else [face.body]
 
     def _drop_solvers(self) -> None:
-        self.__dict__.pop("_solver", None)
-        self.__dict__.pop("put_on_body", None)
+        for name in ("_solver", "_laws", "put_on_body"):
+            self.__dict__.pop(name, None)

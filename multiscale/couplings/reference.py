@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import BlockShape, Control
+from geometry import Control
 from micro import HalfSpaceModel
 from micro.contact_detail import ContactDetail, peaks_of
 from multiscale.couplings import describe
@@ -41,9 +41,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-LEAST_ACROSS = {1: 12.0, 2: 3.0}
-"""Edges across a typical contact below which the force is wrong by several per cent, by the
-element's degree."""
 _CYCLES = {1: 30.0, 2: 60.0}
 """Multigrid cycles of a load step by degree: 15 to 44, and 51 to 90."""
 _NO_AREA = 1e-9
@@ -338,23 +335,8 @@ class ReferenceCoupling(PressedSurface):
 
     def body_statements(self) -> Iterator[tuple[str, str]]:
         """Yield what the meshes are."""
-        meshes, finest = self.rough_meshes, self.rough_meshes.shapes[-1]
-        if isinstance(finest, BlockShape):
-            cells = describe.times(finest.cells)
-            kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
-            where, unknowns = "edges", [f"{count}" for count in meshes.unknowns]
-        else:  # unknowns are an estimate, which is worth two digits
-            kind = f"tetrahedra ({finest.element}), small only where contact can occur"
-            where = "edges there"
-            unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in meshes.unknowns]
-        count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(meshes.shapes)]
-        sizes = describe.listed(f"{1e3 * size:.3g}" for size in meshes.sizes)
-        yield (
-            "block",
-            f"{count} of {kind}; {where} of {sizes} µm, {meshes.across:.2g} across a typical "
-            f"contact; {describe.listed(unknowns)} unknowns, about {meshes.bytes / 1e9:.2g} GB of "
-            f"memory; {block_section(self.scene).sides} sides",
-        )
+        sides = block_section(self.scene).sides
+        yield "block", f"{self.rough_meshes.statement}; {sides} sides"
 
     def error_statement(self) -> str:
         """Say how the run will know its error."""
@@ -365,26 +347,8 @@ class ReferenceCoupling(PressedSurface):
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""
         yield from describe.proportions(self)
-        meshes, finest = self.rough_meshes, self.rough_meshes.shapes[-1]
-        if len(meshes.shapes) == 1:
-            yield (
-                "one mesh: the discretisation error stays unknown, and the results have no error "
-                "bar; reference.meshes = 2 gives one"
-            )
-        if meshes.across < LEAST_ACROSS[meshes.degree]:
-            yield (
-                f"{meshes.across:.2g} edges across a typical contact at the largest load: the "
-                f"force is wrong by several per cent; refine {meshes.key}"
-            )
-        if isinstance(finest, BlockShape):
-            top = float(finest.ticks[2][-1] - finest.ticks[2][-2])
-            if top > 2.0 * float(meshes.sizes[-1]):
-                yield (
-                    f"the top layer is {1e3 * top:.3g} µm high, more than twice the width of its "
-                    "cells, which see the contacts no better than cubes would: take more layers, "
-                    "or a larger block.grading"
-                )
-        yield from describe.locking(self.materials.first.poisson_ratio, meshes.degree)
+        yield from self.rough_meshes.warnings()
+        yield from describe.locking(self.materials.first.poisson_ratio, self.rough_meshes.degree)
 
     @property
     def shows_cells(self) -> bool:

@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 from geometry import Control, PatchGrid, Regions, RigidPlane, Surface
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
-from micro import FiniteSlopes, HalfSpaceModel
+from micro import HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling, Facts
 from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
+from multiscale.couplings.sample_laws import SampleLaws
 from multiscale.couplings.work import (
     BYTES_PER_CELL,
     PRODUCTS,
@@ -37,8 +39,6 @@ from multiscale.inputs.memory import law_requests
 from multiscale.inputs.surfaces import RegionSamples, located, region_samples, sample_surface
 from multiscale.law_solvers.embedded import EmbeddedLaws
 from multiscale.laws.law_table import LawTable
-from multiscale.laws.refinement import MOST_ROWS
-from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws, step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
@@ -50,17 +50,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_CONCENTRATION = 10.0
-"""Largest local pressure that laws are made for, over the mean one on the face."""
-_CROWNED = 2.0
-"""The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
-_YIELDED = 0.95
-"""Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
-then, and at it the pressure is no function of closure."""
-_EXTENSION = 2.0
-"""Largest pressure of laws that turned out to end too early, over that of the earlier ones."""
-_RESERVE = 0.15
-"""Closure that laws are made for beyond the largest approach on the face, relative to it."""
 _TOLERANCE = 5e-4
 """Interpolation error of laws by default."""
 _CYCLES_AT_POINTS = 24
@@ -217,98 +206,21 @@ class RepresentativeCoupling(LawCoupling):
 
     # --- laws
 
-    def _make_table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
-        """Tabulate the laws, or extend earlier ones as far as the material allows.
-
-        Args:
-            observe: Told of rows as they are made.
-            before: Laws that end too early; where they end as far as possible they come back.
-        """
-        hardness = self.scene.micro.hardness
-        most = math.inf if hardness is None else _YIELDED * hardness
-        if before is None or not (reached := before.largest_pressure):
-            pressure, closure = self.largest_loads()
-        else:
-            pressure, closure = _EXTENSION * reached, None
-            most = min(most, self.materials.contact_modulus)
-        models = {
-            id(one): self._model_of(region, one)
-            for region in self.samples
-            for one in region.surfaces
-        }
-        made = representative_laws(
-            {region.name: region.surfaces for region in self.samples},
-            self.materials.contact_modulus,
-            largest_pressure=min(pressure, most),
-            largest_closure=closure,
+    @cached_property
+    def _laws(self) -> SampleLaws:
+        return SampleLaws(
+            scene=self.scene,
+            bodies=self.bodies,
+            samples=self.samples,
+            model=self.model,
+            load_history=self.load_history,
+            finite_slopes=self.finite_slopes,
             tolerance=self.table_tolerance,
-            most_rows=MOST_ROWS,
-            make_model=lambda sample: models[id(sample)],
-            before=before,
-            comm=self.comm,
-            observe=observe,
         )
-        return before if before is not None and made.rows == before.rows else made
 
-    def _model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
-        """Return the periodic model of a sample, with the slopes of its body where they count."""
-        pair = region.materials
-        model = replace(self.model, surface=sample, contact_modulus=pair.contact_modulus)
-        if not self.finite_slopes:
-            return model
-        return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
-
-    def largest_loads(self) -> tuple[float, float | None]:
-        """Return the largest local pressure that laws are made for [MPa], and closure [mm].
-
-        The closure is None where only a force, or other loads of the body, would tell it.
-
-        Note:
-            Collective.
-        """
-        stated, history = self.scene.law.largest_pressure, self.load_history
-        if history.quantity == "force":
-            force = history.largest
-            mean = force / self.body.area
-            return stated or max(_CONCENTRATION * mean, self._hertz(force=force)), None
-        tilt, lengths = history.tilt or (0.0, 0.0), self.body.lengths
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
-        mean = approach / self.mean_compliance()
-        pressure = stated or max(_CONCENTRATION * mean, self._hertz(approach=approach))
-        first = self.bodies.first
-        preloaded = first is not None and first.body.preload is not None
-        return pressure, None if preloaded else (1.0 + _RESERVE) * approach
-
-    def mean_compliance(self) -> float:
-        """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
-
-        Note:
-            Collective.
-        """
-        from macro import FacePair, displacements_under
-
-        face, total = self.bodies.contact_face(), 0.0
-        for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
-            moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
-            total += float(moved @ one.areas / one.areas.sum())
-        return total
-
-    def _hertz(self, *, force: float = 0.0, approach: float = 0.0) -> float:
-        """Return a bound of the pressure between smooth crowned bodies; 0 without a crown [MPa].
-
-        Source:
-            Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
-        """
-        radii = [one for one in self.scene.law.crown or () if one != "inf"]
-        if not radii:
-            return 0.0
-        modulus, radius = self.materials.contact_modulus, math.sqrt(math.prod(radii))
-        if len(radii) == 1:
-            radius, length = radii[0], min(self.body.lengths)
-            line = math.sqrt(force / length * modulus / (math.pi * radius))
-            return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
-        point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
-        return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        """Tabulate the laws; collective."""
+        return self._laws.table(observe)
 
     # --- load steps
 
@@ -344,7 +256,7 @@ class RepresentativeCoupling(LawCoupling):
             try:
                 return super().press(control)
             except BeyondLaws:
-                longer = self._make_table(None, before=self.table)
+                longer = self._laws.table(None, before=self.table)
                 if longer is self.table:
                     raise
                 last, face = self._solver.state(), self._solver.face

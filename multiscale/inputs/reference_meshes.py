@@ -19,6 +19,7 @@ from multiscale.inputs.block import block_section
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.readable import listed
 from multiscale.scene.scene import Scene
 
 Array = NDArray[np.float64]
@@ -28,6 +29,9 @@ BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 _BYTES_IN_GMSH = {1: 1900, 2: 250}
 """Memory of rank 0 per unknown while gmsh makes tetrahedra, by the element's degree. It is 1 kB for
 each cell [B]."""
+LEAST_ACROSS = {1: 12.0, 2: 3.0}
+"""Edges across a typical contact below which the force is wrong by several per cent, by the
+element's degree."""
 _NODES = {1: 1.1, 2: 8.4}
 """Nodes of unstructured tetrahedra per cube of their edge, by the element's degree."""
 _RESERVE = 0.1
@@ -89,6 +93,47 @@ class ReferenceMeshes:
     def gathered(self) -> float:
         """Memory of rank 0 while it makes the largest mesh, roughly; 0 for hexahedra [B]."""
         return 0.0 if self.hexahedral else float(max(self.unknowns)) * _BYTES_IN_GMSH[self.degree]
+
+    @property
+    def statement(self) -> str:
+        """What the meshes are, in words."""
+        finest = self.shapes[-1]
+        if isinstance(finest, BlockShape):
+            cells = " × ".join(map(str, finest.cells))
+            kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
+            where, unknowns = "edges", [f"{count}" for count in self.unknowns]
+        else:  # unknowns are an estimate, which is worth two digits
+            kind = f"tetrahedra ({finest.element}), small only where contact can occur"
+            where = "edges there"
+            unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
+        count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(self.shapes)]
+        sizes = listed(f"{1e3 * size:.3g}" for size in self.sizes)
+        return (
+            f"{count} of {kind}; {where} of {sizes} µm, {self.across:.2g} across a typical "
+            f"contact; {listed(unknowns)} unknowns, about {self.bytes / 1e9:.2g} GB of memory"
+        )
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the meshes."""
+        if len(self.shapes) == 1:
+            yield (
+                "one mesh: the discretisation error stays unknown, and the results have no error "
+                "bar; reference.meshes = 2 gives one"
+            )
+        if self.across < LEAST_ACROSS[self.degree]:
+            yield (
+                f"{self.across:.2g} edges across a typical contact at the largest load: the "
+                f"force is wrong by several per cent; refine {self.key}"
+            )
+        finest = self.shapes[-1]
+        if isinstance(finest, BlockShape):
+            top = float(finest.ticks[2][-1] - finest.ticks[2][-2])
+            if top > 2.0 * float(self.sizes[-1]):
+                yield (
+                    f"the top layer is {1e3 * top:.3g} µm high, more than twice the width of its "
+                    "cells, which see the contacts no better than cubes would: take more layers, "
+                    "or a larger block.grading"
+                )
 
 
 def reference_meshes(
