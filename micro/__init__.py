@@ -1,7 +1,7 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
-Every micro model presses a plane on a surface and returns a `Response` of the surface and its
-patches. `HalfSpaceModel` solves the contact problem on the surface's cells. `AsperityModel` sees
+Every micro model has one entry, ``press``: a plane under a `Control` presses on the surface, and a
+`ContactState` says all of the contact, of the surface and its patches. `HalfSpaceModel` solves the contact problem on the surface's cells. `AsperityModel` sees
 its summits alone. `micro_model` makes any of them by name.
 
     closed_forms                                      Hertz, Love
@@ -9,10 +9,11 @@ its summits alone. `micro_model` makes any of them by name.
     asperities                                        summits that interact pair by pair
 """
 
+from geometry.contact_state import ContactState, Spots, Start
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS
 from micro.asperities.model import MODELS, AsperityModel
-from micro.by_name import MODEL_NAMES, START_KINDS, micro_model
+from micro.by_name import MODEL_NAMES, micro_model
 from micro.closed_forms.hertz import HertzContact
 from micro.closed_forms.love import influence_matrix
 from micro.compliance.body_modes import BodyModes, BodyStresses
@@ -26,40 +27,37 @@ from micro.compliance.rectangle_modes import (
     side_stress_modes,
 )
 from micro.compliance.side_cells import SideStresses, side_stresses
-from micro.compliance.slopes_of_bodies import SlopesOfBodies
-from micro.half_space.contact_spots import Contacts, find_contacts
+from micro.half_space.contact_spots import find_spots
 from micro.half_space.model import HalfSpaceModel
-from micro.half_space.plane_contact import HalfSpaceState
-from micro.model import MicroModel, Pressed, Response
+from micro.model import MicroModel, Stiffness, press_along
 
 __all__ = [
     "MODELS",
     "MODEL_NAMES",
     "SOLVERS",
-    "START_KINDS",
     "AsperityModel",
     "BodyModes",
     "BodyStresses",
-    "Contacts",
+    "ContactState",
     "FiniteSlopes",
     "FreeSides",
     "HalfSpaceModel",
-    "HalfSpaceState",
     "HertzContact",
     "MicroModel",
-    "Pressed",
     "RectangleFields",
-    "Response",
     "RigidPlane",
     "SideStresses",
-    "SlopesOfBodies",
+    "Spots",
+    "Start",
+    "Stiffness",
     "SurfaceStress",
     "coarse_grid",
-    "find_contacts",
+    "find_spots",
     "half_space_modes",
     "half_space_stress_modes",
     "influence_matrix",
     "micro_model",
+    "press_along",
     "side_modes",
     "side_stress_modes",
     "side_stresses",

@@ -1,4 +1,4 @@
-"""Hertz contacts of the asperities of a surface, and the plane that rests on them.
+"""Hertz contacts of the asperities of a surface.
 
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
@@ -18,9 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, Control
-from geometry.plane_equilibrium import PlaneResponse
-from geometry.rigid_plane import PlaneLevers, RigidPlane
+from geometry import Asperities
 from micro.asperities.contact_problem import (
     BYTES_PER_PAIR,
     ContactProblem,
@@ -30,13 +28,11 @@ from micro.asperities.contact_problem import (
     check_pairs,
     solve,
 )
-from micro.asperities.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs
+from micro.asperities.hertz_pairs import BodyPoints, HertzPairs
 from micro.asperities.patch_sums import EllipticContacts
-from micro.asperities.plane_on_peaks import Peaks, contact_stiffness
 from micro.asperities.truncated_newton import truncated_newton
 from micro.closed_forms.hertz import HertzContact
 from micro.compliance.body_modes import BodyModes
-from support.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -56,18 +52,6 @@ class ModelKind(NamedTuple):
 
     elliptic: bool
     interacting: bool
-
-
-class Equilibrium(NamedTuple):
-    """Contacts in equilibrium with a plane.
-
-    Attributes:
-        plane: The plane.
-        solution: The contacts.
-    """
-
-    plane: RigidPlane
-    solution: Solution
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -179,107 +163,18 @@ class AsperityContacts:
             above, start = np.sort(np.append(above, np.flatnonzero(raised))), own
         return found._replace(indentation=own, displacement=displacement, iterations=spent)
 
-    def stiffness(self, indentation: Array, lever: Array) -> Array:
-        """Return nearly the derivative of the loads on a rigid plane by its motions, (k, k).
-
-        The contacts act as point forces here, whatever their distance.
+    def tangent(self, indentation: Array, modes: Array) -> Array:
+        """Return the derivative of the loads on a rigid plane by its motions, shape (k, k).
 
         Args:
             indentation: Indentations of the contacts, shape (n,) [mm].
-            lever: Displacements of the summits by unit motions, shape (n, k).
+            modes: Displacements of the summits by unit motions, shape (n, k).
         """
         active = np.flatnonzero(indentation > 0.0)
+        moved = modes[active]
         rate = 1.5 * self.hertz.force[active] * np.sqrt(indentation[active])
-        coupling = np.zeros(2 * (len(active),))
-        share = rate / (np.pi * self.contact_modulus)
-        if self.kind.interacting:
-            x, y = self.asperities.x[active], self.asperities.y[active]
-            apart = np.hypot(x[:, None] - x, y[:, None] - y)
-            np.fill_diagonal(apart, np.inf)
-            coupling += share / np.maximum(apart, share / MERGING_SLOPE)
-        if self.pairs.body is not None:
-            among = self.pairs.body.among(active)
-            coupling += among.by(among) * rate
-        return contact_stiffness(lever[active], rate, coupling)
-
-    def tangent(self, indentation: Array) -> Array:
-        """Return the derivative of the loads on a rigid plane by its motions, shape (3, 3).
-
-        Args:
-            indentation: Indentations of the contacts in equilibrium, shape (n,) [mm].
-        """
-        active = np.flatnonzero(indentation > 0.0)
-        lever = self._peaks.lever[active]
-        rate = 1.5 * self.hertz.force[active] * np.sqrt(indentation[active])
-        if not self.kind.interacting and self.body is None:
-            return np.asarray(lever.T @ (rate[:, None] * lever))
-        caused = self.pairs.subset(active).evaluate(indentation[active])
-        own = np.linalg.solve(np.eye(len(active)) + caused.derivative, lever)
-        return np.asarray(lever.T @ (rate[:, None] * own))
-
-    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> Equilibrium:
-        """Solve the contacts, and the motions of the plane that are free.
-
-        Without force the plane is that of first touch; where its slopes are free they are those
-        of the start.
-
-        Args:
-            control: What is prescribed of the plane.
-            start: A solution nearby, of these or as many asperities.
-
-        Raises:
-            InputError: When the start is of other asperities.
-            NotConverged: When the contact conditions cannot be met to 1e-10, or no plane is in
-                equilibrium.
-        """
-        own = np.zeros(len(self.asperities)) if start is None else start.solution.indentation
-        if own.shape != (len(self.asperities),):
-            raise InputError(
-                "the solution to start from is of other asperities",
-                value=own.shape,
-                allowed=f"({len(self.asperities)},)",
-            )
-        if control.approach is not None and control.tilt is not None:
-            plane = RigidPlane.above(self.asperities, control.approach, control.tilt)
-            return Equilibrium(plane, self.solution(self.asperities.interference(plane), own))
-        peaks, first, spent = self._peaks, self.first_plane(control, start), 0
-
-        def respond(motion: Array) -> PlaneResponse[Equilibrium]:
-            nonlocal own, spent
-            plane = RigidPlane.moved(self.asperities, motion)
-            found = self.solution(self.asperities.interference(plane), own)
-            own, spent = found.indentation, spent + found.iterations
-            known = Equilibrium(plane, found._replace(iterations=spent))
-            return PlaneResponse(
-                loads=peaks.levers.loads(self.hertz.force * own**1.5),
-                stiffness=lambda: self.stiffness(known.solution.indentation, peaks.lever),
-                state=known,
-            )
-
-        return peaks.equilibrium(respond, control, first.motion)[1]
-
-    def first_plane(self, control: Control, start: Equilibrium | None = None) -> RigidPlane:
-        """Return the plane that the search for an equilibrium starts from.
-
-        Args:
-            control: What is prescribed of the plane.
-            start: A solution nearby; without it the plane is that of contacts that do not
-                displace each other's summits.
-
-        Raises:
-            NotConverged: When no plane can be in equilibrium.
-        """
-        near = None
-        if start is not None and (start.solution.indentation.any() or control.force == 0.0):
-            near = start.plane
-        return RigidPlane.moved(self.asperities, self._peaks.first_plane(control, near))
-
-    @property
-    def _peaks(self) -> Peaks:
-        """The summits under the plane; not cached, because models are sent between processes."""
-        a, force = self.asperities, self.hertz.force
-        return Peaks(
-            levers=PlaneLevers.at(a.x, a.y, a.lengths),
-            depth=a.highest - a.z,
-            force=lambda interference: float(force @ np.maximum(interference, 0.0) ** 1.5),
-        )
+        own = moved
+        if self.kind.interacting or self.body is not None:
+            caused = self.pairs.subset(active).evaluate(indentation[active])
+            own = np.linalg.solve(np.eye(len(active)) + caused.derivative, moved)
+        return np.asarray(moved.T @ (rate[:, None] * own))

@@ -19,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from micro.compliance.body_modes import BodyModes, ModesOnCells
+from micro.compliance.finite_slopes import FiniteSlopes
 from micro.compliance.free_sides import FreeSides
 from micro.compliance.half_space_grid import Cells, HalfSpaceGrid
 from micro.compliance.side_cells import side_cells
-from micro.compliance.slopes_of_bodies import SlopeTerm
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -124,15 +124,15 @@ class Compliance:
         modulus: Contact modulus E* of the model [MPa].
         sides: Free sides, if there are any.
         body: What a finite body adds to the half-space and its sides, if it is finite.
-        slopes: What finite slopes add, if they count. Whoever solves on the grids has to take them
-            into account (`micro.contact.slope_iteration`).
+        slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
+            grids has to take them into account (`micro.contact.slope_iteration`).
     """
 
     periodic: bool
     modulus: float = 1.0
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: SlopeTerm | None = None
+    slopes: tuple[FiniteSlopes, ...] = ()
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -203,9 +203,8 @@ class Compliance:
         Args:
             pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
         """
-        assert self.slopes is not None
         if self._last is None or not np.array_equal(self._last[0], pressure):
-            self._last = pressure, self.slopes.displacement(pressure * self.modulus)
+            self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
 
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
@@ -215,7 +214,10 @@ class Compliance:
             pressure: Pressures / E* of all cells, shape (nx, ny).
             rate: Their change by whatever the derivative is by, shape (nx, ny).
         """
-        assert self.slopes is not None
         step = _DIFFERENCE * float(pressure.max()) / float(np.abs(rate).max())
-        moved = self.slopes.displacement((pressure + step * rate) * self.modulus)
+        moved = self._by_slopes(pressure + step * rate)
         return np.asarray((moved - self.slope_displacement(pressure)) / step)
+
+    def _by_slopes(self, pressure: Array) -> Array:
+        """Return the sum of what the slopes of all bodies add, by pressures / E*."""
+        return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))

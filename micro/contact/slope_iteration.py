@@ -85,7 +85,7 @@ def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> Co
     """
     compliance, interference = problem.compliance, problem.interference
     tolerance = problem.tolerance
-    if compliance.slopes is None:
+    if not compliance.slopes:
         return solve_on_surface(problem, start)
     mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
     if start is not None and start.pressure.any():

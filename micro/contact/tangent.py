@@ -58,7 +58,7 @@ def approach_stiffness(problem: ContactProblem, pressure: Array) -> tuple[float,
         change.ravel()[flat] = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
         rate[box] += change
         moved = part.grid.displacement(rate[box])
-        if problem.compliance.slopes is not None:
+        if problem.compliance.slopes:
             moved += problem.compliance.slope_rate(pressure, rate)[box]
         left = 1.0 - moved.ravel()[flat]
         if float(np.abs(contact.balanced(left)).max()) <= _RESIDUAL:

@@ -13,16 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
-from micro import (
-    START_KINDS,
-    FiniteSlopes,
-    HalfSpaceModel,
-    HalfSpaceState,
-    MicroModel,
-    SlopesOfBodies,
-)
-from micro.contact_detail import ContactDetail
-from micro.model import SolvedContact, Stiffness
+from geometry.contact_state import ContactState, Start
+from micro import FiniteSlopes, HalfSpaceModel, MicroModel, RigidPlane, Stiffness
 from multiscale.couplings.body import has_body_term, scene_body
 from multiscale.loading.load_step import LoadStep
 from multiscale.setup.problem import ProblemSetup
@@ -67,30 +59,30 @@ class ContactCoupling:
     ) -> None:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm = comm
-        self._start: Any = None
+        self._start: Start | None = None
         self._turns = False
-        self.latest: SolvedContact | None = None
+        self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Coupling.press`."""
 
         def solve() -> LoadStep:
-            response, plane, self._start, self.latest = self._model.press(
+            state = self._model.press(
                 control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
             )
-            self._turns = control.tilt is None
+            self.latest, self._start, self._turns = state, state.start, control.tilt is None
             return LoadStep.of_patches(
                 self._patches,
-                plane=(plane.approach, *plane.tilt),
-                load=(response.force[0], *response.moment[0]),
-                closure=plane.means(self._patches) - response.patch_displacement[0],
-                pressure=response.patch_force[0] / self._patches.area,
-                area_fraction=response.patch_contact_area[0] / self._patches.area,
-                separation=response.mean_separation,
-                contacts=response.contacts,
-                newton_iterations=int(response.iterations[0]),
-                warnings=response.warnings,
-                peak_pressure_MPa=self.latest.peak_pressure,
+                plane=(state.approach, *state.tilt),
+                load=(state.force, *state.moment),
+                closure=state.patch_closure,
+                pressure=state.patch_force / self._patches.area,
+                area_fraction=state.patch_area / self._patches.area,
+                separation=state.mean_separation,
+                contacts=state.contacts,
+                newton_iterations=state.iterations,
+                warnings=(state.warning,) if state.warning else (),
+                peak_pressure_MPa=state.peak_pressure,
                 **self._of_cells(),
             )
 
@@ -99,16 +91,16 @@ class ContactCoupling:
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""
         state = self.latest
-        if not isinstance(state, HalfSpaceState):
+        if state is None or state.pressure is None:
             return {}
-        found = {
+        columns = {
             "elastic_energy_mJ": state.elastic_energy,
             "plastic_work_mJ": state.plastic_work,
         }
-        if state.plastic_depth is not None:
-            found["yielding_area_fraction"] = float(np.mean(state.yielding))
-            found["plastic_depth_mm"] = float(state.plastic_depth.max())
-        return found
+        if state.plastic_depth is not None and state.yielding is not None:
+            columns["yielding_area_fraction"] = float(np.mean(state.yielding))
+            columns["plastic_depth_mm"] = float(state.plastic_depth.max())
+        return columns
 
     @property
     def past(self) -> Any:
@@ -138,11 +130,12 @@ class ContactCoupling:
         def pressures() -> Array:
             assert self.latest is not None
             if isinstance(self._model, HalfSpaceModel):
-                pressure, surface = self._start[0], self._model.surface
+                pressure, surface = self.latest.pressures, self._model.surface
                 borders = parts.borders_x, parts.borders_y
                 x, y = map(overlaps, borders, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
-            spots = self.latest.detail
+            spots = self.latest.spots
+            assert spots is not None
             owner = parts.index_of(*spots.place.T)
             return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
 
@@ -151,7 +144,7 @@ class ContactCoupling:
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step; see `HasStiffness`."""
         return on_root_alone(
-            self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
+            self._comm, lambda: self._model.stiffness(self._solved(), turns=self._turns)
         )
 
     def interface_stiffness(self) -> float:
@@ -163,7 +156,13 @@ class ContactCoupling:
         Note:
             Collective.
         """
-        return on_root_alone(self._comm, lambda: self._solved_cells().interface_stiffness())
+
+        def stiffness() -> float:
+            if not isinstance(self._model, HalfSpaceModel):
+                raise InputError("contacts without cells have no conductance")
+            return self._model.interface_stiffness(self._solved())
+
+        return on_root_alone(self._comm, stiffness)
 
     def over_gaps(self, function: Callable[[Array], float]) -> float:
         """Return a function of the gaps at the latest load step, on every rank.
@@ -178,20 +177,22 @@ class ContactCoupling:
             Collective.
         """
 
-        def found() -> float:
-            state = self._solved_cells()
+        def of_gaps() -> float:
+            state = self._solved()
+            if state.gap is None:
+                raise InputError("contacts without cells have no conductance")
             return function(np.where(state.in_contact, 0.0, np.maximum(state.gap, 0.0)))
 
-        return on_root_alone(self._comm, found)
+        return on_root_alone(self._comm, of_gaps)
 
-    def _solved_cells(self) -> HalfSpaceState:
-        if not isinstance(self.latest, HalfSpaceState):
-            raise InputError("contacts without cells have no conductance")
+    def _solved(self) -> ContactState:
+        if self.latest is None:
+            raise ValueError("no load step is solved yet")
         return self.latest
 
-    def detail(self, latest: Any) -> ContactDetail:
+    def detail(self, latest: Any) -> ContactState:
         """Return the contact of a load step in detail; see `HasContact`."""
-        return on_root_alone(self._comm, lambda: latest.detail)
+        return on_root_alone(self._comm, lambda: latest)
 
     def state(self) -> Arrays:
         """Return the latest solution; see `Restorable`. It is whole on rank 0 alone."""
@@ -199,7 +200,7 @@ class ContactCoupling:
 
     def restore(self, state: Arrays) -> None:
         """Start from a solution; see `Restorable`."""
-        self._start = unpacked(state, START_KINDS)
+        self._start = unpacked(state, (RigidPlane, Start))
 
 
 def contact_model(setup: ProblemSetup, comm: Any, put_on_body: OnBody | None = None) -> MicroModel:
@@ -280,8 +281,8 @@ def on_body(
         )
         second = setup.materials.second
         if above is None or second is None:
-            return replace(model, slopes=slopes)
+            return replace(model, slopes=(slopes,))
         others = FiniteSlopes(above, second, order=order, periodic=model.periodic)
-        return replace(model, slopes=SlopesOfBodies((slopes, others)))
+        return replace(model, slopes=(slopes, others))
 
     return put

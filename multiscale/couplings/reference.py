@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
-from micro.contact_detail import ContactDetail, peaks_of
+from geometry.contact_state import ContactState, Spots, peaks_of
+from geometry.rigid_plane import RigidPlane
 from multiscale.loading.load_step import LoadStep
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.setup.problem import ProblemSetup
@@ -101,7 +102,7 @@ class ReferenceCoupling:
             ),
         )
 
-    def detail(self, latest: UnilateralContactState) -> ContactDetail:
+    def detail(self, latest: UnilateralContactState) -> ContactState:
         """Return the contact of a load step in detail; see `HasContact`.
 
         The area of a spot is that of its nodes times the area with its border in the facets over
@@ -115,11 +116,17 @@ class ReferenceCoupling:
         share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > _NO_AREA * nodes.area.max()
-        return ContactDetail(
+        spots = Spots(
             place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
             area=share * np.bincount(region, nodes.area[touching], minlength=count),
             force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
             peak_pressure=nodes.pressure[top],
+        )
+        return ContactState(
+            plane=RigidPlane(approach=latest.approach, tilt=latest.tilt),
+            patches=self._patches,
+            force=latest.force,
+            spots=spots,
             x=nodes.x[some],
             y=nodes.y[some],
             pressure=nodes.pressure[some],

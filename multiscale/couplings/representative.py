@@ -100,7 +100,7 @@ def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfS
     model = replace(setup.model, surface=sample, contact_modulus=pair.contact_modulus)
     if not setup.finite_slopes:
         return model
-    return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
+    return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
 
 
 def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:

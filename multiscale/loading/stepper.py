@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol, runtime_checkable
 import numpy as np
 
 from geometry import Control, NotConverged
-from micro.contact_detail import ContactDetail
+from geometry.contact_state import ContactState
 from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
 from support.checked_store import Arrays
@@ -82,7 +82,7 @@ class HasContact(Protocol):
     def latest(self) -> Any:
         """The contact at the latest load step, as `detail` takes it."""
 
-    def detail(self, latest: Any) -> ContactDetail:
+    def detail(self, latest: Any) -> ContactState:
         """Return the spots and fields of a contact, the same on every rank.
 
         Args:

@@ -118,7 +118,7 @@ class _Search(MeshSearch):
         probe = replace(error_probe(setup, body), model=model, by_laws=False)
         worst: Errors = {"grid": 0.0}
         for value in sorted({load_history.largest, load_history.points[-1]}):
-            state = body(model, order).equilibrium(load_history.control(value))
+            state = body(model, order).press(load_history.control(value))
             if not state.force > 0.0:
                 continue
             found = probe.measure(state.force, state.plane.approach, state.plane.tilt)
