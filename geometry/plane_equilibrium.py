@@ -215,4 +215,3 @@ def _direction(
         step = vectors @ np.where(falling, loads, 0.0)
         return first * step / np.abs(step).max(), False
     return vectors @ np.divide(loads, values, out=np.zeros_like(loads), where=~loose), True
-

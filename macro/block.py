@@ -1,6 +1,6 @@
 """The elastic block: its supports, its stiffness, and the solver that its lattice allows.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Contact of a rough surface with a rigid plane on the scale of its asperities.
 
 Every micro model has one entry, ``press``: a plane under a `Control` presses on the surface, and a
-`ContactState` says all of the contact, of the surface and its patches. `HalfSpaceModel` solves the contact problem on the surface's cells. `AsperityModel` sees
-its summits alone. `micro_model` makes any of them by name.
+`ContactState` tells the contact of the surface and its patches. `HalfSpaceModel` solves the contact
+problem on the surface's cells. `AsperityModel` sees its summits alone. `micro_model` makes any of
+them by name.
 
     closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells

@@ -147,7 +147,7 @@ def _extrapolated(
 ) -> Start | None:
     """Return what to start from at an approach, by the last two solutions."""
     if last is None or before is None or not last.approach > before.approach:
-        return last and last.guess
+        return None if last is None else last.guess
     ahead = (approach - last.approach) / (last.approach - before.approach)
     own = last.guess.values
     return replace(last.guess, values=np.maximum(own + ahead * (own - before.guess.values), 0.0))

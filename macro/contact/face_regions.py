@@ -1,6 +1,6 @@
 """A contact face of any outline, whose regions have a law each.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Guesses minimise the energy in the space of earlier solutions. Extrapolation too
 as many linear iterations over eight load steps with 4 patches and one closure for each, and 3 to
 24 % more with 16 and 64 patches or laws at points.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

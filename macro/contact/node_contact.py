@@ -2,7 +2,7 @@
 
 A rough top has no smooth energy in a basis of earlier solutions; guesses are extrapolated.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

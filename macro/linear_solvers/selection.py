@@ -13,7 +13,7 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
                     28 to 43 on hexahedra of 8 : 1 and 20 : 1
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The half-space model: a rough surface cell by cell, without assumptions on its asperities.
 
-Theory: demos/theory.md, sections 3 and 4.
+Theory: docs/theory.md, sections 3 and 4.
 """
 
 from __future__ import annotations
@@ -169,8 +169,8 @@ class HalfSpaceModel:
         if start is not None and start.values.shape != self.surface.grid:
             problem, allowed = "the solution to start from is of another grid", self.surface.grid
             raise InputError(problem, value=start.values.shape, allowed=f"{allowed}")
-        solution = self._solution(control, start)
-        return contact_state(self, solution, start and start.plastic_depth, patches, means)
+        depth = None if start is None else start.plastic_depth
+        return contact_state(self, self._solution(control, start), depth, patches, means)
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
@@ -256,17 +256,19 @@ class HalfSpaceModel:
     def _solution(self, control: Control, start: Start | None) -> CellSolution:
         """Solve the contact from a start, whose plastic depth the surface has."""
         surface, modulus = self.surface, self.contact_modulus
-        depth = start and start.plastic_depth
+        depth = None if start is None else start.plastic_depth
         if control.force == 0.0:
-            control, start = self._first_touch(control, start), None
+            near = _LEVEL if start is None else start.plane.tilt
+            control, start = self._first_touch(control.tilt or near, depth), None
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(surface, motion), depth)
         if self.periodic:
             self._check_periodic(control, interference)
         problem = self._problem(interference, control.free, control.loads)
-        first = start and ContactPressures(
-            np.divide(start.values, modulus), np.array([start.plane.approach])
-        )
+        first = None
+        if start is not None:
+            known = np.divide(start.values, modulus)
+            first = ContactPressures(known, np.array([start.plane.approach]))
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
@@ -328,13 +330,10 @@ class HalfSpaceModel:
             hardness=np.inf if self.hardness is None else self.hardness / modulus,
         )
 
-    def _first_touch(self, control: Control, start: Start | None) -> Control:
-        """Return the approach at which a plane without force, tilted as one near, first touches."""
-        near = _LEVEL if start is None else start.plane.tilt
-        tilt = near if control.tilt is None else control.tilt
-        flat = RigidPlane.above(self.surface, 0.0, tilt)
-        touch = -float(self.interference(flat, start and start.plastic_depth).max())
-        return Control(approach=touch, tilt=tilt)
+    def _first_touch(self, tilt: tuple[float, float], depth: Array | None) -> Control:
+        """Return the approach at which a plane of given slopes first touches."""
+        plane = RigidPlane.above(self.surface, 0.0, tilt)
+        return Control(approach=-float(self.interference(plane, depth).max()), tilt=tilt)
 
     def _check_periodic(self, control: Control, interference: Array) -> None:
         """Refuse planes that are not level, and approaches beyond full contact."""

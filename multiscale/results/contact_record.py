@@ -54,9 +54,7 @@ class ContactRecord:
     plastic_depth_mm: Array | None = None
 
     @classmethod
-    def of(
-        cls, state: ContactState, step: LoadStep, lengths: tuple[float, float]
-    ) -> ContactRecord:
+    def of(cls, state: ContactState, step: LoadStep, lengths: tuple[float, float]) -> ContactRecord:
         """Return the record of a load step.
 
         Args:
@@ -65,10 +63,13 @@ class ContactRecord:
             lengths: Sides of the surface [mm].
         """
         assert state.spots is not None
-        columns = state.spots.place.T, (
-            state.spots.area,
-            state.spots.force,
-            state.spots.peak_pressure,
+        columns = (
+            state.spots.place.T,
+            (
+                state.spots.area,
+                state.spots.force,
+                state.spots.peak_pressure,
+            ),
         )
         spots = np.concatenate(columns).T
         order = np.lexsort((spots[:, 1], spots[:, 0], -spots[:, 3]))

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from micro.contact_detail import peaks_of
 
 from geometry import Control, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel, micro_model
-from micro.contact_detail import peaks_of
 
 MODULUS, RADIUS, APPROACH, CELLS = 4000.0, 2.0, 0.02, 128
 X = (np.arange(CELLS) + 0.5) / CELLS
