@@ -17,6 +17,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from helpers.along import respond
 
 from geometry import (
     Material,
@@ -54,8 +55,11 @@ whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 approaches = np.linspace(0.0, 16e-3, 9 if choice.quick else 81)[1:]
 responses = {
-    name: AsperityModel(name, asperities, contact_modulus=MODULUS).respond(
-        approaches, patches=whole, mean_heights=patch_means(surface, whole)
+    name: respond(
+        AsperityModel(name, asperities, contact_modulus=MODULUS),
+        approaches,
+        patches=whole,
+        mean_heights=patch_means(surface, whole),
     )
     for name in MODELS
 }

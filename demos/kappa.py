@@ -14,6 +14,7 @@ import argparse
 from pathlib import Path
 
 import numpy as np
+from helpers.along import respond
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import micro_model
@@ -41,7 +42,7 @@ def kappa(name, seed):
     surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
     model = micro_model(name, surface, contact_modulus=MODULUS)
     means = patch_means(surface, WHOLE)
-    response = model.respond(APPROACHES, patches=WHOLE, mean_heights=means)
+    response = respond(model, APPROACHES, patches=WHOLE, mean_heights=means)
     area = np.maximum.accumulate(response.contact_area_fraction)
     found = np.interp(FRACTIONS, area, response.kappa(SLOPE), right=np.nan)
     return np.where(area[0] <= FRACTIONS, found, np.nan)

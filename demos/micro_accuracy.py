@@ -19,6 +19,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from helpers.along import respond
 from paper.accuracy_figure import draw_accuracy
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
@@ -55,7 +56,7 @@ def answer(spectrum, name, grid):
     _ = surface.highest  # not of the model
     start = time.process_time()
     model = micro_model(name, surface, contact_modulus=MODULUS)
-    response = model.respond(APPROACHES, patches=WHOLE, mean_heights=patch_means(surface, WHOLE))
+    response = respond(model, APPROACHES, patches=WHOLE, mean_heights=patch_means(surface, WHOLE))
     seconds = (time.process_time() - start) / len(APPROACHES)
     return [*response.force, *response.contact_area, seconds]
 

@@ -39,7 +39,7 @@ def respond(band, seed, names, deepest):
     approaches, means = np.linspace(0.0, deepest, 33)[1:], patch_means(surface, WHOLE)
     models = {name: micro_model(name, surface, contact_modulus=MODULUS) for name in names}
     return {
-        name: model.respond(approaches, patches=WHOLE, mean_heights=means)
+        name: respond(model, approaches, patches=WHOLE, mean_heights=means)
         for name, model in models.items()
     }
 

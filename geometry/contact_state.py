@@ -6,6 +6,7 @@ know has its default, which says so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -246,3 +247,13 @@ class ContactState:
         if not self.force > 0.0:
             return float(np.nan)
         return self.contact_area_fraction * rms_slope * contact_modulus / self.mean_pressure
+
+
+def stacked(states: Sequence[ContactState], name: str) -> NDArray[Any]:
+    """Return what several states know under one name, as an array whose first axis counts them.
+
+    Args:
+        states: The states.
+        name: Name of an attribute.
+    """
+    return np.array([getattr(state, name) for state in states])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
 
-from geometry import Asperities, Material
+from geometry import Asperities, Control, Material
 from micro import AsperityModel
 
 x = (np.arange(CELLS) + 0.5) / CELLS - 0.5
@@ -82,7 +82,9 @@ def summits(ratio: float, place: list[float], lower: float = 0.0) -> Asperities:
 
 def pressed(approach: float, *given: Any) -> Any:
     """Press summits that interact."""
-    return AsperityModel("elliptic", summits(*given), contact_modulus=4000.0).solve(approach)
+    return AsperityModel("elliptic", summits(*given), contact_modulus=4000.0).press(
+        Control(approach=approach)
+    )
 
 
 @case(4, "merging summits: 0.04 mm apart, pressed 0.02 mm", "residual of gaps and forces", 1e-10)

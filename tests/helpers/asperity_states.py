@@ -2,7 +2,25 @@
 
 import numpy as np
 
+from geometry import Control
 from micro import HertzContact
+
+
+class AsperityState:
+    """A contact state of an asperity model, with all contacts that there may be."""
+
+    def __init__(self, model, state):
+        self._state = state
+        self.ellipses = model.contacts.ellipses(state.indentation)
+
+    def __getattr__(self, name):
+        return getattr(self._state, name)
+
+
+def pressed(model, approach, *, tilt=(0.0, 0.0), start=None):
+    """Press an asperity model to an approach."""
+    state = model.press(Control(approach=approach, tilt=tilt), start=start)
+    return AsperityState(model, state)
 
 
 def places(asperities):
@@ -17,7 +35,7 @@ def interference(asperities, state):
 
 def displacement(model, state):
     """Return the displacements of all summits by all contacts, also of summits below the plane."""
-    own = state.start.solution.indentation
+    own = state.indentation
     interacting = model.contacts.kind.interacting or model.body is not None
     return own + model.contacts.pairs.evaluate(own).displacement if interacting else own
 
@@ -25,7 +43,7 @@ def displacement(model, state):
 def surface_displacement(model, state, x, y):
     """Add up the fields of all contacts at points, each Hertz's, also where contacts merge."""
     total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
-    a, hertz, own = model.asperities, model.contacts.hertz, state.start.solution.indentation
+    a, hertz, own = model.asperities, model.contacts.hertz, state.indentation
     for k in np.flatnonzero(own):  # one field at a time bounds the memory
         contact = HertzContact(
             contact_modulus=hertz.contact_modulus,

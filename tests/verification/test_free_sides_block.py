@@ -47,7 +47,9 @@ def test_what_is_left_beside_a_side_is_smooth():
     pressure = np.zeros(patches.count)
     pressure[index] = 1.0
     nodes = interface.body.space.tabulate_dof_coordinates()
-    down = -interface.body.solve(interface.load(pressure)).x.array.reshape(-1, 3)[:, 2]
+    down = -interface.body.press(Control(approach=interface.load(pressure))).x.array.reshape(-1, 3)[
+        :, 2
+    ]
     at = (np.abs(nodes[:, 2]) < 1e-9) & (np.abs(nodes[:, 1] - square.centres[0, 1]) < 0.01)
     at &= (nodes[:, 0] > 1e-3) & (nodes[:, 0] < 0.06)
     x, y, _ = nodes[at].T
@@ -86,7 +88,10 @@ def meshed_force():
 
 def test_ball_cut_by_a_side_carries_what_the_meshed_one_does():
     ball = cut_ball(128)
-    known, unknown = (on_block(ball, known=known).solve(APPROACH).force for known in (True, False))
+    known, unknown = (
+        on_block(ball, known=known).press(Control(approach=APPROACH)).force
+        for known in (True, False)
+    )
     expected, bar = meshed_force()
     assert bar < 2e-3 * expected
     # 0.2 % with the sides in the half-space

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from helpers.half_space_cases import paraboloid
 
+from geometry import Control
 from micro import HalfSpaceModel, HertzContact
 
 E_STAR = 2000.0
@@ -19,7 +20,9 @@ def sphere(n, offset=(0.0, 0.0)):
     surface = paraboloid((n, n), (SIDE, SIDE), (RADIUS, RADIUS), off=off)
     # the interpolant's summit is the sphere's
     assert surface.highest == pytest.approx(0.0, abs=1e-12)
-    state = HalfSpaceModel(surface=surface, contact_modulus=E_STAR).solve(APPROACH)
+    state = HalfSpaceModel(surface=surface, contact_modulus=E_STAR).press(
+        Control(approach=APPROACH)
+    )
     return state, hertz(RADIUS, RADIUS, APPROACH)
 
 
@@ -69,7 +72,7 @@ def test_rate_of_the_sphere():
 def test_ellipsoid(grid):
     # 6 : 1 radii of curvature make axes of 3.7 : 1; oblong cells in the second case
     surface = paraboloid(grid, (0.5, 0.25), (3.0, 0.4))
-    state = HalfSpaceModel(surface=surface, contact_modulus=E_STAR).solve(0.01)
+    state = HalfSpaceModel(surface=surface, contact_modulus=E_STAR).press(Control(approach=0.01))
     exact = hertz(3.0, 0.4, 0.01)
     # 13 and 19 cells on the minor semi-axis; the bound of the sphere
     cells = exact.semi_minor / surface.spacing[1]
@@ -89,7 +92,7 @@ def test_force_of_a_given_approach_and_back():
     state, exact = sphere(64)
     surface = paraboloid((64, 64), (SIDE, SIDE), (RADIUS, RADIUS))
     model = HalfSpaceModel(surface=surface, contact_modulus=E_STAR)
-    again = model.solve_force(float(exact.force))
+    again = model.press(Control(force=float(exact.force)))
     # δ ∝ P^(2/3) of the error of the force, 2e-4 on 64 cells
     assert again.approach == pytest.approx(APPROACH, rel=2e-4)
     assert state.force == pytest.approx(exact.force, rel=3e-4)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
 import micro.asperities.hertz_pairs
 from geometry import Asperities, PatchGrid
@@ -159,7 +160,7 @@ def evaluations(monkeypatch, below: int) -> int:
         patch.setattr(micro.asperities.hertz_pairs, "circular_field", watched)
         model = AsperityModel("circular", summits(below), contact_modulus=1.0)
         whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-        model.respond([0.002, 0.004], patches=whole, mean_heights=[-0.1])
+        respond(model, [0.002, 0.004], patches=whole, mean_heights=[-0.1])
     return counted[0]
 
 

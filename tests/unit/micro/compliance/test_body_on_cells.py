@@ -85,16 +85,16 @@ def test_cells_lifted_into_contact_are_found(control, lower):
     model = HalfSpaceModel(
         surface=surface, contact_modulus=E_STAR, body=seesaw(3e-3), tolerance=1e-9
     )
-    state = model.equilibrium(control)
-    overlap = state.interference > 0.0
+    state = model.press(control)
+    overlap = model.interference(state.plane) > 0.0
     left = surface.x < 0.5
     assert not overlap[left].any()
     assert state.in_contact[left].any() and state.in_contact[~left].any()
-    slack = 1.1e-9 * state.interference.max()
+    slack = 1.1e-9 * model.interference(state.plane).max()
     assert state.gap.min() >= -slack
     assert np.abs(state.gap[state.in_contact]).max() <= slack
     # the same on all cells at once, where no box can hide any
-    interference = state.interference
+    interference = model.interference(state.plane)
     body = Compliance(periodic=False, modulus=E_STAR, body=seesaw(3e-3))
     problem = replace(contact_problem(interference, SPACING, tolerance=1e-10), compliance=body)
     every = solve(problem, np.zeros(GRID))
@@ -126,18 +126,18 @@ def test_a_box_of_cells_only_grows(seed, monkeypatch):
         )  # fmt: skip
         for control in controls:
             boxes.clear()
-            state = model.equilibrium(control)
+            state = model.press(control)
             for before, after in pairwise(boxes):
                 grown += 1
                 for old, new in zip(before, after, strict=True):
                     assert new.start <= old.start and new.stop >= old.stop
-            assert state.gap.min() >= -1.1e-8 * state.interference.max()
+            assert state.gap.min() >= -1.1e-8 * model.interference(state.plane).max()
     assert grown > 2
 
 
 def test_a_stiff_body_lifts_nothing():
     model = HalfSpaceModel(surface=two_bumps(8e-3), contact_modulus=E_STAR, body=seesaw(1e-6))
-    state = model.solve(5e-3)
+    state = model.press(Control(approach=5e-3))
     assert not state.in_contact[model.surface.x < 0.5].any()
     assert state.gap.min() >= -1.1e-8 * 5e-3
 
@@ -147,10 +147,10 @@ def test_a_body_under_a_free_plane():
     model = HalfSpaceModel(
         surface=surface, contact_modulus=E_STAR, body=random_body(3, 1e-4), tolerance=1e-10
     )
-    state = model.solve_force(2.0, tilt=None)
+    state = model.press(Control(force=2.0, tilt=None))
     area = np.prod(SPACING)
     for arm in (surface.x[:, None] - 0.5, surface.y - 0.375):
         assert abs(np.sum(state.pressure * arm) * area) < 1e-10 * 2.0
-    assert state.gap.min() >= -1.1e-10 * state.interference.max()
-    fixed = model.solve(state.approach, tilt=state.plane.tilt)
+    assert state.gap.min() >= -1.1e-10 * model.interference(state.plane).max()
+    fixed = model.press(Control(approach=state.approach, tilt=state.plane.tilt))
     assert fixed.force == pytest.approx(2.0, rel=1e-8)

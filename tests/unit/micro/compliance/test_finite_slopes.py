@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.rough_half_space import displaced
 
-from geometry import InputError, Material, Spectrum, Surface, synthesise
+from geometry import Control, InputError, Material, Spectrum, Surface, synthesise
 from micro import FreeSides, HalfSpaceModel
 from micro.compliance.finite_slopes import FiniteSlopes, coarse_grid
 from micro.compliance.side_cells import SideStresses
@@ -37,7 +37,7 @@ def term(surface, around="nothing", **options):
 
 def pressed(surface, periodic=False, approach=2e-3):
     model = HalfSpaceModel(surface=surface, contact_modulus=4000.0 / 0.91, periodic=periodic)
-    return model.solve(approach).pressure
+    return model.press(Control(approach=approach)).pressure
 
 
 GRIDS = pytest.mark.parametrize("grid", [(48, 40), (128, 130)], ids=["own", "coarse"])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
 
-from geometry import Surface, UnevenPartition
+from geometry import Control, Surface, UnevenPartition
 from micro import (
     FreeSides,
     HalfSpaceModel,
@@ -95,8 +95,8 @@ def test_a_free_side_lowers_the_force_of_a_ball_beside_it():
     alone = HalfSpaceModel(surface=ball, contact_modulus=1.0)
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.3, decay_length=0.25)
     beside = replace(alone, sides=sides)
-    state = beside.solve(5e-3)
-    assert state.force < 0.9 * alone.solve(5e-3).force
+    state = beside.press(Control(approach=5e-3))
+    assert state.force < 0.9 * alone.press(Control(approach=5e-3)).force
     assert state.gap[state.in_contact] == pytest.approx(0.0, abs=1e-8 * 5e-3)
     assert state.gap.min() > -1e-8 * 5e-3  # of the model's tolerance
 

@@ -92,16 +92,16 @@ def arms(surface):
 
 @pytest.mark.parametrize("force", [1e-6, 0.05, 2.0, 50.0])
 def test_meets_force_and_moments(model, force):
-    state = model.equilibrium(Control(force=force, tilt=None))
+    state = model.press(Control(force=force, tilt=None))
     assert state.force == pytest.approx(force, rel=1e-12)
     area = np.prod(model.surface.spacing)
     half = 0.5 * np.hypot(*model.surface.lengths)
     for arm in arms(model.surface):
         assert abs(np.sum(state.pressure * arm) * area) < 1e-12 * force * half
     # the plane found, prescribed, and its approach, prescribed with a free tilt
-    fixed = model.solve(state.approach, tilt=state.plane.tilt)
+    fixed = model.press(Control(approach=state.approach, tilt=state.plane.tilt))
     assert fixed.force == pytest.approx(force, rel=1e-7)  # 2 ε dlnF/dlnδ, more at first touch
-    turned = model.equilibrium(Control(approach=state.approach, tilt=None))
+    turned = model.press(Control(approach=state.approach, tilt=None))
     assert turned.force == pytest.approx(force, rel=1e-7)
     assert turned.plane.tilt == pytest.approx(state.plane.tilt, abs=1e-9)
 
@@ -121,8 +121,8 @@ def test_mirrors_and_turns(model, turn, given):
     surface = model.surface
     lengths = surface.lengths[::-1] if turn == "axes exchanged" else surface.lengths
     other = replace(model, surface=Surface(heights=field(surface.heights), lengths=lengths))
-    one = model.equilibrium(Control(**given, tilt=None))
-    same = replace(other, highest=model.reference_height).equilibrium(Control(**given, tilt=None))
+    one = model.press(Control(**given, tilt=None))
+    same = replace(other, highest=model.reference_height).press(Control(**given, tilt=None))
     assert same.force == pytest.approx(one.force, rel=1e-8)
     assert same.approach == pytest.approx(one.approach, rel=1e-8)
     assert same.plane.tilt == pytest.approx(tilt(one.plane.tilt), rel=1e-7, abs=1e-10)
@@ -142,13 +142,13 @@ def hardly_touching(seed, part=None):
     surface = synthesise(spectrum, grid=(nx, ny), lengths=(1.0, float(ny / nx)))
     scene = HalfSpaceModel(surface=surface, contact_modulus=4000.0, tolerance=1e-9)
     deep = dice.uniform(0.2, 3.0) * surface.heights.std()
-    largest = replace(scene, tolerance=1e-2).solve(deep).force
+    largest = replace(scene, tolerance=1e-2).press(Control(approach=deep)).force
     return scene, largest * (part or 10 ** dice.uniform(-5.0, -3.0))
 
 
 def turned_share(scene, force):
     """Return the iterations of a free plane over those of a level one; it has no moment."""
-    level, turned = scene.solve_force(force), scene.solve_force(force, tilt=None)
+    level, turned = scene.press(Control(force=force)), scene.press(Control(force=force, tilt=None))
     moments = [abs(np.sum(turned.pressure * arm)) for arm in arms(scene.surface)]
     assert max(moments) < 1e-8 * turned.pressure.sum()
     assert turned.residual <= 1e-9 and turned.force == pytest.approx(force, rel=1e-9)
@@ -180,7 +180,7 @@ def test_what_motions_take_up_leaves_no_gap():
 def test_no_plane_turns_on_a_period():
     model = HalfSpaceModel(surface=rough(), contact_modulus=1.0, periodic=True)
     with pytest.raises(InputError, match="a plane over a periodic surface must be level"):
-        model.solve_force(1.0, tilt=None)
+        model.press(Control(force=1.0, tilt=None))
 
 
 def test_loads_that_no_pressures_meet():

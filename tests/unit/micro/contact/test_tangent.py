@@ -25,20 +25,20 @@ def model(**terms):
         ({}, Control(approach=0.006, tilt=TURNING)),
         ({}, Control(force=1.0, tilt=TURNING)),
         ({"periodic": True}, Control(force=1.0, tilt=LEVEL)),
-        ({"slopes": SLOPES}, Control(approach=0.006, tilt=LEVEL)),
-        ({"slopes": SLOPES}, Control(approach=0.006, tilt=TURNING)),
+        ({"slopes": (SLOPES,)}, Control(approach=0.006, tilt=LEVEL)),
+        ({"slopes": (SLOPES,)}, Control(approach=0.006, tilt=TURNING)),
     ],
 )
 def test_stiffness_is_the_derivative_of_the_force(terms, control):
     contact = model(**terms)
-    state = contact.equilibrium(control)
+    state = contact.press(control)
     turns = control.tilt is None
     stiffness, products, _ = contact.stiffness(state, turns=turns)
     # small enough for the same cells in contact, over which the force is linear
     step = 1e-4 * state.approach
     near = [
-        contact.equilibrium(
-            Control(approach=state.approach + change, tilt=control.tilt), start=state
+        contact.press(
+            Control(approach=state.approach + change, tilt=control.tilt), start=state.guess
         )
         for change in (step, -step)
     ]
@@ -56,11 +56,11 @@ def test_stiffness_of_a_sphere_is_that_of_hertz():
     x = (np.arange(cells) + 0.5) / cells - 0.5
     sphere = Surface(heights=-(x[:, None] ** 2 + x**2) / (2.0 * radius), lengths=(1.0, 1.0))
     contact = HalfSpaceModel(surface=sphere, contact_modulus=MODULUS)
-    stiffness = contact.stiffness(contact.solve(approach), turns=False).value
+    stiffness = contact.stiffness(contact.press(Control(approach=approach)), turns=False).value
     # 25 cells along the contact's radius: 8e-4 were measured
     assert stiffness == pytest.approx(2.0 * MODULUS * np.sqrt(radius * approach), rel=2e-3)
 
 
 def test_stiffness_is_zero_without_contact():
     contact = model()
-    assert contact.stiffness(contact.solve(-1e-3), turns=False) == (0.0, 0, 0.0)
+    assert contact.stiffness(contact.press(Control(approach=-1e-3)), turns=False) == (0.0, 0, 0.0)
