@@ -10,7 +10,7 @@ them by name.
     asperities                                        summits that interact pair by pair
 """
 
-from geometry.contact_state import ContactState, Spots, Start
+from geometry.contact_state import ContactState, Spots, Start, stacked
 from geometry.rigid_plane import RigidPlane
 from micro.asperities.contacts import SOLVERS
 from micro.asperities.model import MODELS, AsperityModel
@@ -62,4 +62,5 @@ __all__ = [
     "side_modes",
     "side_stress_modes",
     "side_stresses",
+    "stacked",
 ]

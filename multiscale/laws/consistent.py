@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from micro import ContactState, MicroModel, Start, influence_matrix
+from micro import ContactState, MicroModel, Start, influence_matrix, stacked
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -188,24 +188,21 @@ class WholeSurface:
         solved = self._solve(approaches)
         self._solved.update(zip(map(float, approaches), solved, strict=True))
 
-        def column(name: str) -> NDArray[Any]:
-            return np.array([getattr(state, name) for state in solved])
-
         def in_all_patches(values: NDArray[Any]) -> NDArray[Any]:
             return np.broadcast_to(values[:, None], pressure.shape)
 
-        pressure = column("patch_pressure")
+        pressure = stacked(solved, "patch_pressure")
         local = np.array([state.plane.means(self.patches) for state in solved])
         loaded, macro_displacement = pressure > 0.0, self.displacements(pressure)
-        area_fraction = column("patch_area") / self.patches.area
+        area_fraction = stacked(solved, "patch_area") / self.patches.area
         return SolvedRows(
             approach=local if self.tilt is not None else in_all_patches(approaches),
             closure=local - macro_displacement,
             pressure=pressure,
             contact_area_fraction=np.where(loaded, area_fraction, 0.0),
-            contacts=np.where(loaded, column("patch_contacts"), 0),
-            unresolved_displacement=column("patch_displacement") - macro_displacement,
-            outside_range=in_all_patches(column("warning") != ""),
+            contacts=np.where(loaded, stacked(solved, "patch_contacts"), 0),
+            unresolved_displacement=stacked(solved, "patch_displacement") - macro_displacement,
+            outside_range=in_all_patches(stacked(solved, "warning") != ""),
         )
 
     def laws(self, rows: SolvedRows) -> list[PatchLaw]:

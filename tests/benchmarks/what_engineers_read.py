@@ -24,8 +24,8 @@ def steps(surface, hardness, also):
     model.press(Control(approach=1e-3))  # makes transforms
     began, start, products, more = time.process_time(), None, 0, 0
     for approach in APPROACHES:
-        pressed = model.press(Control(approach=float(approach)), start=start)
-        start, state = pressed.start, pressed.state
+        state = model.press(Control(approach=float(approach)), start=start)
+        start = state.start
         products += state.iterations
         if also == "stiffness":
             more += model.stiffness(state, turns=False).iterations

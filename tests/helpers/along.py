@@ -1,5 +1,7 @@
 """Micro models pressed along approaches, every result as an array over them."""
 
+import numpy as np
+
 from geometry.contact_state import stacked
 from micro import press_along
 
@@ -12,6 +14,10 @@ class Along:
 
     def __getattr__(self, name):
         return stacked(self.states, name)
+
+    def kappa(self, rms_slope, contact_modulus):
+        """Return κ at every approach."""
+        return np.array([state.kappa(rms_slope, contact_modulus) for state in self.states])
 
 
 def respond(model, approaches, **given):

@@ -47,9 +47,7 @@ def test_what_is_left_beside_a_side_is_smooth():
     pressure = np.zeros(patches.count)
     pressure[index] = 1.0
     nodes = interface.body.space.tabulate_dof_coordinates()
-    down = -interface.body.press(Control(approach=interface.load(pressure))).x.array.reshape(-1, 3)[
-        :, 2
-    ]
+    down = -interface.body.solve(interface.load(pressure)).x.array.reshape(-1, 3)[:, 2]
     at = (np.abs(nodes[:, 2]) < 1e-9) & (np.abs(nodes[:, 1] - square.centres[0, 1]) < 0.01)
     at &= (nodes[:, 0] > 1e-3) & (nodes[:, 0] < 0.06)
     x, y, _ = nodes[at].T

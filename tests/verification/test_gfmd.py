@@ -43,7 +43,10 @@ def found(rough, pressures):
     model = HalfSpaceModel(rough, contact_modulus=1.0, periodic=True, tolerance=1e-6)
     states = [model.press(Control(force=pressure * rough.area)) for pressure in pressures]
     counted, corrected, energy = np.transpose(
-        [(state.counted_area, state.contact_area, state.elastic_energy) for state in states]
+        [
+            (state.in_contact.mean() * rough.area, state.contact_area, state.elastic_energy)
+            for state in states
+        ]
     )
     return counted / rough.area, corrected / rough.area, energy / rough.area * 1e-3  # mm to m
 

@@ -76,7 +76,7 @@ def test_order_of_figure_7(rough):
         assert np.all(ellipse.force >= circle.force)
         assert np.all(ellipse.contact_area <= circle.contact_area)
     # (iii), (iv): area against pressure, and κ, is about the same for all four.
-    kappa = {name: curve.kappa(0.215) for name, curve in response.items()}
+    kappa = {name: curve.kappa(0.215, E_STAR) for name, curve in response.items()}
     for name, values in kappa.items():
         enough = response[name].contact_area_fraction > 0.015
         assert np.all((values[enough] > 1.5) & (values[enough] < 3.5)), name
