@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,71 +15,79 @@ from geometry.contact_state import ContactState
 from geometry.rigid_plane import RigidPlane
 from micro.half_space.contact_spots import find_spots
 
-if TYPE_CHECKING:
-    from micro.half_space.model import HalfSpaceModel
-
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
 class CellSolution(NamedTuple):
-    """Pressures of the cells and the plane that makes them.
+    """A solution of the contact problem of a plane and the cells of a surface.
 
     Attributes:
         plane: The rigid plane.
         pressure: Contact pressures, shape (nx, ny) [MPa].
-        yielding: Which cells bear the hardness, shape (nx, ny).
-        force: Normal force [N].
+        displacement: Displacements of the surface, shape (nx, ny) [mm].
+        gap: Gaps, negative where cells bear the hardness, shape (nx, ny) [mm].
+        yielding: Which cells bear it, shape (nx, ny).
+        earlier_depth: Plastic depth that earlier loads left in the cells, shape (nx, ny) [mm].
         residual: Largest violation of the contact conditions, over the largest interference.
         iterations: Products of the compliance with pressures.
     """
 
     plane: RigidPlane
     pressure: Array
+    displacement: Array
+    gap: Array
     yielding: Flags
-    force: float
+    earlier_depth: Array | None
     residual: float
     iterations: int
 
+    @property
+    def plastic_depth(self) -> Array:
+        """Plastic depth that the load has left in the cells, shape (nx, ny) [mm]."""
+        return np.where(self.yielding, np.maximum(-self.gap, 0.0), 0.0)
+
 
 def contact_state(
-    model: HalfSpaceModel,
     solution: CellSolution,
-    earlier_depth: Array | None,
+    surface: Surface,
     patches: Partition,
-    mean_heights: Array,
+    depths: Array,
+    *,
+    periodic: bool,
+    hardness: float | None,
 ) -> ContactState:
     """Return the contact of a solution, with sums and means over patches.
 
     Args:
-        model: The model.
-        solution: Its solution.
-        earlier_depth: Plastic depth that earlier loads left in the cells, shape (nx, ny) [mm].
+        solution: The solution.
+        surface: The surface.
         patches: The N patches, within the surface's rectangle.
-        mean_heights: Mean heights of the patches, shape (N,) [mm].
+        depths: Mean depths of the patches below the height that the approach counts from, (N,)
+            [mm].
+        periodic: Whether contacts continue over the borders.
+        hardness: Largest pressure [MPa]; None where contacts are elastic.
     """
-    plane, pressure, surface = solution.plane, solution.pressure, model.surface
+    plane, pressure, moved, gap = solution[:4]
     cell = surface.spacing[0] * surface.spacing[1]
-    moved = model.displacement(pressure)
-    depth, gap = None, moved - model.interference(plane, earlier_depth)
-    displacement = patch_means(Surface(heights=moved, lengths=surface.lengths), patches)
-    separation = model.reference_height - plane.means(patches) - mean_heights + displacement
-    plastic_work = 0.0
-    if model.hardness is not None:
-        anew = np.where(solution.yielding, np.maximum(-gap, 0.0), 0.0)
-        depth = anew if earlier_depth is None else earlier_depth + anew
-        gap = gap + anew
-        separation += patch_means(Surface(heights=depth, lengths=surface.lengths), patches)
-        plastic_work = model.hardness * float(depth.sum()) * cell
-    spots, share = find_spots(
-        pressure, surface.spacing, periodic=model.periodic, hardness=model.hardness
-    )
+
+    def means(field: Array) -> Array:
+        return patch_means(Surface(heights=field, lengths=surface.lengths), patches)
+
+    displacement, depth, work = means(moved), None, 0.0
+    separation = depths - plane.means(patches) + displacement
+    if hardness is not None:
+        anew, earlier = solution.plastic_depth, solution.earlier_depth
+        depth, gap = anew if earlier is None else earlier + anew, gap + anew
+        separation += means(depth)
+        work = hardness * float(depth.sum()) * cell
+    spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     borders = patches.borders_x, patches.borders_y
     along_x, along_y = map(overlaps, borders, surface.lengths, surface.grid)
     return ContactState(
         plane=plane,
         patches=patches,
-        force=solution.force,
+        force=float(pressure.sum()) * cell,
         moment=plane.moment(surface.x[:, None], surface.y, pressure * cell),
         contact_area=float(spots.area.sum()),
         contacts=len(spots),
@@ -100,7 +108,7 @@ def contact_state(
         displacement=moved,
         yielding=solution.yielding,
         plastic_depth=depth,
-        earlier_depth=earlier_depth,
+        earlier_depth=solution.earlier_depth,
         elastic_energy=0.5 * float(np.vdot(pressure, moved)) * cell,
-        plastic_work=plastic_work,
+        plastic_work=work,
     )

@@ -169,8 +169,14 @@ class HalfSpaceModel:
         if start is not None and start.values.shape != self.surface.grid:
             problem, allowed = "the solution to start from is of another grid", self.surface.grid
             raise InputError(problem, value=start.values.shape, allowed=f"{allowed}")
-        depth = None if start is None else start.plastic_depth
-        return contact_state(self, self._solution(control, start), depth, patches, means)
+        return contact_state(
+            self._solution(control, start),
+            self.surface,
+            patches,
+            self.reference_height - means,
+            periodic=self.periodic,
+            hardness=self.hardness,
+        )
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
@@ -188,21 +194,6 @@ class HalfSpaceModel:
             below += depth
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
-    def displacement(self, pressure: Array) -> Array:
-        """Return the normal displacement of the surface at the cell centres [mm].
-
-        Args:
-            pressure: Pressures, shape (nx, ny) [MPa].
-
-        Returns:
-            Shape (nx, ny); on a periodic surface from its own mean.
-        """
-        compliance, pressure = self.compliance, np.divide(pressure, self.contact_modulus)
-        moved = compliance.on_grid(pressure.shape, self.surface.spacing).displacement(pressure)
-        if compliance.slopes:
-            moved += compliance.slope_displacement(pressure)
-        return moved
-
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`.
 
@@ -216,16 +207,16 @@ class HalfSpaceModel:
             return Stiffness(value if np.isfinite(value) else None, used)
         tilt, rates, used = None if turns else state.tilt, [], 0
         start = replace(state.guess, plastic_depth=state.earlier_depth)
+        cell = float(np.prod(self.surface.spacing))
         for part in (0.5, 1.0, 2.0):
             back = part * _BACK * largest
             try:
                 solution = self._solution(Control(approach=state.approach - back, tilt=tilt), start)
             except NotConverged as error:
                 return Stiffness(None, used + error.iterations)
-            rates.append((state.force - solution.force) / back)
+            rates.append((state.force - float(solution.pressure.sum()) * cell) / back)
             used += solution.iterations
         # one cell that enters, up to the hardness or as far as it is displaced
-        cell = float(np.prod(self.surface.spacing))
         bears = (self.hardness or 0.0) * cell / (_BACK * largest)
         one = min(bears, self.contact_modulus * float(np.sqrt(cell)))
         change = max(one, float(np.abs(np.diff(rates)).max()))
@@ -275,14 +266,25 @@ class HalfSpaceModel:
         yielding, pressure = problem.yielding(solved.pressure), solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
+        plane, displacement = RigidPlane.moved(surface, motion), self._displacement(pressure)
         return CellSolution(
-            plane=RigidPlane.moved(surface, motion),
+            plane=plane,
             pressure=pressure,
+            displacement=displacement,
+            gap=displacement - self.interference(plane, depth),
             yielding=yielding,
-            force=float(pressure.sum()) * surface.spacing[0] * surface.spacing[1],
+            earlier_depth=depth,
             residual=solved.residual,
             iterations=solved.iterations,
         )
+
+    def _displacement(self, pressure: Array) -> Array:
+        """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
+        compliance, pressure = self.compliance, np.divide(pressure, self.contact_modulus)
+        moved = compliance.on_grid(pressure.shape, self.surface.spacing).displacement(pressure)
+        if self.slopes:
+            moved += compliance.slope_displacement(pressure)
+        return moved
 
     def _elastic_stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
         """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.

@@ -32,10 +32,10 @@ FLOORS = {
         "plausibility",
         "facing preparation rigid_plane",
         "files",
-        "asperities meshes plane_equilibrium",
+        "asperities contact_state meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms conductance contact_detail",
+        "closed_forms conductance",
         "compliance model",
         "asperities contact",
         "half_space",
