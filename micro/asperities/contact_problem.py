@@ -184,7 +184,7 @@ def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
         trial = min(load + step, 1.0)
         try:
             part = replace(problem, interference=trial * problem.interference)
-            found = method(part, indentation)
+            solution = method(part, indentation)
         except NotConverged as failure:
             spent, step = spent + failure.iterations, 0.5 * step
             if step < _SMALLEST_LOAD_STEP:
@@ -197,10 +197,10 @@ def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
                     " micro.model",
                 ) from failure
             continue
-        spent += found.iterations
+        spent += solution.iterations
         if trial == 1.0:
-            return found._replace(iterations=spent)
-        load, step, indentation = trial, 2.0 * step, found.indentation
+            return solution._replace(iterations=spent)
+        load, step, indentation = trial, 2.0 * step, solution.indentation
 
 
 def active_set(

@@ -31,8 +31,8 @@ from micro.asperities.contact_problem import (
 from micro.asperities.hertz_pairs import BodyPoints, HertzPairs
 from micro.asperities.patch_sums import EllipticContacts
 from micro.asperities.truncated_newton import truncated_newton
+from micro.boundary_elements.body_modes import BodyModes
 from micro.closed_forms.hertz import HertzContact
-from micro.compliance.body_modes import BodyModes
 
 Array = NDArray[np.float64]
 
@@ -150,9 +150,9 @@ class AsperityContacts:
             check_pairs(len(above), size)
             pairs = self.pairs.subset(above)
             problem = ContactProblem(interaction=pairs.evaluate, interference=interference[above])
-            found = solve(problem, SOLVERS[self.solver], start[above])
-            own[above], displacement[above] = found.indentation, found.displacement
-            spent += found.iterations
+            solved = solve(problem, SOLVERS[self.solver], start[above])
+            own[above], displacement[above] = solved.indentation, solved.displacement
+            spent += solved.iterations
             if self.pairs.body is None:
                 break
             # Through the half-space contacts only press summits down; a body can raise them.
@@ -161,7 +161,7 @@ class AsperityContacts:
             if not raised.any():
                 break
             above, start = np.sort(np.append(above, np.flatnonzero(raised))), own
-        return found._replace(indentation=own, displacement=displacement, iterations=spent)
+        return solved._replace(indentation=own, displacement=displacement, iterations=spent)
 
     def tangent(self, indentation: Array, modes: Array) -> Array:
         """Return the derivative of the loads on a rigid plane by its motions, shape (k, k).

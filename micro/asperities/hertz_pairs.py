@@ -33,9 +33,9 @@ from scipy.special import elliprf
 from geometry import Partition
 from geometry.legendre_modes import mode_values
 from micro.asperities.contact_problem import InteractionDisplacement
+from micro.boundary_elements.body_modes import BodyModes
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
-from micro.compliance.body_modes import BodyModes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

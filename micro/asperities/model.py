@@ -23,8 +23,8 @@ from micro.asperities.contacts import SOLVERS, AsperityContacts, ModelKind
 from micro.asperities.hertz_pairs import BodyPoints
 from micro.asperities.patch_sums import patch_displacements, patch_loads
 from micro.asperities.plane_on_peaks import Peaks
+from micro.boundary_elements.body_modes import BodyModes
 from micro.closed_forms.hertz import checked_modulus
-from micro.compliance.body_modes import BodyModes
 from micro.model import Stiffness, checked_patches
 from support.errors import InputError
 

@@ -102,10 +102,10 @@ def patch_loads(patches: Partition, contacts: EllipticContacts) -> tuple[Array, 
         patches: The N patches.
         contacts: The m contacts.
     """
-    found = shares(patches, contacts)
-    force = found.force * contacts.force[found.contact]
-    area = found.area * contacts.area[found.contact]
-    sums = [np.bincount(found.patch, part, patches.count) for part in (force, area)]
+    parts = shares(patches, contacts)
+    force = parts.force * contacts.force[parts.contact]
+    area = parts.area * contacts.area[parts.contact]
+    sums = [np.bincount(parts.patch, part, patches.count) for part in (force, area)]
     return np.asarray(sums[0], float), np.asarray(sums[1], float)
 
 

@@ -16,14 +16,14 @@ from geometry import Control, Partition, PatchGrid, Surface
 from geometry.contact_state import ContactState, Start
 from geometry.plausibility import check_slopes
 from geometry.rigid_plane import RigidPlane, motion_units
-from micro.compliance.body_modes import BodyModes
-from micro.compliance.finite_slopes import FiniteSlopes
-from micro.compliance.free_sides import FreeSides
-from micro.compliance.grid_compliance import Compliance
-from micro.contact.problem import ContactPressures, ContactProblem
-from micro.contact.rigid_motions import Motions
-from micro.contact.slope_iteration import solve_contact
-from micro.contact.tangent import approach_stiffness
+from micro.boundary_elements.body_modes import BodyModes
+from micro.boundary_elements.finite_slopes import FiniteSlopes
+from micro.boundary_elements.free_sides import FreeSides
+from micro.boundary_elements.grid_compliance import Compliance
+from micro.complementarity.problem import ContactPressures, ContactProblem
+from micro.complementarity.rigid_motions import Motions
+from micro.complementarity.slope_iteration import solve_contact
+from micro.complementarity.tangent import approach_stiffness
 from micro.half_space.cell_sums import CellSolution, contact_state
 from micro.model import Stiffness, checked_patches
 from support.cores import blas_threads

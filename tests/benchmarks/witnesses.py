@@ -14,7 +14,7 @@ import numpy as np
 
 from geometry import Control
 
-FOLDERS = ("verification", "unit/micro", "unit/micro/compliance", "unit/multiscale", "")
+FOLDERS = ("verification", "unit/micro", "unit/micro/boundary_elements", "unit/multiscale", "")
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in FOLDERS]
 
 

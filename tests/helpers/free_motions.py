@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from micro.compliance.grid_compliance import Compliance
-from micro.contact.problem import ContactProblem
-from micro.contact.rigid_motions import Motions
-from micro.contact.slope_iteration import solve_contact
+from micro.boundary_elements.grid_compliance import Compliance
+from micro.complementarity.problem import ContactProblem
+from micro.complementarity.rigid_motions import Motions
+from micro.complementarity.slope_iteration import solve_contact
 
 
 def turning(x, y, total):

@@ -36,8 +36,8 @@ FLOORS = {
     ],
     "micro": [
         "closed_forms conductance",
-        "compliance model",
-        "asperities contact",
+        "boundary_elements model",
+        "asperities complementarity",
         "half_space",
         "by_name",
     ],

@@ -16,7 +16,7 @@ from scipy.interpolate import RectBivariateSpline
 from geometry import Control, RefinedShape
 from macro import Block, Material, block_mesh
 from micro import FreeSides
-from micro.compliance.side_cells import SideStresses
+from micro.boundary_elements.side_cells import SideStresses
 
 PLACE, WIDTH, FINE, CELLS = 0.05, 0.06, 0.012, 256
 TICKS = (np.arange(CELLS) + 0.5) / CELLS

@@ -14,8 +14,8 @@ from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material
 from macro.compliance.face_compliance import face_compliance
 from micro import FreeSides, HalfSpaceModel, micro_model
-from micro.compliance.body_modes import BodyModes
-from micro.compliance.rectangle_modes import half_space_modes, side_modes
+from micro.boundary_elements.body_modes import BodyModes
+from micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = 4000.0 / (1.0 - 0.15**2)

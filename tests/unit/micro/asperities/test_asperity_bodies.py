@@ -17,7 +17,7 @@ from geometry import (
     synthesise,
 )
 from micro import MODELS, AsperityModel, HertzContact
-from micro.compliance.body_modes import BodyModes
+from micro.boundary_elements.body_modes import BodyModes
 
 MODULUS = 4000.0
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

@@ -6,8 +6,8 @@ from helpers.asperity_states import places
 from scipy.special import elliprf
 
 from micro.asperities.hertz_pairs import MERGING_SLOPE, BodyPoints, HertzPairs, merging_parameter
+from micro.boundary_elements.body_modes import BodyModes
 from micro.closed_forms.hertz import HertzContact, shape_factors
-from micro.compliance.body_modes import BodyModes
 
 
 def interaction(asperities, circular):

@@ -8,7 +8,7 @@ from helpers.free_motions import approach, contact_problem
 
 from geometry import Control, InputError, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
-from micro.contact.active_set import ActiveSet
+from micro.complementarity.active_set import ActiveSet
 
 E_STAR = 4000.0
 SURFACE = synthesise(
