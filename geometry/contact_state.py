@@ -15,11 +15,8 @@ from numpy.typing import NDArray
 
 from geometry.patches import Partition
 from geometry.rigid_plane import RigidPlane
+from support.arrays import Array, Counts, Flags
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Counts = NDArray[np.int64]
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation".split()

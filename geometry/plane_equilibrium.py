@@ -14,13 +14,12 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.rigid_plane import Control, motion_units, plane_failure
 from geometry.slope_search import slope_search
+from support.arrays import Array
 from support.errors import NotConverged
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 TOLERANCE = 1e-10

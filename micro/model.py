@@ -6,13 +6,12 @@ from dataclasses import replace
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
 from geometry.contact_state import ContactState, Start
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 class MicroModel(Protocol):

@@ -33,10 +33,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.checks import process_memory
 from support.errors import InputError, NotConverged
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10
 """Largest complementarity error, relative to the largest interference."""

@@ -27,18 +27,16 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import elliprf
 
 from geometry import Partition
 from geometry.legendre_modes import mode_values
 from micro.asperities.contact_problem import InteractionDisplacement
+from micro.asperities.patch_sums import EllipticContacts
 from micro.boundary_elements.body_modes import BodyModes
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 """Largest relative stiffness c* of one contact at another's summit."""
@@ -149,6 +147,22 @@ class HertzPairs:
     def v_merged(self) -> Array:
         """Confocal parameters v* at which the slope is c*, shape (n,)."""
         return merging_parameter(self.shape.axis_ratio_squared, self.shape.integral)
+
+    @property
+    def interact(self) -> bool:
+        """Whether contacts displace each other's summits, through the half-space or a body."""
+        return self.half_space or self.body is not None
+
+    def ellipses(self, indentation: Array) -> EllipticContacts:
+        """Return the n contacts with given indentations t ≥ 0, shape (n,) [mm]."""
+        major = np.sqrt(self.size * indentation)
+        return EllipticContacts(
+            x=self.x,
+            y=self.y,
+            angle=self.angle,
+            semi_axes=np.stack([major, major * self.shape.axis_ratio], axis=1),
+            force=self.force(indentation),
+        )
 
     def subset(self, index: Indices) -> Self:
         """Return the interaction among some of the asperities."""

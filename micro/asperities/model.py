@@ -9,29 +9,41 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.contact_state import ContactState, Spots, Start
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
 from micro.asperities.contact_problem import Solution
-from micro.asperities.contacts import SOLVERS, AsperityContacts, ModelKind
-from micro.asperities.hertz_pairs import BodyPoints
+from micro.asperities.contacts import SOLVERS, plane_stiffness, solve_summits
+from micro.asperities.hertz_pairs import BodyPoints, HertzPairs
 from micro.asperities.patch_sums import patch_displacements, patch_loads
 from micro.asperities.plane_on_peaks import Peaks
 from micro.boundary_elements.body_modes import BodyModes
-from micro.closed_forms.hertz import checked_modulus
+from micro.closed_forms.hertz import checked_modulus, shape_factors
 from micro.model import Stiffness, checked_patches
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 LARGEST_AREA_FRACTION = 0.1
 """Contact area fraction up to which summits count as separate; errors may be large before."""
+
+
+class ModelKind(NamedTuple):
+    """What distinguishes the four models.
+
+    Attributes:
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
+        interacting: Whether contacts displace each other's summits through the half-space.
+    """
+
+    elliptic: bool
+    interacting: bool
+
 
 MODELS: Mapping[str, ModelKind] = MappingProxyType(
     {
@@ -53,8 +65,9 @@ class AsperityModel:
         asperities: The n summits, with the highest point z_M that the approach counts from.
         contact_modulus: E* [MPa].
         solver: Solver of the models with interaction, a name in `SOLVERS`.
-        body: What a finite body with its sides adds to the half-space, between all contacts; a
-            half-space when not given.
+        body: What a finite body with its sides adds to the half-space, between all contacts, also
+            those of the models without interaction; a half-space when not given. On thin blocks it
+            takes away from the interaction: models without any may then have no solution.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -90,14 +103,20 @@ class AsperityModel:
         return float(self.reference_height - self.asperities.z.max(initial=-np.inf))
 
     @cached_property
-    def contacts(self) -> AsperityContacts:
-        """The contacts of the asperities."""
-        return AsperityContacts(
-            asperities=self.asperities,
+    def pairs(self) -> HertzPairs:
+        """The contacts of the asperities, and how they displace each other's summits."""
+        a, (elliptic, interacting) = self.asperities, MODELS[self.kind]
+        radii = (a.radius_major, a.radius_minor) if elliptic else (a.radius, a.radius)
+        return HertzPairs(
+            x=a.x,
+            y=a.y,
+            angle=a.angle,
+            radius=a.radius,
+            shape=shape_factors(*radii),
+            circular=not elliptic,
+            half_space=interacting,
+            body=None if self.body is None else BodyPoints.at(self.body, a.x, a.y),
             contact_modulus=self.contact_modulus,
-            kind=MODELS[self.kind],
-            solver=self.solver,
-            body=self.body,
         )
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
@@ -125,7 +144,7 @@ class AsperityModel:
         patches, means = checked_patches(self.asperities, patches, mean_heights)
         plane, solution = self._equilibrium(control, start)
         touching = np.flatnonzero(solution.indentation > 0.0)
-        contacts = self.contacts.ellipses(solution.indentation).subset(touching)
+        contacts = self.pairs.subset(touching).ellipses(solution.indentation[touching])
         force, area = float(contacts.force.sum()), float(contacts.area.sum())
         displacement = patch_displacements(patches, contacts, self.contact_modulus)
         if self.body is not None:
@@ -163,7 +182,7 @@ class AsperityModel:
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
-        tangent = self.contacts.tangent(state.guess.values, self._peaks.modes.matrix)
+        tangent = plane_stiffness(self.pairs, state.guess.values, self._peaks.modes.matrix)
         return Stiffness(normal_stiffness(tangent, turns=turns), 1)
 
     @property
@@ -171,11 +190,11 @@ class AsperityModel:
         """The summits under the plane; not cached, because models are sent between processes."""
         a = self.asperities
         modes = PlaneLevers.at(a.x, a.y, a.lengths)
-        return Peaks(modes=modes, depth=a.highest - a.z, force=self.contacts.hertz.force)
+        return Peaks(modes=modes, depth=a.highest - a.z, force=self.pairs.force(np.ones(len(a))))
 
     def _equilibrium(self, control: Control, start: Start | None) -> tuple[RigidPlane, Solution]:
         """Solve the contacts, and the motions of the plane that are free."""
-        asperities, contacts = self.asperities, self.contacts
+        asperities, pairs = self.asperities, self.pairs
         own = np.zeros(len(asperities)) if start is None else start.values
         if own.shape != (len(asperities),):
             raise InputError(
@@ -185,18 +204,18 @@ class AsperityModel:
             )
         if control.approach is not None and control.tilt is not None:
             plane = RigidPlane.above(asperities, control.approach, control.tilt)
-            return plane, contacts.solution(asperities.interference(plane), own)
+            return plane, solve_summits(pairs, asperities.interference(plane), own, self.solver)
         useful = start is not None and (own.any() or control.force == 0.0)
         peaks, spent = self._peaks, 0
 
         def respond(motion: Array) -> PlaneResponse[Solution]:
             nonlocal own, spent
             interference = asperities.interference(RigidPlane.moved(asperities, motion))
-            solution = contacts.solution(interference, own)
+            solution = solve_summits(pairs, interference, own, self.solver)
             own, spent = solution.indentation, spent + solution.iterations
             return PlaneResponse(
-                loads=peaks.modes.loads(contacts.hertz.force * own**1.5),
-                stiffness=lambda: contacts.tangent(solution.indentation, peaks.modes.matrix),
+                loads=peaks.modes.loads(pairs.force(own)),
+                stiffness=lambda: plane_stiffness(pairs, solution.indentation, peaks.modes.matrix),
                 state=solution._replace(iterations=spent),
             )
 

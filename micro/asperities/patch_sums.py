@@ -27,14 +27,11 @@ from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from geometry import Partition
 from micro.closed_forms.love import corner_integral
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 _RADII, _RADIUS_WEIGHTS = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
 _ANGLES = 16

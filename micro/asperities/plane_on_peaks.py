@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, linprog
 
 from geometry import Control
 from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 _TOLERANCE = 1e-9

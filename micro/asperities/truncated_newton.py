@@ -22,10 +22,8 @@ from micro.asperities.contact_problem import (
     Solution,
     damped_step,
 )
+from support.arrays import Array, Flags
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 _MOST_ITERATIONS = 60
 _MOST_SETS = 200
@@ -79,7 +77,7 @@ def truncated_newton(
 
 
 def _minimise(
-    problem: ContactProblem, contacting: Mask, start: Array, most_iterations: int
+    problem: ContactProblem, contacting: Flags, start: Array, most_iterations: int
 ) -> tuple[Array, InteractionDisplacement, int]:
     """Bring w − d to 0 over the set of contacts; a negative t displaces no other summit."""
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale

@@ -12,15 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Partition
 from geometry.legendre_modes import mode_means, mode_values
+from support.arrays import Array, Indices
 from support.checks import positive_lengths
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -37,15 +37,13 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
 from geometry import Material, Surface
 from geometry.plausibility import check_finite_slopes
 from micro.boundary_elements.waves import Around, Spectrum, surface_waves
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _RATIOS, _FEWEST, _GRADIENT = (4, 2, 1), 64, 0.9
 """Cells per coarse cell along an axis: the first ratio that leaves 64 coarse cells a side and 0.9

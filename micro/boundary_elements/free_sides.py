@@ -1,9 +1,9 @@
 """What the free sides of a block add to the half-space near them.
 
-Each side adds what it would add to a quarter-space (`micro.boundary_elements.quarter_space`), cut off at a
-decay length λ: waves along it longer than 2π λ count as waves of that length. What is left out is
-smooth up to the very side. So is what the block does beyond its four quarter-spaces, except in its
-corners. Both are left to the body's term (`micro.boundary_elements.body_modes`).
+Each side adds what it would add to a quarter-space (`micro.boundary_elements.quarter_space`), cut
+off at a decay length λ: waves along it longer than 2π λ count as waves of that length. What is left
+out is smooth up to the very side. So is what the block does beyond its four quarter-spaces, except
+in its corners. Both are left to the body's term (`micro.boundary_elements.body_modes`).
 
 Theory: docs/theory.md, section 5.
 """
@@ -13,15 +13,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from geometry import Partition
 from micro.boundary_elements.quarter_space import side_compliance, side_stresses
+from support.arrays import Array, Indices
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _STEP = 0.4
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by

@@ -16,16 +16,14 @@ from functools import cached_property, lru_cache, partial
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.side_cells import side_cells
+from support.arrays import Array, Indices
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Grid = tuple[int, ...]
 """Numbers of cells (nx, ny)."""
 Pair = tuple[float, float]

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from micro.closed_forms.love import corner_integral
+from support.arrays import Array, Indices
 from support.cores import BLOCK, blocks, cores, in_threads
 
-Array = NDArray[np.float64]
 Field = NDArray[Any]
-Indices = NDArray[np.intp]
 
 _LINES = 128
 """Bytes of a row that a block of columns holds at least: two lines of the cache."""

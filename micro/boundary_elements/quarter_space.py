@@ -40,11 +40,10 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
 from scipy.special import kn
 
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _STEP = 0.08
 """Step of the tables, in the logarithm of distances times wave number."""

@@ -37,9 +37,9 @@ from numpy.typing import NDArray
 from geometry.legendre_modes import mode_values
 from geometry.materials import Material
 from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
+from support.arrays import Array
 from support.checks import positive_lengths
 
-Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
 

@@ -25,9 +25,9 @@ from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_slopes, mode_values
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, gauss_points, values_at
+from support.arrays import Array
 from support.small_caches import cached_where_small
 
-Array = NDArray[np.float64]
 Part = Callable[[Array, float, int], Array]
 """Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""
 

@@ -20,10 +20,9 @@ from scipy import fft
 from scipy.sparse import csr_array, hstack
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
+from support.arrays import Array, Indices
 from support.cores import in_threads
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from support.arrays import Array
 from support.cores import BLOCK, blocks, in_threads
 from support.small_caches import cached_where_small
 
-Array = NDArray[np.float64]
 Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 

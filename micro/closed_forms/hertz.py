@@ -10,13 +10,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import elliprd, elliprf
 
 from micro.closed_forms.hertz_field import elliptic_field
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _NEWTON_STEPS = 30
 

@@ -14,18 +14,14 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.problem import ContactPressures, ContactProblem
 from micro.complementarity.start import admissible_start
+from support.arrays import Array, Flags, Indices
 from support.cores import blocks, in_threads
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 
 _BLOCK = 2**17
 """Cells that a thread evaluates at a time."""

@@ -10,12 +10,10 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.boundary_elements.grid_compliance import GridCompliance
 from micro.boundary_elements.half_space_grid import Cells
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 class ContactCells:

@@ -26,14 +26,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from micro.complementarity.rigid_motions import Box, Motions, coarsened
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Flags, Indices
 
 
 class ContactPressures(NamedTuple):

@@ -18,11 +18,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-Flags = NDArray[np.bool_]
+from support.arrays import Array, Flags, Indices
+
 Box = tuple[slice, slice]
 """Rows and columns of a rectangle of cells."""
 

@@ -13,13 +13,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.complementarity.problem import ContactPressures, ContactProblem
 from micro.complementarity.solver import solve_on_surface
+from support.arrays import Array
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
 
 _MOST_SOLUTIONS = 30
 _FIRST = 1e-2

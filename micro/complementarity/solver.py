@@ -17,15 +17,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.complementarity.active_set import solve
 from micro.complementarity.problem import ContactPressures, ContactProblem
 from micro.complementarity.rigid_motions import Box
+from support.arrays import Array, Flags
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _FEW_CELLS = 32
 """Cells per side on which a solution from nothing costs nothing."""

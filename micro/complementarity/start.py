@@ -9,14 +9,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 
 from micro.complementarity.problem import ContactProblem
 from micro.complementarity.rigid_motions import Motions
+from support.arrays import Array
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
 
 _EVEN_SHARES = 0.0, *np.logspace(-3.0, 6.0, 10)
 """Shares of uniform pressure that are added, one after the other, until a start meets the loads."""

@@ -15,14 +15,12 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.problem import ContactProblem
 from micro.complementarity.solver import box_around
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _RESIDUAL = 3e-4
 """Largest error of the displacements relative to the approach. That of the sum is its square."""

@@ -8,15 +8,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Partition, Surface, overlaps, patch_means
 from geometry.contact_state import ContactState
 from geometry.rigid_plane import RigidPlane
 from micro.half_space.contact_spots import find_spots
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from support.arrays import Array, Flags
 
 
 class CellSolution(NamedTuple):

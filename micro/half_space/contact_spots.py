@@ -9,8 +9,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from geometry.contact_state import Spots, peaks_of
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.integer]
 
 EDGE_EXCESS = (np.pi - 1.0 + np.log(2.0)) / 24.0

@@ -10,7 +10,7 @@ from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Control, Partition, PatchGrid, Surface
 from geometry.contact_state import ContactState, Start
@@ -26,11 +26,9 @@ from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.tangent import approach_stiffness
 from micro.half_space.cell_sums import CellSolution, contact_state
 from micro.model import Stiffness, checked_patches
+from support.arrays import Array, Flags
 from support.cores import blas_threads
 from support.errors import InputError, NotConverged
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 _LEVEL = (0.0, 0.0)
 _BACK, _SAFETY = 0.05, 1.5

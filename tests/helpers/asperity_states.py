@@ -11,7 +11,7 @@ class AsperityState:
 
     def __init__(self, model, state):
         self._state = state
-        self.ellipses = model.contacts.ellipses(state.indentation)
+        self.ellipses = model.pairs.ellipses(state.indentation)
 
     def __getattr__(self, name):
         return getattr(self._state, name)
@@ -36,19 +36,20 @@ def interference(asperities, state):
 def displacement(model, state):
     """Return the displacements of all summits by all contacts, also of summits below the plane."""
     own = state.indentation
-    interacting = model.contacts.kind.interacting or model.body is not None
-    return own + model.contacts.pairs.evaluate(own).displacement if interacting else own
+    interacting = model.pairs.interact
+    return own + model.pairs.evaluate(own).displacement if interacting else own
 
 
 def surface_displacement(model, state, x, y):
     """Add up the fields of all contacts at points, each Hertz's, also where contacts merge."""
     total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
-    a, hertz, own = model.asperities, model.contacts.hertz, state.indentation
+    a, own = model.asperities, state.indentation
+    round_ = model.pairs.circular
     for k in np.flatnonzero(own):  # one field at a time bounds the memory
         contact = HertzContact(
-            contact_modulus=hertz.contact_modulus,
-            radius_major=hertz.radius_major[k],
-            radius_minor=hertz.radius_minor[k],
+            contact_modulus=model.contact_modulus,
+            radius_major=(a.radius if round_ else a.radius_major)[k],
+            radius_minor=(a.radius if round_ else a.radius_minor)[k],
             indentation=own[k],
         )
         turned = ((x - a.x[k]) + 1j * (y - a.y[k])) * np.exp(-1j * a.angle[k])

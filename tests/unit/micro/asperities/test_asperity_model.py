@@ -25,8 +25,8 @@ def curve(model, approaches, patches=PATCHES, **options):
 def test_name_and_kind(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     assert model.name == name
-    assert model.contacts.kind.elliptic == name.startswith("elliptic")
-    assert model.contacts.kind.interacting == (not name.endswith("independent"))
+    assert (not model.pairs.circular) == name.startswith("elliptic")
+    assert model.pairs.half_space == (not name.endswith("independent"))
 
 
 @every_model
