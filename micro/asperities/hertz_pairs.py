@@ -29,11 +29,9 @@ from typing import Self
 import numpy as np
 from scipy.special import elliprf
 
-from geometry import Partition
-from geometry.legendre_modes import mode_values
 from micro.asperities.contact_problem import InteractionDisplacement
 from micro.asperities.patch_sums import EllipticContacts
-from micro.boundary_elements.body_modes import BodyModes
+from micro.boundary_elements.body_modes import BodyPoints
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
 from support.arrays import Array, Indices
@@ -49,65 +47,6 @@ _NEWTON_STEPS = 30
 _PAIRS_AT_ONCE = 2**16
 """Pairs whose fields are evaluated at once. 2,000 elliptic contacts took 141 ms of one core in such
 blocks and 283 ms in one piece, whose arrays leave the cache."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BodyPoints:
-    """Compliance of a body between n points of its contact face.
-
-    Args:
-        body: The compliance in modes.
-        values: Modes at the points, shape (K², n).
-    """
-
-    body: BodyModes
-    values: Array
-
-    @classmethod
-    def at(cls, body: BodyModes, x: Array, y: Array) -> Self:
-        """Evaluate the modes at points.
-
-        Args:
-            body: The compliance in modes.
-            x: Abscissae, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-        """
-        along_x, along_y = (
-            mode_values(place - corner, length, body.count)
-            for place, corner, length in zip((x, y), body.origin, body.lengths, strict=True)
-        )
-        return cls(body=body, values=(along_x[:, None] * along_y).reshape(len(body.matrix), -1))
-
-    def among(self, index: Indices) -> Self:
-        """Return the compliance between some of the points."""
-        return replace(self, values=self.values[:, index])
-
-    def displacement(self, force: Array) -> Array:
-        """Return the displacements of the points by forces on them, shape (n,) [mm].
-
-        Args:
-            force: Forces, shape (n,) [N].
-        """
-        return np.asarray(self.values.T @ (self.body.matrix @ (self.values @ force)))
-
-    def by(self, loaded: BodyPoints) -> Array:
-        """Return the displacements of the points by unit forces on m others, (n, m) [mm/N].
-
-        Args:
-            loaded: The points that the forces act on, on the same body.
-        """
-        return np.asarray(self.values.T @ (self.body.matrix @ loaded.values))
-
-    def patch_means(self, patches: Partition, force: Array) -> Array:
-        """Return the mean displacements of patches, shape (N,) [mm].
-
-        Args:
-            patches: N patches within the face.
-            force: Forces on the points, shape (n,) [N].
-        """
-        cells = self.body.on(patches.borders_x, patches.borders_y)
-        amplitudes = (self.body.matrix @ (self.values @ force)).reshape(self.body.count, -1)
-        return np.asarray((cells.means_x.T @ amplitudes @ cells.means_y).ravel())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

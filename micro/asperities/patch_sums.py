@@ -23,7 +23,7 @@ Theory: docs/theory.md, section 8.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -68,12 +68,6 @@ class EllipticContacts:
     def position(self) -> Array:
         """Centres (x, y), shape (m, 2) [mm]."""
         return np.stack([self.x, self.y], axis=1)
-
-    def subset(self, index: Indices) -> EllipticContacts:
-        """Return some of the contacts."""
-        return EllipticContacts(
-            **{item.name: getattr(self, item.name)[index] for item in fields(self)}
-        )
 
 
 class Shares(NamedTuple):

@@ -9,7 +9,8 @@ Theory: docs/theory.md, section 6.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -76,20 +77,6 @@ class BodyModes:
         )
         return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
 
-    def between(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Return displacements of points by unit forces at points, shape (n, n) [mm/N].
-
-        Args:
-            x: Abscissae, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-        """
-        x, y = self._placed(x, y)
-        along_x = mode_values(x, self.lengths[0], self.count)
-        along_y = mode_values(y, self.lengths[1], self.count)
-        modes = (along_x[:, None] * along_y).reshape(len(self.matrix), -1)
-        compliance = modes.T @ self.matrix @ modes
-        return np.asarray(0.5 * (compliance + compliance.T))
-
     def patch_compliance(self, patches: Partition) -> Array:
         """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
 
@@ -119,6 +106,65 @@ class BodyModes:
     def _placed(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """Return places counted from the corner of the top."""
         return np.asarray(x, float) - self.origin[0], np.asarray(y, float) - self.origin[1]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyPoints:
+    """Compliance of a body between n points of its contact face.
+
+    Args:
+        body: The compliance in modes.
+        values: Modes at the points, shape (K², n).
+    """
+
+    body: BodyModes
+    values: Array
+
+    @classmethod
+    def at(cls, body: BodyModes, x: Array, y: Array) -> Self:
+        """Evaluate the modes at points.
+
+        Args:
+            body: The compliance in modes.
+            x: Abscissae, shape (n,) [mm].
+            y: Ordinates, shape (n,) [mm].
+        """
+        along_x, along_y = (
+            mode_values(place - corner, length, body.count)
+            for place, corner, length in zip((x, y), body.origin, body.lengths, strict=True)
+        )
+        return cls(body=body, values=(along_x[:, None] * along_y).reshape(len(body.matrix), -1))
+
+    def among(self, index: Indices) -> Self:
+        """Return the compliance between some of the points."""
+        return replace(self, values=self.values[:, index])
+
+    def displacement(self, force: Array) -> Array:
+        """Return the displacements of the points by forces on them, shape (n,) [mm].
+
+        Args:
+            force: Forces, shape (n,) [N].
+        """
+        return np.asarray(self.values.T @ (self.body.matrix @ (self.values @ force)))
+
+    def by(self, loaded: BodyPoints) -> Array:
+        """Return the displacements of the points by unit forces on m others, (n, m) [mm/N].
+
+        Args:
+            loaded: The points that the forces act on, on the same body.
+        """
+        return np.asarray(self.values.T @ (self.body.matrix @ loaded.values))
+
+    def patch_means(self, patches: Partition, force: Array) -> Array:
+        """Return the mean displacements of patches, shape (N,) [mm].
+
+        Args:
+            patches: N patches within the face.
+            force: Forces on the points, shape (n,) [N].
+        """
+        cells = self.body.on(patches.borders_x, patches.borders_y)
+        amplitudes = (self.body.matrix @ (self.values @ force)).reshape(self.body.count, -1)
+        return np.asarray((cells.means_x.T @ amplitudes @ cells.means_y).ravel())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

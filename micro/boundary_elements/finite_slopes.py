@@ -90,7 +90,6 @@ class FiniteSlopes:
     Args:
         surface: The surface.
         material: Elastic constants of the body.
-        order: Highest power of the heights, 1 or 2.
         periodic: Whether surface and pressures continue periodically; displacements then count
             from their mean, as those of the periodic half-space do.
         plane: Height of the surface of the flat body whose edge stresses are given [mm]; that
@@ -104,8 +103,8 @@ class FiniteSlopes:
         spacing: Sides of these cells [mm].
 
     Raises:
-        InputError: When the order is unknown, the surface too steep for it, or a surface is not
-            periodic that should be.
+        InputError: When the surface is too steep for the theory, or not periodic where it should
+            be.
     """
 
     def __init__(
@@ -113,18 +112,15 @@ class FiniteSlopes:
         surface: Surface,
         material: Material,
         *,
-        order: int = 2,
         periodic: bool = False,
         plane: float | None = None,
         edge_stresses: Sequence[SurfaceStress] = (),
         grid: tuple[int, int] | None = None,
     ) -> None:
-        if order not in (1, 2):
-            raise InputError("this order of slopes is unknown", value=order, allowed="1 or 2")
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         check_finite_slopes(surface)
-        self.material, self.order, self.edge_stresses = material, order, tuple(edge_stresses)
+        self.material, self.edge_stresses = material, tuple(edge_stresses)
         self._surface, self._periodic = surface, periodic
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
@@ -150,21 +146,18 @@ class FiniteSlopes:
         loaded = waves.alone(waves.coarsened(pressure))
         stresses = self._stresses(loaded)
         strains = self._strains(stresses)
-        weights = -heights * strains
         pushed = heights * loaded / modulus
-        bent = []
-        if self.order == 2:
-            value, more = self._second(loaded, stresses)
-            energy = loaded**2 / modulus - _product(stresses, strains)
-            share = _share(float(np.sum(below * energy)), value)
-            weights += share * more
-            bent = [share * below**2 * stresses]
+        value, more = self._second(loaded, stresses)
+        energy = loaded**2 / modulus - _product(stresses, strains)
+        share = _share(float(np.sum(below * energy)), value)
+        weights = share * more - heights * strains
         for term in self.edge_stresses:
             pushed += term.adjoint(weights * np.array([1.0, 1.0, 2.0])[:, None, None])  # xy and yx
         # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
         pushed -= 2.0 * nu * (weights[0] + weights[1])
-        fields = [pushed[None], (2.0 * nu - 1.0) * weights, *bent]
-        moved = waves.changed(np.concatenate(fields), self._displaced, 1, inside=True)[0]
+        bent = share * below**2 * stresses
+        fields = np.concatenate([pushed[None], (2.0 * nu - 1.0) * weights, bent])
+        moved = waves.changed(fields, self._displaced, 1, inside=True)[0]
         if self._periodic:
             moved -= moved.mean()
         return waves.refined(moved)
@@ -172,9 +165,9 @@ class FiniteSlopes:
     def error(self, pressure: Array) -> float:
         """Return what ∫ p u dA may be off by, as orders beyond those taken are left out [N mm].
 
-        It is the last order that was taken, times its ratio to the order before where that is below
-        1; or, where parts of these orders cancel each other, the size that the next order has
-        without cancelling. Gradients count by their nearness to the loads, as 1/r².
+        It is the second order, times its ratio to the first where that is below 1; or, where parts
+        of these orders cancel each other, the size that the next order has without cancelling.
+        Gradients count by their nearness to the loads, as 1/r².
 
         Args:
             pressure: Pressures on all cells, shape (nx, ny) [MPa].
@@ -192,18 +185,12 @@ class FiniteSlopes:
         steepness = float(np.sum(near * squares)) / (float(np.sum(near)) or 1.0)
         third = (_THIRD + _THIRD_BY_POISSON * nu**2) * steepness
         third *= float(np.sum(np.abs(below) * (of_load + of_stresses)))
-        last = second * min(1.0, second / first) if self.order == 2 and first else second
+        last = second * min(1.0, second / first) if first else second
         return max(last, third) * self.spacing[0] * self.spacing[1]
 
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
-        return FiniteSlopes(
-            self._surface,
-            self.material,
-            order=self.order,
-            periodic=self._periodic,
-            grid=self.grid,
-        )
+        return FiniteSlopes(self._surface, self.material, periodic=self._periodic, grid=self.grid)
 
     def _second(self, loaded: Array, stresses: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses in it.
@@ -259,17 +246,15 @@ class FiniteSlopes:
         return parts
 
     def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
-        """Return the waves of the displacement in one of a scalar and those of one or two tensors.
+        """Return the waves of the displacement by one of a scalar and those of two tensors.
 
         Each tensor t contributes k · t k/k², the second one times (1 − ν) |k|/(2 G).
         """
         directions = self._waves.directions[:, :, here]
         moved = waves[0] + _lengthwise(waves[1:4], directions)
-        if self.order == 2:
-            stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
-            bending = 0.5 / stiffness * self._waves.wave_number[:, here]
-            moved += bending * _lengthwise(waves[4:], directions)
-        return np.asarray(moved[None])
+        stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
+        bending = 0.5 / stiffness * self._waves.wave_number[:, here]
+        return np.asarray((moved + bending * _lengthwise(waves[4:], directions))[None])
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""

@@ -274,7 +274,6 @@ def on_body(
         slopes = FiniteSlopes(
             surface,
             material,
-            order=order,
             periodic=model.periodic,
             plane=plane,
             edge_stresses=stresses,
@@ -282,7 +281,7 @@ def on_body(
         second = setup.materials.second
         if above is None or second is None:
             return replace(model, slopes=(slopes,))
-        others = FiniteSlopes(above, second, order=order, periodic=model.periodic)
+        others = FiniteSlopes(above, second, periodic=model.periodic)
         return replace(model, slopes=(slopes, others))
 
     return put

@@ -17,7 +17,7 @@ from geometry import (
     synthesise,
 )
 from micro import MODELS, AsperityModel, HertzContact
-from micro.boundary_elements.body_modes import BodyModes
+from micro.boundary_elements.body_modes import BodyModes, BodyPoints
 
 MODULUS = 4000.0
 PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -58,7 +58,8 @@ def apart():
 def dense(model, required):
     """Solve for the indentations one after another until none changes (Gauss and Seidel)."""
     a, kind = model.asperities, MODELS[model.name]
-    between = model.body.between(a.x, a.y)
+    points = BodyPoints.at(model.body, a.x, a.y)
+    between = points.by(points)
     major = a.radius_major if kind.elliptic else a.radius
     minor = a.radius_minor if kind.elliptic else a.radius
 
