@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
 from geometry.contact_state import ContactState, Start
 from support.arrays import Array
+from support.checks import real_array
 from support.errors import InputError
 
 
@@ -123,11 +124,13 @@ def press_along(
         A state for each approach, in their order.
 
     Raises:
-        InputError: When the approaches are not a finite, non-empty list, or as for
+        InputError: When the approaches are no list of finite numbers, or as for
             `MicroModel.press`.
         NotConverged: When the contact conditions cannot be met.
     """
-    wanted = checked_approaches(approaches)
+    wanted = np.atleast_1d(real_array(approaches))
+    if wanted.ndim != 1:
+        raise InputError("the approaches are no list", value=wanted.shape, allowed="numbers in mm")
     states: dict[int, ContactState] = {}
     before = last = None
     for index in map(int, np.argsort(wanted, kind="stable")):
@@ -150,24 +153,6 @@ def _extrapolated(
     ahead = (approach - last.approach) / (last.approach - before.approach)
     own = last.guess.values
     return replace(last.guess, values=np.maximum(own + ahead * (own - before.guess.values), 0.0))
-
-
-def checked_approaches(approaches: ArrayLike) -> Array:
-    """Return approaches as an array of shape (m,) [mm].
-
-    Raises:
-        InputError: When they are no finite, non-empty list of numbers.
-    """
-    allowed = "a number or a list of finite numbers in mm"
-    wanted = np.atleast_1d(_numbers(approaches, "the approaches are no numbers", allowed))
-    if wanted.size == 0:
-        raise InputError("a response needs at least one approach", value=[])
-    if wanted.ndim != 1:
-        raise InputError("the approaches are no list", value=wanted.shape, allowed=allowed)
-    if not np.isfinite(wanted).all():
-        first = float(wanted[~np.isfinite(wanted)][0])
-        raise InputError("the approach must be finite", value=first, allowed="mm")
-    return wanted
 
 
 def checked_patches(
@@ -196,17 +181,8 @@ def checked_patches(
             allowed="mean_heights, or no patches",
         )
     mean_heights = [rough.mean_height] if mean_heights is None else mean_heights
-    allowed = f"shape ({patches.count},)"
-    means = _numbers(mean_heights, "the mean heights are no numbers", allowed)
-    if means.shape != (patches.count,):
-        raise InputError("every patch needs one mean height", value=means.shape, allowed=allowed)
-    if not np.isfinite(means).all():
-        raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
+    means = real_array(mean_heights)
+    if means.shape != (patches.count,) or not np.isfinite(means).all():
+        problem, allowed = "every patch needs one finite mean height", f"{patches.count}, in mm"
+        raise InputError(problem, value=means.tolist(), allowed=allowed)
     return patches, means
-
-
-def _numbers(values: ArrayLike, problem: str, allowed: str) -> Array:
-    try:
-        return np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(problem, value=values, allowed=allowed) from None

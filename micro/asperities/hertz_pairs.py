@@ -42,8 +42,6 @@ MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
 """a/r of a circular contact whose slope at distance r is c*."""
 
-_NEWTON_STEPS = 30
-
 _PAIRS_AT_ONCE = 2**16
 """Pairs whose fields are evaluated at once. 2,000 elliptic contacts took 141 ms of one core in such
 blocks and 283 ms in one piece, whose arrays leave the cache."""
@@ -179,7 +177,7 @@ def merging_parameter(beta: Array, integral: Array) -> Array:
         integral: K(e), shape (n,).
     """
     v = beta**MERGING_SLOPE / np.tan(0.5 * np.pi * MERGING_SLOPE) ** 2
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(30):
         excess = elliprf(1.0 + v, beta + v, v) - MERGING_SLOPE * integral
         step = 2.0 * excess * np.sqrt((1.0 + v) * (beta + v) / v)
         v = v * np.exp(np.clip(step, -2.0, 2.0))

@@ -24,8 +24,6 @@ _TOLERANCE = 1e-9
 """What force and moments may miss, relative to the force and to that times half the diagonal; the
 contact conditions themselves are met to 1e-10."""
 
-_LEVEL = (0.0, 0.0)
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
@@ -75,7 +73,7 @@ class Peaks:
             nearer = (control.approach or np.inf) >= near.approach
             tilt = near.tilt if nearer or control.force == 0.0 else None
         if tilt is None:
-            tilt = _LEVEL if control.force == 0.0 else self._resting(control)
+            tilt = (0.0, 0.0) if control.force == 0.0 else self._resting(control)
         if control.approach is not None:
             return np.array([control.approach, *tilt])
         touch = self.modes.first_touch(self.depth, tilt)
@@ -107,7 +105,7 @@ class Peaks:
         linear programme. Where the approach is prescribed, it need not be much larger than that.
         """
         if not len(self.depth):
-            return _LEVEL
+            return 0.0, 0.0
         scale = float(np.ptp(self.depth)) or 1.0
         most = None if control.approach is None else control.approach / scale + 1.0
         highest = linprog(

@@ -23,6 +23,7 @@ from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.side_cells import side_cells
 from support.arrays import Array, Indices
+from support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
 """Numbers of cells (nx, ny)."""
@@ -33,7 +34,9 @@ _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
 _FEW_CELLS = 2**14
 """Cells up to which half-spaces are cached for other surfaces too, with 2 MB then."""
-_small_half_space = lru_cache(maxsize=_MOST_GRIDS + 8)(HalfSpaceGrid)
+_half_space = cached_where_small(
+    lambda grid, spacing, *, periodic: grid[0] * grid[1] <= _FEW_CELLS, most=_MOST_GRIDS + 8
+)(HalfSpaceGrid)
 _DIFFERENCE = 1e-6
 """Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
 slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
@@ -184,14 +187,7 @@ class Compliance:
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
         """Function from numbers of cells and their sides to the half-space on them, cached."""
-        own = lru_cache(maxsize=_MOST_GRIDS)(partial(HalfSpaceGrid, periodic=self.periodic))
-
-        def made(grid: tuple[int, int], spacing: Pair) -> HalfSpaceGrid:
-            if grid[0] * grid[1] <= _FEW_CELLS:
-                return _small_half_space(grid, spacing, periodic=self.periodic)
-            return own(grid, spacing)
-
-        return made
+        return lru_cache(maxsize=_MOST_GRIDS)(partial(_half_space, periodic=self.periodic))
 
     def slope_displacement(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].

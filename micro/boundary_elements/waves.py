@@ -11,14 +11,14 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
 from support.arrays import Array
-from support.cores import BLOCK, blocks, in_threads
+from support.cores import BLOCK, blocks, cores, in_threads
 from support.small_caches import cached_where_small
 
 Spectrum = NDArray[np.complex128]
@@ -92,13 +92,9 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        (cx, cy), (nx, _) = self.coarse, self.grid
-        rows = _by_lines(
-            lambda part: fft.dct(part, axis=1, norm="ortho")[:, :cy], field, (nx, cy), axis=1
-        )
-        cosines = _by_lines(
-            lambda part: fft.dct(part, axis=0, norm="ortho")[:cx], rows, (cx, cy), axis=0
-        )
+        (cx, cy), everywhere = self.coarse, cores()
+        rows = fft.dct(field, axis=1, norm="ortho", workers=everywhere)[:, :cy]
+        cosines = fft.dct(rows, axis=0, norm="ortho", workers=everywhere)[:cx]
         return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
 
     def refined(self, field: Array) -> Array:
@@ -106,14 +102,10 @@ class Waves:
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
-        (_, cy), (nx, ny) = self.coarse, self.grid
+        (nx, ny), everywhere = self.grid, cores()
         cosines = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
-        columns = _by_lines(
-            lambda part: fft.idct(part, n=nx, axis=0, norm="ortho"), cosines, (nx, cy), axis=0
-        )
-        return _by_lines(
-            lambda part: fft.idct(part, n=ny, axis=1, norm="ortho"), columns, (nx, ny), axis=1
-        )
+        columns = fft.idct(cosines, n=nx, axis=0, norm="ortho", workers=everywhere)
+        return np.asarray(fft.idct(columns, n=ny, axis=1, norm="ortho", workers=everywhere))
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""
@@ -166,20 +158,6 @@ class Waves:
         in_threads(along_columns, blocks(half, BLOCK // (16 * mx * given)))
         in_threads(back_along_rows, blocks(sx, BLOCK // (8 * my * count)))
         return result
-
-
-def _by_lines(
-    change: Callable[[Array], Array], field: Array, shape: tuple[int, int], *, axis: int
-) -> Array:
-    """Return a field whose lines along an axis are changed, some at a time and on all cores."""
-    result = np.empty(shape)
-
-    def change_lines(here: slice) -> None:
-        place: Any = (here, slice(None)) if axis == 1 else (slice(None), here)
-        result[place] = change(field[place])
-
-    in_threads(change_lines, blocks(shape[1 - axis], BLOCK // (8 * field.shape[axis])))
-    return result
 
 
 surface_waves = cached_where_small(

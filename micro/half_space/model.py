@@ -30,7 +30,6 @@ from support.arrays import Array, Flags
 from support.cores import blas_threads
 from support.errors import InputError, NotConverged
 
-_LEVEL = (0.0, 0.0)
 _BACK, _SAFETY = 0.05, 1.5
 """Part of the largest interference that the plane goes back by where cells yield anew, and error of
 the stiffness over what going back half and twice as far changes it by. On 24 surfaces of 64² cells,
@@ -247,7 +246,7 @@ class HalfSpaceModel:
         surface, modulus = self.surface, self.contact_modulus
         depth = None if start is None else start.plastic_depth
         if control.force == 0.0:
-            near = _LEVEL if start is None else start.plane.tilt
+            near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(surface, motion), depth)

@@ -206,10 +206,8 @@ def test_refuses(cluster):
     model = AsperityModel("elliptic", cluster, contact_modulus=1.0)
     with pytest.raises(InputError, match="inf: the approach must be finite"):
         pressed(model, np.inf)
-    with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):
+    with pytest.raises(InputError, match="every patch needs one finite mean height"):
         respond(model, [1e-3], patches=PATCHES, mean_heights=np.zeros(3))
-    with pytest.raises(InputError, match="a response needs at least one approach"):
-        respond(model, [], patches=ONE_PATCH, mean_heights=[0.0])
     corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
     with pytest.raises(InputError, match="points lie outside the patches"):
         respond(model, [1e-3], patches=corner, mean_heights=[0.0])

@@ -163,12 +163,12 @@ def test_moment_turns_with_the_surface(name):
     assert results[1] == pytest.approx(results[0] * [-1.0, 1.0], rel=0.02)
 
 
+@pytest.mark.parametrize("model", ["half-space"], indirect=True)  # no model sees them
 @pytest.mark.parametrize(
     ("approaches", "problem"),
     [
-        ([], "at least one approach"),
         ([[1e-3, 2e-3]], r"\(1, 2\): the approaches are no list"),
-        (["deep"], r"\['deep'\]: the approaches are no numbers"),
+        (["deep"], "not an array of real numbers"),
         ([1e-3, np.nan], "nan: the approach must be finite"),
     ],
 )
@@ -177,14 +177,13 @@ def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):
         respond(model, approaches, patches=PATCHES, mean_heights=MEANS)
 
 
+@pytest.mark.parametrize("model", ["half-space", "circular"], indirect=True)  # cells, summits
 @pytest.mark.parametrize(
     ("means", "problem"),
     [
-        (np.full(PATCHES.count, np.nan), "a mean height is not finite"),
-        (MEANS[:-1], r"\(5,\): every patch needs one mean height"),
-        (MEANS.reshape(PATCHES.grid), r"\(3, 2\): every patch needs one mean height"),
-        (0.0, r"\(\): every patch needs one mean height"),
-        (["low"] * PATCHES.count, "the mean heights are no numbers"),
+        (np.full(PATCHES.count, np.nan), "every patch needs one finite mean height"),
+        (MEANS[:-1], "every patch needs one finite mean height"),
+        (["low"] * PATCHES.count, "not an array of real numbers"),
     ],
 )
 def test_refuses_mean_heights_that_do_not_fit(model, means, problem):
