@@ -2,7 +2,7 @@
 
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
-displacements by all contacts add up to w_k (`micro.asperities.contact_problem`).
+displacements by all contacts add up to w_k (`micro.asperities.summit_problem`).
 
 Theory: docs/theory.md, sections 8 and 9.
 """
@@ -14,16 +14,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from micro.asperities.contact_problem import (
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.asperities.summit_problem import (
     BYTES_PER_PAIR,
-    ContactProblem,
     Method,
     Solution,
+    SummitProblem,
     active_set,
     check_pairs,
     solve,
 )
-from micro.asperities.hertz_pairs import HertzPairs
 from micro.asperities.truncated_newton import truncated_newton
 from support.arrays import Array
 
@@ -61,7 +61,7 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
     size = BYTES_PER_PAIR * (2.0 if solver == "truncated-newton" else 1.0)
     while True:
         check_pairs(len(above), size)
-        problem = ContactProblem(
+        problem = SummitProblem(
             interaction=pairs.subset(above).evaluate, interference=interference[above]
         )
         solved = solve(problem, SOLVERS[solver], start[above])

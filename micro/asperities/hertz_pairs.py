@@ -29,8 +29,8 @@ from typing import Self
 import numpy as np
 from scipy.special import elliprf
 
-from micro.asperities.contact_problem import InteractionDisplacement
 from micro.asperities.patch_sums import EllipticContacts
+from micro.asperities.summit_problem import InteractionDisplacement
 from micro.boundary_elements.body_modes import BodyPoints
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field

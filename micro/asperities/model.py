@@ -18,11 +18,11 @@ from geometry import Asperities, Control, Partition, PatchGrid
 from geometry.contact_state import ContactState, Spots, Start
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
-from micro.asperities.contact_problem import Solution
 from micro.asperities.contacts import SOLVERS, plane_stiffness, solve_summits
 from micro.asperities.hertz_pairs import HertzPairs
 from micro.asperities.patch_sums import patch_displacements, patch_loads
 from micro.asperities.plane_on_peaks import Peaks
+from micro.asperities.summit_problem import Solution
 from micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from micro.closed_forms.hertz import checked_modulus, shape_factors
 from micro.model import Stiffness, checked_patches

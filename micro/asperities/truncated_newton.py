@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
-from micro.asperities.contact_problem import (
+from micro.asperities.summit_problem import (
     TOLERANCE,
-    ContactProblem,
     InteractionDisplacement,
     Solution,
+    SummitProblem,
     damped_step,
 )
 from support.arrays import Array, Flags
@@ -31,7 +31,7 @@ _BLOCK_CHANGES = 5
 
 
 def truncated_newton(
-    problem: ContactProblem,
+    problem: SummitProblem,
     start: Array,
     *,
     most_iterations: int = _MOST_ITERATIONS,
@@ -77,7 +77,7 @@ def truncated_newton(
 
 
 def _minimise(
-    problem: ContactProblem, contacting: Flags, start: Array, most_iterations: int
+    problem: SummitProblem, contacting: Flags, start: Array, most_iterations: int
 ) -> tuple[Array, InteractionDisplacement, int]:
     """Bring w − d to 0 over the set of contacts; a negative t displaces no other summit."""
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale

@@ -5,7 +5,7 @@
           └ solve                which cells touch                  `active_set`
               └ ContactCells     their pressures                    `conjugate_gradients`
 
-All of them solve a `ContactProblem` (`problem`): compliance, interference, bounds, and the motions
-of the body that are free, with their loads (`rigid_motions`). `start` finds pressures to start
-from.
+All of them solve a `CellProblem` (`cell_problem`): compliance, interference, bounds, and the
+motions of the body that are free, with their loads (`rigid_motions`). `start` finds pressures to
+start from.
 """

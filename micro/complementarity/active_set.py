@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from micro.boundary_elements.half_space_grid import Cells
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.conjugate_gradients import ContactCells
-from micro.complementarity.problem import ContactPressures, ContactProblem
 from micro.complementarity.start import admissible_start
 from support.arrays import Array, Flags, Indices
 from support.cores import blocks, in_threads
@@ -72,7 +72,7 @@ class ActiveSet:
         NotConverged: When no pressures within the bounds meet the loads.
     """
 
-    def __init__(self, problem: ContactProblem, start: Array) -> None:
+    def __init__(self, problem: CellProblem, start: Array) -> None:
         self.problem = problem
         self._one_by_one = False  # since a step of all cells at once gained nothing
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
@@ -248,7 +248,7 @@ class ActiveSet:
         return ContactCells(self.problem.grid, cells, modes)
 
 
-def solve(problem: ContactProblem, start: Array, *, most_steps: int = 200) -> ContactPressures:
+def solve(problem: CellProblem, start: Array, *, most_steps: int = 200) -> ContactPressures:
     """Solve the contact problem on one grid.
 
     The residual ε bounds the error of the force: the solution is exact for a body whose heights

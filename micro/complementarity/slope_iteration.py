@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from micro.complementarity.problem import ContactPressures, ContactProblem
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.solver import solve_on_surface
 from support.arrays import Array
 from support.errors import NotConverged
@@ -69,7 +69,7 @@ class AndersonMixing:
         return moved
 
 
-def solve_contact(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
+def solve_contact(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from micro.complementarity.active_set import solve
-from micro.complementarity.problem import ContactPressures, ContactProblem
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Box
 from support.arrays import Array, Flags
 from support.errors import NotConverged
@@ -34,7 +34,7 @@ _ESTIMATE = 1e-2
 """Residual of the solution on a coarse grid that the approach is estimated from."""
 
 
-def solve_on_surface(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
+def solve_on_surface(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve one contact without finite slopes.
 
     Args:
@@ -55,7 +55,7 @@ def solve_on_surface(problem: ContactProblem, start: ContactPressures | None) ->
     return _solve_growing(problem, _box(problem, 0.0), pressure)
 
 
-def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) -> ContactPressures:
+def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
     """Solve with a free approach; the box follows from an estimate of it."""
     interference = problem.interference
     top = float(interference.max())  # the approach that counts is that from first touch of a cell
@@ -77,7 +77,7 @@ def _solve_under_force(problem: ContactProblem, start: ContactPressures | None) 
         first, most = solution.pressure, _MARGIN * approach
 
 
-def _box(problem: ContactProblem, least: float) -> Box:
+def _box(problem: CellProblem, least: float) -> Box:
     """Return the box that a body can touch on a half-space: the cells of more interference."""
     interference = problem.interference
     if problem.compliance.periodic:
@@ -85,7 +85,7 @@ def _box(problem: ContactProblem, least: float) -> Box:
     return box_around(interference > least)
 
 
-def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
+def _solve_growing(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on a box, and on a larger one while cells outside are lifted into contact."""
     solution = _solve_on(problem, box, start)
     while problem.compliance.body is not None and box != _whole(problem.interference):
@@ -100,7 +100,7 @@ def _solve_growing(problem: ContactProblem, box: Box, start: Array | None) -> Co
     return solution
 
 
-def _lifted(problem: ContactProblem, box: Box, interference: Array, pressure: Array) -> Flags:
+def _lifted(problem: CellProblem, box: Box, interference: Array, pressure: Array) -> Flags:
     """Return which cells outside a box penetrate the rigid body.
 
     The half-space only lowers cells. All displacements are therefore evaluated only where those by
@@ -114,7 +114,7 @@ def _lifted(problem: ContactProblem, box: Box, interference: Array, pressure: Ar
     return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
 
 
-def _solve_on(problem: ContactProblem, box: Box, start: Array | None) -> ContactPressures:
+def _solve_on(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
     """Solve on the cells of a box, from coarser grids where there is no start."""
     part = problem.on(box)
     known = None if start is None else start[box].copy()  # the search overwrites it
@@ -126,12 +126,12 @@ def _solve_on(problem: ContactProblem, box: Box, start: Array | None) -> Contact
     return solution._replace(pressure=pressure)
 
 
-def _solve_nested(problem: ContactProblem) -> ContactPressures:
+def _solve_nested(problem: CellProblem) -> ContactPressures:
     """Solve on the cells of a problem from nothing, by way of coarser grids."""
     return solve(problem, nested_start(problem))
 
 
-def nested_start(problem: ContactProblem) -> Array:
+def nested_start(problem: CellProblem) -> Array:
     """Return pressures / E* to start from, shape (nx, ny).
 
     They come from a grid half as fine. On a small grid they are uniform and meet the loads.

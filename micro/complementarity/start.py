@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import linprog
 
-from micro.complementarity.problem import ContactProblem
+from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.rigid_motions import Motions
 from support.arrays import Array
 from support.errors import NotConverged
@@ -25,7 +25,7 @@ it has the conditions of few cells only."""
 _ROUNDING = 1e-13
 
 
-def admissible_start(problem: ContactProblem, pressure: Array) -> tuple[Array, Array]:
+def admissible_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array]:
     """Return admissible pressures near given ones, and the free motions if nothing touches.
 
     Args:
@@ -50,7 +50,7 @@ def admissible_start(problem: ContactProblem, pressure: Array) -> tuple[Array, A
     )
 
 
-def _unloaded_start(problem: ContactProblem, pressure: Array) -> tuple[Array, Array]:
+def _unloaded_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array]:
     """Start a body that turns without load from pressures of negative energy.
 
     The energy without pressure is zero. A body that cannot turn clear must not come to that point,

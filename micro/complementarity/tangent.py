@@ -17,8 +17,8 @@ from __future__ import annotations
 import numpy as np
 
 from micro.boundary_elements.half_space_grid import Cells
+from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.conjugate_gradients import ContactCells
-from micro.complementarity.problem import ContactProblem
 from micro.complementarity.solver import box_around
 from support.arrays import Array
 
@@ -29,7 +29,7 @@ _FORCING = 1e-2
 _MOST_PASSES, _MOST_ITERATIONS = 12, 100
 
 
-def approach_stiffness(problem: ContactProblem, pressure: Array) -> tuple[float, int]:
+def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, int]:
     """Return the derivative of the sum of the pressures by the approach, and what it took.
 
     Args:

@@ -20,11 +20,11 @@ from micro.boundary_elements.body_modes import BodyModes
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import Compliance
-from micro.complementarity.problem import ContactPressures, ContactProblem
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.tangent import approach_stiffness
-from micro.half_space.cell_sums import CellSolution, contact_state
+from micro.half_space.cell_sums import summed
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags
 from support.cores import blas_threads
@@ -163,17 +163,35 @@ class HalfSpaceModel:
                 plane.
         """
         patches, means = checked_patches(self.surface, patches, mean_heights)
-        if start is not None and start.values.shape != self.surface.grid:
-            problem, allowed = "the solution to start from is of another grid", self.surface.grid
-            raise InputError(problem, value=start.values.shape, allowed=f"{allowed}")
-        return contact_state(
-            self._solution(control, start),
-            self.surface,
-            patches,
-            self.reference_height - means,
-            periodic=self.periodic,
-            hardness=self.hardness,
+        surface, modulus = self.surface, self.contact_modulus
+        if start is not None and start.values.shape != surface.grid:
+            problem, allowed = "the solution to start from is of another grid", f"{surface.grid}"
+            raise InputError(problem, value=start.values.shape, allowed=allowed)
+        depth = None if start is None else start.plastic_depth
+        if control.force == 0.0:
+            near = (0.0, 0.0) if start is None else start.plane.tilt
+            control, start = self._first_touch(control.tilt or near, depth), None
+        solved, plane = self._solved(control, start, depth)
+        yielding, pressure = solved.pressure >= self._bound, solved.pressure * modulus
+        if self.hardness is not None:
+            pressure[yielding] = self.hardness
+        displacement = self._displacement(pressure)
+        state = ContactState(
+            plane=plane,
+            patches=patches,
+            force=float(pressure.sum()) * surface.spacing[0] * surface.spacing[1],
+            iterations=solved.iterations,
+            residual=solved.residual,
+            x=surface.x,
+            y=surface.y,
+            pressure=pressure,
+            gap=displacement - self.interference(plane, depth),
+            displacement=displacement,
+            yielding=yielding,
+            earlier_depth=depth,
         )
+        depths = self.reference_height - means
+        return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
@@ -204,16 +222,16 @@ class HalfSpaceModel:
             return Stiffness(value if np.isfinite(value) else None, used)
         tilt, rates, used = None if turns else state.tilt, [], 0
         start = replace(state.guess, plastic_depth=state.earlier_depth)
-        cell = float(np.prod(self.surface.spacing))
         for part in (0.5, 1.0, 2.0):
             back = part * _BACK * largest
             try:
-                solution = self._solution(Control(approach=state.approach - back, tilt=tilt), start)
+                behind = self.press(Control(approach=state.approach - back, tilt=tilt), start=start)
             except NotConverged as error:
                 return Stiffness(None, used + error.iterations)
-            rates.append((state.force - float(solution.pressure.sum()) * cell) / back)
-            used += solution.iterations
+            rates.append((state.force - behind.force) / back)
+            used += behind.iterations
         # one cell that enters, up to the hardness or as far as it is displaced
+        cell = float(np.prod(self.surface.spacing))
         bears = (self.hardness or 0.0) * cell / (_BACK * largest)
         one = min(bears, self.contact_modulus * float(np.sqrt(cell)))
         change = max(one, float(np.abs(np.diff(rates)).max()))
@@ -241,39 +259,22 @@ class HalfSpaceModel:
             slopes=self.slopes,
         )
 
-    def _solution(self, control: Control, start: Start | None) -> CellSolution:
-        """Solve the contact from a start, whose plastic depth the surface has."""
-        surface, modulus = self.surface, self.contact_modulus
-        depth = None if start is None else start.plastic_depth
-        if control.force == 0.0:
-            near = (0.0, 0.0) if start is None else start.plane.tilt
-            control, start = self._first_touch(control.tilt or near, depth), None
+    def _solved(
+        self, control: Control, start: Start | None, depth: Array | None
+    ) -> tuple[ContactPressures, RigidPlane]:
+        """Return pressures / E* and the plane, on a surface with a plastic depth."""
         motion = control.prescribed(np.zeros(3))
-        interference = self.interference(RigidPlane.moved(surface, motion), depth)
+        interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
         if self.periodic:
             self._check_periodic(control, interference)
-        problem = self._problem(interference, control.free, control.loads)
-        first = None
+        problem, first = self._problem(interference, control.free, control.loads), None
         if start is not None:
-            known = np.divide(start.values, modulus)
+            known = np.divide(start.values, self.contact_modulus)
             first = ContactPressures(known, np.array([start.plane.approach]))
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
-        yielding, pressure = problem.yielding(solved.pressure), solved.pressure * modulus
-        if self.hardness is not None:
-            pressure[yielding] = self.hardness
-        plane, displacement = RigidPlane.moved(surface, motion), self._displacement(pressure)
-        return CellSolution(
-            plane=plane,
-            pressure=pressure,
-            displacement=displacement,
-            gap=displacement - self.interference(plane, depth),
-            yielding=yielding,
-            earlier_depth=depth,
-            residual=solved.residual,
-            iterations=solved.iterations,
-        )
+        return solved, RigidPlane.moved(self.surface, motion)
 
     def _displacement(self, pressure: Array) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
@@ -304,11 +305,16 @@ class HalfSpaceModel:
         return anew > max(_ROUNDING, 10.0 * self.tolerance) * largest
 
     @property
+    def _bound(self) -> float:
+        """Hardness over E*; infinite where contacts are elastic."""
+        return np.inf if self.hardness is None else self.hardness / self.contact_modulus
+
+    @property
     def _units(self) -> Array:
         """Motions of the plane, approach and slopes, that move its corners by 1 mm, shape (3,)."""
         return motion_units(0.5 * float(np.hypot(*self.surface.lengths)))
 
-    def _problem(self, interference: Array, free: Flags, loads: Array) -> ContactProblem:
+    def _problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
         """Return the contact problem of a plane.
 
         Args:
@@ -320,13 +326,13 @@ class HalfSpaceModel:
         lx, ly = surface.lengths
         x, y = (surface.x - 0.5 * lx) * unit[1], (surface.y - 0.5 * ly) * unit[2]
         cell = surface.spacing[0] * surface.spacing[1]
-        return ContactProblem(
+        return CellProblem(
             compliance=self.compliance,
             spacing=surface.spacing,
             interference=interference,
             motions=Motions.of_plane(x, y, free, loads / (modulus * cell)),
             tolerance=self.tolerance,
-            hardness=np.inf if self.hardness is None else self.hardness / modulus,
+            hardness=self._bound,
         )
 
     def _first_touch(self, tilt: tuple[float, float], depth: Array | None) -> Control:

@@ -94,7 +94,7 @@ class Solution(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContactProblem:
+class SummitProblem:
     """Summits that a rigid plane could touch.
 
     Args:
@@ -136,7 +136,7 @@ class ContactProblem:
         )
 
 
-Method = Callable[[ContactProblem, Array], Solution]
+Method = Callable[[SummitProblem, Array], Solution]
 """Takes a problem and a first guess of the indentations (n,) [mm]; raises NotConverged."""
 
 
@@ -160,7 +160,7 @@ def check_pairs(count: int, bytes_per_pair: float) -> None:
         )
 
 
-def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
+def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
     """Solve from a start or, where this fails, along a growing interference.
 
     The interference is then scaled from 0 to 1. The load step is halved after a failure and
@@ -203,7 +203,7 @@ def solve(problem: ContactProblem, method: Method, start: Array) -> Solution:
 
 
 def active_set(
-    problem: ContactProblem, start: Array, *, most_iterations: int = _MOST_ITERATIONS
+    problem: SummitProblem, start: Array, *, most_iterations: int = _MOST_ITERATIONS
 ) -> Solution:
     """Solve a contact problem by damped Newton steps on its normal map.
 

@@ -5,16 +5,16 @@ import pytest
 from helpers.asperity_states import places
 
 from geometry import InputError, NotConverged
-from micro.asperities import contact_problem
-from micro.asperities.contact_problem import (
+from micro.asperities import summit_problem
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.asperities.summit_problem import (
     BYTES_PER_PAIR,
     TOLERANCE,
-    ContactProblem,
+    SummitProblem,
     active_set,
     check_pairs,
     solve,
 )
-from micro.asperities.hertz_pairs import HertzPairs
 from micro.closed_forms.hertz import shape_factors
 
 
@@ -22,7 +22,7 @@ from micro.closed_forms.hertz import shape_factors
 def problem(cluster):
     shape = shape_factors(cluster.radius_major, cluster.radius_minor)
     kernel = HertzPairs(**places(cluster), shape=shape, circular=False)
-    return ContactProblem(interaction=kernel.evaluate, interference=5e-3 + cluster.z)
+    return SummitProblem(interaction=kernel.evaluate, interference=5e-3 + cluster.z)
 
 
 def refusing(limit):
@@ -69,7 +69,7 @@ def test_gives_up_loudly(problem):
 
 def test_pairs_that_do_not_fit_into_the_memory_are_refused(monkeypatch):
     most = BYTES_PER_PAIR * 3000.0**2
-    monkeypatch.setattr(contact_problem, "process_memory", lambda: most)
+    monkeypatch.setattr(summit_problem, "process_memory", lambda: most)
     check_pairs(3000, BYTES_PER_PAIR)
     message = (
         r"^micro\.model: the interaction of 3001 asperities needs 0\.432 GB of memory and 0\.432 GB"

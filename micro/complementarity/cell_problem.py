@@ -49,7 +49,7 @@ class ContactPressures(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ContactProblem:
+class CellProblem:
     """Contact of a rigid body with a rectangle of cells of a surface.
 
     Args:
@@ -90,7 +90,7 @@ class ContactProblem:
         """Return which pressures / E*, within the bounds, are the hardness."""
         return np.asarray(pressure >= self.hardness)
 
-    def on(self, box: Box) -> ContactProblem:
+    def on(self, box: Box) -> CellProblem:
         """Return the problem of a box of these cells, those of a surface, which carries all loads.
 
         Args:
@@ -100,7 +100,7 @@ class ContactProblem:
         interference = np.ascontiguousarray(self.interference[box])
         return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
 
-    def coarsened(self, factors: Sequence[int], tolerance: float) -> ContactProblem:
+    def coarsened(self, factors: Sequence[int], tolerance: float) -> CellProblem:
         """Return the problem on coarse cells, with a tolerance of its own.
 
         Args:
