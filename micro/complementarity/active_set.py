@@ -2,8 +2,9 @@
 
 A step takes the cells with a pressure or a negative gap as the contact, solves its linear system
 roughly by conjugate gradients and drops tensile pressures (primal-dual active set). Dropping them
-changes all gaps, and cells elsewhere overlap for a moment that would only be dropped again. Cells
-therefore enter only when the largest gap left in the contact is less than half of their overlap.
+changes all gaps, and elsewhere gaps become negative for a moment, of cells that would only be
+dropped again. Cells therefore enter only when the largest gap left in the contact is less than half
+of the most negative one outside.
 
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
@@ -45,7 +46,7 @@ the prescribed loads allow a cell no change, rounding remains."""
 _ROUNDING = 4.0 * float(np.finfo(float).eps)
 """Rounding of the gaps under a plane that is free to turn, relative to its largest distance."""
 _CLOSED = 0.5
-"""Largest gap of the cells that carry, over the largest overlap of the others, at which these
+"""Largest gap of the cells that carry, over the most negative gap of the others, at which these
 enter. From 0.3 to 1 it takes as many products. If they always enter, it takes as many on small
 grids, but three times as many where 34 % of 1024² cells touch, with waves down to 4 cells."""
 _FORCING = (0.2, 0.01)
@@ -98,8 +99,8 @@ class ActiveSet:
         def extremes(rows: slice) -> tuple[float, float, float, float]:
             """Let free motions act; return four extremes.
 
-            They are the largest interference, its largest absolute value, the largest gap or
-            overlap of cells that carry, and the largest overlap of all others.
+            They are the largest interference, its largest absolute value, the largest size of the
+            gaps of cells that carry, and of the negative gaps of all others.
             """
             nearer, here, p = motions.displacement(self.motion, rows), gap[rows], pressure[rows]
             here -= nearer
@@ -108,7 +109,7 @@ class ActiveSet:
             closed = np.where(carrying, here, 0.0)
             apart, open_gaps = float(closed.max()), here - closed
             if problem.hardness < np.inf:
-                closed[problem.yielding(p)] = 0.0  # yielding cells may overlap
+                closed[problem.yielding(p)] = 0.0  # yielding cells may have negative gaps
             inside = max(apart, -float(closed.min()))
             return float(nearer.max()), float(np.abs(nearer).max()), inside, -float(open_gaps.min())
 
@@ -127,7 +128,7 @@ class ActiveSet:
                 self.rounding = _ROUNDING * float(largest[1]) / self.scale
 
     def _weights(self, pressure: Array) -> Array:
-        """Return weights of the cells whose gaps give the motions; yielding cells may overlap."""
+        """Return weights of the cells whose gaps give the motions; those that yield have none."""
         weights = pressure
         if self.problem.hardness < np.inf:
             elastic = np.where(self.problem.yielding(pressure), 0.0, pressure)

@@ -1,8 +1,8 @@
 """The contact problem of a rigid body on an elastic one, as a record.
 
 Unknown are the pressures p on the cells of a grid and those rigid motions q of the body that are
-free. With the compliance C, the interference d (the overlap of the undeformed bodies where all free
-motions are zero) and ℓ_i, how much nearer motion i brings the body, the gap is
+free. With the compliance C, the interference d of the undeformed bodies where all free motions are
+zero, and ℓ_i, how much nearer motion i brings the body, the gap is
 
     g = C p − d − Σ_i q_i ℓ_i,
 
@@ -55,8 +55,8 @@ class CellProblem:
     Args:
         compliance: The elastic body.
         spacing: Sides of a cell [mm].
-        interference: Overlap d of the undeformed bodies at zero free motions, negative where they
-            are apart, shape (nx, ny) [mm].
+        interference: Interference d of the undeformed bodies at zero free motions, negative where
+            they are apart, shape (nx, ny) [mm].
         motions: Free rigid motions of the body, if there are any, with their loads.
         tolerance: Largest residual of a solution.
         hardness: Largest pressure H / E*; infinite where contacts are elastic. Pressures of a

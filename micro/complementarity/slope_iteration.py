@@ -104,7 +104,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         change = compliance.slope_displacement(solution.pressure) - displaced
         nearer = interference + problem.motions.displacement(solution.motion)
         changed, largest = (float(field[touching].max()) for field in (np.abs(change), nearer))
-        # bodies that do not overlap do not touch, and their pressures have an energy
+        # bodies without interference do not touch, and their pressures have an energy
         sound = largest > 0.0 and np.vdot(solution.pressure, nearer) > 0.0
         left = changed / largest if sound else np.inf
         if left <= last and accuracy <= tolerance:
