@@ -7,7 +7,6 @@ from helpers.asperity_states import displacement, interference, pressed, surface
 
 from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, micro_model
-from micro.asperities.patch_sums import patch_loads
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -100,21 +99,6 @@ def test_warm_start(cluster, name):
     assert warm.iterations < cold.iterations
     # both stop at 1e-10 in displacement
     assert warm.ellipses.force == pytest.approx(cold.ellipses.force, rel=1e-8)
-
-
-@every_model
-def test_curve_is_made_of_states(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    approaches = np.array([4e-3, 0.0, 1e-3, 8e-3, 4e-3])  # any order, repeated
-    response = curve(model, approaches)
-    assert response.approach.tolist() == approaches.tolist()
-    for row, approach in enumerate(approaches):
-        state = pressed(model, approach)
-        assert response.force[row] == pytest.approx(state.ellipses.force.sum(), rel=1e-7, abs=1e-15)
-        assert response.contact_area[row] == pytest.approx(state.ellipses.area.sum(), rel=1e-7)
-        assert response.contacts[row] == (state.ellipses.force > 0.0).sum()
-        by_patch, _ = patch_loads(PATCHES, state.ellipses)
-        assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
 
 
 def test_without_patches_the_whole_surface_is_one(cluster):

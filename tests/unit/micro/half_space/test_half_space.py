@@ -1,6 +1,5 @@
 """The half-space model: its calls, its states and its refusals."""
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -72,17 +71,6 @@ def test_force_and_approach_are_inverse(model):
     assert warm.approach == pytest.approx(cold.approach, rel=3e-8)
 
 
-def test_start_changes_the_way_but_not_the_answer(model):
-    cold = model.press(Control(approach=6e-3))
-    near = model.press(Control(approach=5.9e-3))
-    warm = model.press(Control(approach=6e-3), start=near.guess)
-    assert warm.force == pytest.approx(cold.force, rel=1e-7)  # 2 ε dlnF/dlnδ, ε = 1e-8
-    assert model.press(Control(approach=6e-3), start=cold.guess).iterations <= 2
-    assert model.press(
-        Control(approach=6e-3), start=model.press(Control(approach=0.0)).guess
-    ).force == pytest.approx(cold.force, rel=1e-7)
-
-
 def test_linear_in_the_contact_modulus(surface):
     one, ten = (
         HalfSpaceModel(surface=surface, contact_modulus=e).press(Control(approach=6e-3))
@@ -98,19 +86,6 @@ def test_unit_of_length_does_not_matter(surface):
     other = HalfSpaceModel(surface=small, contact_modulus=1.0).press(Control(approach=6e-3 * inch))
     assert other.force == pytest.approx(mm.force * inch**2, rel=1e-7)  # both within 1e-8 in δ
     assert other.iterations == mm.iterations
-
-
-def test_response_is_in_the_order_given(model):
-    approaches = np.array([6e-3, 0.0, 2e-3, 9e-3])
-    means = patch_means(model.surface, PATCHES)
-    response = respond(model, approaches, patches=PATCHES, mean_heights=means)
-    assert response.approach == pytest.approx(approaches)
-    for approach, force, area in zip(
-        approaches, response.force, response.contact_area, strict=True
-    ):
-        state = model.press(Control(approach=approach))
-        assert force == pytest.approx(state.force, rel=1e-7)
-        assert area == pytest.approx(state.contact_area, rel=1e-12)  # the same cells
 
 
 def test_patches_sum_to_the_whole(model):
@@ -150,24 +125,6 @@ def test_any_force_and_tilt(force, tilt):
     assert state.residual <= model.tolerance
     # with this tilt a cell touches before the approach at the centre is 0
     assert (state.approach < 0.0) == (tilt != (0.0, 0.0) and force < 1.0)
-
-
-def test_no_contact():
-    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
-    for state in (
-        model.press(Control(approach=0.0)),
-        model.press(Control(approach=-1e-3)),
-        model.press(Control(force=0.0)),
-    ):
-        assert state.force == 0.0 and state.contact_area == 0.0 and state.contacts == 0
-        assert state.gap.min() >= 0.0
-
-
-def test_travels_without_its_work_arrays():
-    model = HalfSpaceModel(surface=rough(), contact_modulus=E_STAR)
-    force = model.press(Control(approach=6e-3)).force
-    copy = pickle.loads(pickle.dumps(model))
-    assert copy.press(Control(approach=6e-3)).force == force
 
 
 def test_refusals(surface):

@@ -35,10 +35,14 @@ def same(one, other, rel):
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
-def test_is_a_row_of_the_curve(model, tilt):
-    row = press_along(model, [APPROACH], patches=PATCHES, mean_heights=MEANS, tilt=tilt)[0]
-    assert row.force > 0.0
-    same(press(model, approach=APPROACH, tilt=tilt), row, rel=1e-12)
+def test_a_path_is_made_of_states(model, tilt):
+    approaches = APPROACH * np.array([0.5, -0.1, 1.0, 0.25, 0.5])  # any order, repeated
+    path = press_along(model, approaches, patches=PATCHES, mean_heights=MEANS, tilt=tilt)
+    assert [state.approach for state in path] == approaches.tolist()
+    for state in path:
+        alone = press(model, approach=state.approach, tilt=tilt)
+        same(state, alone, rel=1e-7)  # residuals of 1e-8 of the approach
+        assert state.contacts == alone.contacts
 
 
 def test_a_model_can_be_sent_to_other_ranks_after_it_was_pressed(model):
