@@ -108,14 +108,14 @@ class Peaks:
             return 0.0, 0.0
         scale = float(np.ptp(self.depth)) or 1.0
         most = None if control.approach is None else control.approach / scale + 1.0
-        highest = linprog(
+        programme = linprog(
             [-1.0, 0.0, 0.0],
             A_ub=self.modes.matrix / [1.0, self.modes.half, self.modes.half],
             b_ub=self.depth / scale,
             bounds=[(None, most), (None, None), (None, None)],
             method="highs",
         )
-        if highest.status != 0:  # the centre lies outside of the peaks' hull
+        if programme.status != 0:  # the centre lies outside of the peaks' hull
             raise plane_failure(control, "NO_EQUILIBRIUM")
-        slopes = highest.x[1:] * (scale / self.modes.half)
+        slopes = programme.x[1:] * (scale / self.modes.half)
         return float(slopes[0]), float(slopes[1])

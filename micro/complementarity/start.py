@@ -108,15 +108,15 @@ def clearance(interference: Array, motions: Motions) -> Clearance:
             break
         cells.append(worst)
         modes = motions.modes_of(np.array(cells)).T
-        highest = linprog(
+        programme = linprog(
             np.append(np.zeros(motions.count), 1.0),
             A_ub=np.column_stack((modes, -np.ones(len(cells)))),
             b_ub=-scaled.ravel()[cells],
             bounds=limits,
             method="highs-ds",
         )
-        motion, bound = np.asarray(highest.x[:-1]), float(highest.x[-1])
-        shares = np.maximum(-np.asarray(highest.ineqlin.marginals), 0.0)
+        motion, bound = np.asarray(programme.x[:-1]), float(programme.x[-1])
+        shares = np.maximum(-np.asarray(programme.ineqlin.marginals), 0.0)
     support = np.zeros(interference.shape)
     support.ravel()[cells[: len(shares)]] = shares
     motion = size * motion
