@@ -53,6 +53,8 @@ _SMALLEST_LOAD_STEP = 1.0 / 256.0
 _SHORTEST_STEP = 2.0**-10
 _LEAST_DECREASE = 1e-4
 
+_NEWTON = "Newton's method on the active set"
+
 
 class InteractionDisplacement(NamedTuple):
     """Displacements of n summits by the m active contacts, except by each contact's own field.
@@ -226,7 +228,7 @@ def active_set(
         if problem.residual(z, caused.displacement) <= TOLERANCE:
             return problem.solution(z, caused, iteration)
         z, caused, error = damped_step(evaluate, z, _newton_step(caused, error), error)
-    raise _failure("MAX_ITERATIONS", most_iterations)
+    raise failure(_NEWTON, "MAX_ITERATIONS", most_iterations)
 
 
 def _newton_step(caused: InteractionDisplacement, error: Array) -> Array:
@@ -237,19 +239,16 @@ def _newton_step(caused: InteractionDisplacement, error: Array) -> Array:
     try:
         inside = np.linalg.solve(matrix, -error[active])
     except np.linalg.LinAlgError:
-        raise _failure("SINGULAR_JACOBIAN", 1) from None
+        raise failure(_NEWTON, "SINGULAR_JACOBIAN", 1) from None
     step = -error - derivative @ inside
     step[active] = inside
     return np.asarray(step)
 
 
-def _failure(reason: str, iterations: int) -> NotConverged:
-    return NotConverged(
-        "Newton's method on the active set",
-        reason=reason,
-        iterations=iterations,
-        remedy="lower load.approach",
-    )
+def failure(what: str, reason: str, iterations: int, also: str = "") -> NotConverged:
+    """Return the error of an iteration, with what else may help beside a lower approach."""
+    remedy = f"lower load.approach{also}"
+    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
 
 
 def damped_step(
@@ -280,6 +279,4 @@ def damped_step(
         if np.linalg.norm(left) <= (1.0 - _LEAST_DECREASE * length) * norm:
             return trial, caused, left
         length *= 0.5
-    raise NotConverged(
-        "a damped Newton step", reason="LINE_SEARCH", iterations=1, remedy="lower load.approach"
-    )
+    raise failure("a damped Newton step", "LINE_SEARCH", 1)
