@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from geometry import Control
 from multiscale.laws.interpolation import LawPoint, Tangent
 
 RNG = np.random.default_rng(2)
@@ -47,4 +46,4 @@ def test_only_loaded_patches_are_solved_for():
 def test_a_singular_system_is_refused():
     at = law_point(np.ones(2), np.zeros(2), np.zeros(2))
     with pytest.raises(np.linalg.LinAlgError):
-        Tangent.of(at, np.zeros((2, 2))).press(Control(approach=np.ones(2)))
+        Tangent.of(at, np.zeros((2, 2))).solve(np.ones(2))
