@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
 from geometry.contact_state import ContactState, Start
-from micro import HalfSpaceModel, MicroModel, RigidPlane, Stiffness
+from micro import HalfSpaceModel, MicroModel, Stiffness
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 from support.collective import on_root, on_root_alone
 
 Array = NDArray[np.float64]
@@ -171,10 +169,10 @@ class ContactSolver:
         """
         return on_root_alone(self._comm, lambda: latest)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest solution; it is whole on rank 0 alone."""
-        return packed(self._start)
+        return self._start
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a solution."""
-        self._start = unpacked(state, (RigidPlane, Start))
+        self._start = state
