@@ -27,7 +27,7 @@ from geometry import (
     roughness,
     synthesise,
 )
-from micro import MODELS, AsperityModel
+from micro import MODELS, AsperityModel, press_along, stacked
 from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
 from multiscale.figures.style import MODELS as LOOKS
 
@@ -48,14 +48,17 @@ asperities = find_asperities(surface, periodic=False)
 whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
 
 # %% [markdown]
-# One response per model over the approach, from first touch to 16 µm.
+# One curve per model over the approach, from first touch to 16 µm.
 
 # %%
 MODULUS = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 approaches = np.linspace(0.0, 16e-3, 9 if choice.quick else 81)[1:]
-responses = {
-    name: AsperityModel(name, asperities, contact_modulus=MODULUS).respond(
-        approaches, patches=whole, mean_heights=patch_means(surface, whole)
+curves = {
+    name: press_along(
+        AsperityModel(name, asperities, contact_modulus=MODULUS),
+        approaches,
+        patches=whole,
+        mean_heights=patch_means(surface, whole),
     )
     for name in MODELS
 }
@@ -71,13 +74,13 @@ use_style()
 figure = new_figure(FULL_WIDTH, 2.9)
 motion, area = figure.subplots(1, 2)
 height, modulus = 1e3 * roughness(surface).sq, 1e3 / MODULUS
-for name, response in responses.items():
+for name, states in curves.items():
     look = {"color": LOOKS[name]["color"], "ls": LOOKS[name]["ls"]}
     if name.startswith("circular"):  # nearly the same: dots on the lines
         look |= {"ls": "", "marker": "o", "ms": 3.5, "markevery": 5, "mfc": LOOKS[name].get("mfc")}
-    pressure = modulus * response.mean_pressure
-    motion.plot(1e3 * response.approach / height, pressure, **look)
-    area.plot(pressure, 100 * response.contact_area_fraction, **look)
+    pressure = modulus * stacked(states, "mean_pressure")
+    motion.plot(1e3 * stacked(states, "approach") / height, pressure, **look)
+    area.plot(pressure, 100 * stacked(states, "contact_area_fraction"), **look)
 motion.set(xlabel="approach / rms height", ylabel="mean pressure / E* [10⁻³]")
 area.set(xlabel="mean pressure / E* [10⁻³]", ylabel="contact area [% of the face]")
 motion.text(
@@ -89,8 +92,8 @@ area.text(0.02, 0.93, "all four models", va="top", **at(area))
 figure.savefig(choice.out / "four_models.png")
 # %%
 print("mean pressure [MPa] and contact area [%] at an approach of 16 µm")
-for name, response in responses.items():
-    pressure, area = response.mean_pressure[-1], 100 * response.contact_area_fraction[-1]
+for name, states in curves.items():
+    pressure, area = states[-1].mean_pressure, 100 * states[-1].contact_area_fraction
     print(f"  {name:22s} {pressure:7.3f} {area:7.3f}")
 
 # %% [markdown]
@@ -98,6 +101,6 @@ for name, response in responses.items():
 # each other's summits down. The shape of the contacts changes the force by a few per cent only.
 
 # %%
-pressures = {name: response.mean_pressure[-1] for name, response in responses.items()}
+pressures = {name: states[-1].mean_pressure for name, states in curves.items()}
 assert pressures["elliptic"] < 0.9 * pressures["elliptic-independent"]
 assert abs(pressures["elliptic"] / pressures["circular"] - 1) < 0.05

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
+from micro import micro_model, press_along, stacked
 from multiscale.figures.style import MODELS as LOOKS
 from multiscale.figures.style import ONE_COLUMN, new_figure, use_style
 
@@ -41,10 +41,11 @@ def kappa(name, seed):
     surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
     model = micro_model(name, surface, contact_modulus=MODULUS)
     means = patch_means(surface, WHOLE)
-    response = model.respond(APPROACHES, patches=WHOLE, mean_heights=means)
-    area = np.maximum.accumulate(response.contact_area_fraction)
-    found = np.interp(FRACTIONS, area, response.kappa(SLOPE), right=np.nan)
-    return np.where(area[0] <= FRACTIONS, found, np.nan)
+    states = press_along(model, APPROACHES, patches=WHOLE, mean_heights=means)
+    area = np.maximum.accumulate(stacked(states, "contact_area_fraction"))
+    values = [state.kappa(SLOPE, MODULUS) for state in states]
+    values = np.interp(FRACTIONS, area, values, right=np.nan)
+    return np.where(area[0] <= FRACTIONS, values, np.nan)
 
 
 # %%

@@ -22,7 +22,7 @@ import numpy as np
 from paper.accuracy_figure import draw_accuracy
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
+from micro import micro_model, press_along, stacked
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")
@@ -55,9 +55,10 @@ def answer(spectrum, name, grid):
     _ = surface.highest  # not of the model
     start = time.process_time()
     model = micro_model(name, surface, contact_modulus=MODULUS)
-    response = model.respond(APPROACHES, patches=WHOLE, mean_heights=patch_means(surface, WHOLE))
+    means = patch_means(surface, WHOLE)
+    states = press_along(model, APPROACHES, patches=WHOLE, mean_heights=means)
     seconds = (time.process_time() - start) / len(APPROACHES)
-    return [*response.force, *response.contact_area, seconds]
+    return [*stacked(states, "force"), *stacked(states, "contact_area"), seconds]
 
 
 # %%

@@ -16,7 +16,7 @@ from paper.models_figure import models_figure
 from paper.page import Page
 
 from geometry import Material, PatchGrid, Spectrum, patch_means, synthesise
-from micro import micro_model
+from micro import micro_model, press_along, stacked
 from multiscale.figures.style import FULL_WIDTH, new_figure, use_style
 from multiscale.figures.style import MODELS as LOOKS
 
@@ -32,22 +32,23 @@ SETS = {7: {"waves": (2, 10)}, 9: {"waves_x": (2, 7), "waves_y": (2, 12)}}
 MODELS = ("elliptic", "circular", "elliptic-independent", "circular-independent", "half-space")
 
 
-def respond(band, seed, names, deepest):
-    """Return the responses of some models on one surface, to an approach [mm]."""
+def curves(band, seed, names, deepest):
+    """Return the states of some models on one surface, to an approach [mm]."""
     spectrum = Spectrum(hurst=0.95, rms_slope=SLOPE, seed=seed, **band)
     surface = synthesise(spectrum, grid=(GRID, GRID), lengths=(1.0, 1.0))
     approaches, means = np.linspace(0.0, deepest, 33)[1:], patch_means(surface, WHOLE)
     models = {name: micro_model(name, surface, contact_modulus=MODULUS) for name in names}
     return {
-        name: model.respond(approaches, patches=WHOLE, mean_heights=means)
+        name: press_along(model, approaches, patches=WHOLE, mean_heights=means)
         for name, model in models.items()
     }
 
 
-def at(fraction, response):
+def at(fraction, states):
     """Return κ and pressure [MPa] at area fractions, NaN where they are not reached."""
-    area = np.maximum.accumulate(response.contact_area_fraction)
-    columns = response.kappa(SLOPE), response.mean_pressure
+    area = np.maximum.accumulate(stacked(states, "contact_area_fraction"))
+    kappa = [state.kappa(SLOPE, MODULUS) for state in states]
+    columns = kappa, stacked(states, "mean_pressure")
     return [np.interp(fraction, area, values, left=np.nan, right=np.nan) for values in columns]
 
 
@@ -64,11 +65,11 @@ CLAIMS = {
     "pressure; κ of the elliptic models lies between 2 and 3 above 1.5 %.",
 }
 for number, band in SETS.items():
-    group = respond(band, 1, MODELS, 16e-3)
+    group = curves(band, 1, MODELS, 16e-3)
     shares, wider = [], []
     for seed in SEEDS:
-        x = respond(band, seed, MODELS, 16e-3)
-        pressures = np.array([x[name].mean_pressure[-1] for name in x])
+        x = curves(band, seed, MODELS, 16e-3)
+        pressures = np.array([x[name][-1].mean_pressure for name in x])
         shares.append(pressures[:4] / pressures[4] - 1)
         wider.append(at(0.012, x["circular"])[0] / at(0.012, x["elliptic"])[0] - 1)
     shares, wider = np.mean(shares, axis=0), np.nanmean(wider)
@@ -76,7 +77,7 @@ for number, band in SETS.items():
     found += ", ".join(f"{n} {share:+.0%}" for n, share in zip(MODELS[:4], shares, strict=True))
     found += f". Area of circles against ellipses at 1.2 % of contact area: {wider:+.1%}. κ here "
     found += "at 2 %: " + ", ".join(f"{n} {at(0.02, x)[0]:.2f}" for n, x in group.items()) + "."
-    figure = models_figure(group, rms_slope=SLOPE)
+    figure = models_figure(group, rms_slope=SLOPE, contact_modulus=MODULUS)
     page.add(f"Figure {number}", TITLES[number], figure, CLAIMS[number], found)
     assert max(shares[:2]) < 0.0 < min(shares[2:])  # interaction, then none
     assert max(abs(shares[:2])) < min(shares[2:])
@@ -88,7 +89,7 @@ for number, band in SETS.items():
 # %%
 FRACTIONS = np.geomspace(0.004, 0.08, 40)
 CROWD = ("elliptic-independent", "circular-independent", "half-space")
-crowd = [respond(SETS[7], seed, CROWD, 34e-3) for seed in SEEDS]
+crowd = [curves(SETS[7], seed, CROWD, 34e-3) for seed in SEEDS]
 use_style()
 figure = new_figure(FULL_WIDTH, 3.0)
 curve, spread = figure.subplots(1, 2)

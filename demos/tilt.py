@@ -47,10 +47,11 @@ def errors(seed: int, count: int, tilt: tuple[float, float]) -> tuple[float, flo
     laws = consistent_laws(model, patches, mean_heights=means, largest=largest)
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
     step = CondensedLaws(laws, half_space).press(Control(approach=APPROACH, tilt=TILT))
-    whole = model.respond([APPROACH], patches=patches, mean_heights=means, tilt=TILT)
-    pressure = whole.patch_pressure[0]
+    control = Control(approach=APPROACH, tilt=TILT)
+    whole = model.press(control, patches=patches, mean_heights=means)
+    pressure = whole.patch_pressure
     missed = np.abs(step.patches.pressure_MPa - pressure).max() / pressure.max()
-    return step.force_N / whole.force[0] - 1.0, float(missed)
+    return step.force_N / whole.force - 1.0, float(missed)
 
 
 # %% [markdown]

@@ -5,9 +5,6 @@ those are free that no load step prescribes. In equilibrium the force is the pre
 there is no moment about the centre. A step of Newton's method is shortened or lengthened until the
 slope of the energy along it has fallen, which always ends. Against a motion that no contact
 resists the plane goes on until one does.
-
-Source:
-    Nocedal & Wright 2006, ch. 6 (BFGS), doi 10.1007/978-0-387-40065-5.
 """
 
 from __future__ import annotations
@@ -17,13 +14,12 @@ from dataclasses import dataclass
 from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.rigid_plane import Control, motion_units, plane_failure
 from geometry.slope_search import slope_search
+from support.arrays import Array
 from support.errors import NotConverged
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 TOLERANCE = 1e-10
@@ -49,8 +45,8 @@ class PlaneResponse(Generic[T]):
 
     Args:
         loads: Force and first moments about the centre, shape (3,) [N, N mm].
-        stiffness: Returns the derivative of the loads by approach and slopes, at least nearly,
-            symmetric, shape (3, 3).
+        stiffness: Returns the derivative of the loads by approach and slopes, symmetric, shape
+            (3, 3).
         state: Whatever else is known of the contacts.
     """
 
@@ -75,7 +71,6 @@ def find_equilibrium(
     half: float,
     *,
     aim: float = _AIM,
-    nearly: bool = False,
     first_touch: float | None = None,
 ) -> tuple[Array, T]:
     """Find the plane whose loads are those prescribed.
@@ -87,7 +82,6 @@ def find_equilibrium(
         half: Half the diagonal of the interface [mm].
         aim: Residual of force and moments to aim at, relative to the force and to that times
             ``half``; `TOLERANCE` is accepted where no step brings them closer.
-        nearly: Whether stiffnesses are inexact; the last step corrects them then (BFGS).
         first_touch: Approach of first touch under the slopes of the start [mm], where contacts
             may refuse to be pressed farther than their model can bear: steps are shortened then,
             and the start retreats. None where a refusal is final.
@@ -101,7 +95,6 @@ def find_equilibrium(
     """
     motions = _FreeMotions(respond, control, half, final=first_touch is None)
     now = motions.begun(np.array(start, dtype=np.float64), first_touch)
-    step = change = np.zeros(len(motions.unit))
     largest = 0.0
     for _ in range(_MOST_STEPS):
         measure = max(now.force, control.force or 0.0)
@@ -109,8 +102,6 @@ def find_equilibrium(
             return now.plane, now.response.state
         largest = max(largest, measure)
         stiffness = motions.stiffness(now)
-        if nearly:
-            stiffness = _corrected(stiffness, step, change)
         step, resisted = _direction(stiffness, now.residual, aim * measure, _FIRST * half)
         if resisted and np.abs(step).max() <= _ROUNDING * motions.size(now.plane):
             now = motions.trial(motions.moved(now, step))  # displacements allow no more
@@ -120,10 +111,10 @@ def find_equilibrium(
             clear = motions.trial(motions.moved(now, 3.0 * step))
             if clear.force == 0.0:
                 return clear.plane, clear.response.state
-        share, found = motions.searched(now, step)
-        if found is None:
+        reached = motions.searched(now, step)
+        if reached is None:
             break
-        step, change, now = share * step, found.residual - now.residual, found
+        now = reached
     measure = max(now.force, control.force or 0.0)
     if np.abs(now.residual).max() <= max(aim, TOLERANCE) * measure:
         return now.plane, now.response.state
@@ -187,28 +178,28 @@ class _FreeMotions(Generic[T]):
         plane[self._free] += self.unit * motion
         return plane
 
-    def searched(self, now: _Trial[T], step: Array) -> tuple[float, _Trial[T] | None]:
-        """Search along a step, and return the share that was taken and where it leads."""
-        found = now
+    def searched(self, now: _Trial[T], step: Array) -> _Trial[T] | None:
+        """Search along a step, and return where it leads; None where it gains nothing."""
+        trial = now
 
         def slope_after(share: float) -> float:
-            nonlocal found
+            nonlocal trial
             plane = self.moved(now, share * step)
             if np.abs(plane[self._free] / self.unit).max() > _FARTHEST * self._half:
                 raise plane_failure(self._control, "NO_SUPPORT" if now.force else "NO_CONTACT")
             try:
-                found = self.trial(plane)
+                trial = self.trial(plane)
             except NotConverged:
                 if self._final:
                     raise
                 return np.inf
             # less than the tolerance is lost by rounding alone, and is no support to be kept
             held = now.force > TOLERANCE * (self._control.force or np.inf)
-            return np.inf if held and found.force == 0.0 else float(found.residual @ step)
+            return np.inf if held and trial.force == 0.0 else float(trial.residual @ step)
 
         longest = self._half / float(np.abs(step).max())
         share = slope_search(slope_after, float(now.residual @ step), min(1.0, longest))
-        return (0.0, None) if share is None else (share, found)
+        return None if share is None else trial
 
 
 def _direction(
@@ -223,13 +214,3 @@ def _direction(
         step = vectors @ np.where(falling, loads, 0.0)
         return first * step / np.abs(step).max(), False
     return vectors @ np.divide(loads, values, out=np.zeros_like(loads), where=~loose), True
-
-
-def _corrected(stiffness: Array, step: Array, change: Array) -> Array:
-    """Return a stiffness that reproduces the change of the residual in the last step (BFGS)."""
-    pushed = stiffness @ step
-    curvature, predicted = float(step @ change), float(step @ pushed)
-    if predicted <= 0.0 or curvature <= 1e-8 * predicted:
-        return stiffness
-    update = np.outer(change, change) / curvature - np.outer(pushed, pushed) / predicted
-    return np.asarray(stiffness + update)

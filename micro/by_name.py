@@ -1,11 +1,8 @@
-"""The micro models by name, and what their load steps start from."""
+"""The micro models by name."""
 
 from __future__ import annotations
 
 from geometry import Surface, find_asperities
-from geometry.rigid_plane import RigidPlane
-from micro.asperities.contact_problem import Solution
-from micro.asperities.contacts import Equilibrium
 from micro.asperities.model import MODELS, AsperityModel
 from micro.half_space.model import HalfSpaceModel
 from micro.model import MicroModel
@@ -13,9 +10,6 @@ from support.errors import InputError
 
 MODEL_NAMES = (*MODELS, "half-space")
 """Names of all micro models."""
-
-START_KINDS: tuple[type, ...] = (RigidPlane, Equilibrium, Solution)
-"""Records that `Pressed.start` may consist of, besides arrays and tuples."""
 
 
 def micro_model(

@@ -1,21 +1,18 @@
-"""The protocol of all micro models, their response, and the checks of arguments that they share."""
+"""The protocol of all micro models, load steps along approaches, and checks that models share."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, Self
+from dataclasses import replace
+from typing import NamedTuple, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
-from geometry.rigid_plane import RigidPlane
-from micro.contact_detail import ContactDetail
+from geometry.contact_state import ContactState, Start
+from support.arrays import Array
+from support.checks import real_array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Counts = NDArray[np.int64]
 
 
 class MicroModel(Protocol):
@@ -51,65 +48,43 @@ class MicroModel(Protocol):
             The model, whose approach counts from the whole surface's highest point, and its patch.
         """
 
-    def respond(
-        self,
-        approaches: ArrayLike,
-        *,
-        patches: Partition | None = None,
-        mean_heights: ArrayLike | None = None,
-        tilt: tuple[float, float] = (0.0, 0.0),
-    ) -> Response:
-        """Solve along approaches.
-
-        Args:
-            approaches: Rigid approaches δ at the centre of the rectangle in any order, shape (m,)
-                [mm].
-            patches: N patches within the surface's rectangle that results are summed over; the
-                whole rectangle as one patch when not given.
-            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm]; the
-                surface's own when not given.
-            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
-
-        Returns:
-            The response, in the order of ``approaches``, with a warning for each of them that
-            lies outside the range of validity.
-
-        Raises:
-            InputError: When the approaches are not a finite, non-empty list, a contact lies
-                outside the patches, or patches or mean heights do not fit the surface.
-            NotConverged: When the contact conditions cannot be met.
-        """
-
     def press(
         self,
         control: Control,
         *,
         patches: Partition | None = None,
         mean_heights: ArrayLike | None = None,
-        start: Any = None,
-    ) -> Pressed:
-        """Solve one load step: contacts and the free motions of the plane.
+        start: Start | None = None,
+    ) -> ContactState:
+        """Solve the contacts and the free motions of the plane.
 
         Args:
             control: What is prescribed of the plane: approach or force, tilt or no moment.
-            patches: Patches that results are summed over, as for `respond`.
-            mean_heights: Mean heights of the patches, shape (N,) [mm], as for `respond`.
-            start: What this model returned at a load step nearby; without it the solution starts
+            patches: N patches within the surface's rectangle that results are summed over; the
+                whole rectangle as one patch when not given.
+            mean_heights: Mean heights of the surface on the patches, shape (N,) [mm]; the
+                surface's own when not given.
+            start: What a solution of this model at another load left behind: its ``guess``, or its
+                ``start`` for a surface that keeps its plastic depth. Without it the solution starts
                 from no contact.
 
         Returns:
-            The response, of one row, the plane, and where to start the next load step from.
+            The contact, with a warning where the load lies outside the range of validity. The
+            separation of a patch is the mean gap between the plane and the *displaced* surface;
+            the paper's eq. 9 leaves the displacement out. Without force the plane is that of first
+            touch, under the tilt of the start where the tilt is free.
 
         Raises:
-            InputError: When the arguments do not fit the surface.
+            InputError: When a contact lies outside the patches, or patches, mean heights or start
+                do not fit the surface.
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def stiffness(self, state: Any, *, turns: bool) -> Stiffness:
+    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
         Args:
-            state: `Pressed.state` of this model.
+            state: A solution of this model.
             turns: Whether the plane turns without moment; otherwise its slopes stay.
         """
 
@@ -128,164 +103,56 @@ class Stiffness(NamedTuple):
     error: float = 0.0
 
 
-class SolvedContact(Protocol):
-    """The contact that a micro model found."""
-
-    @property
-    def peak_pressure(self) -> float:
-        """Largest contact pressure [MPa]; 0 without contact."""
-
-    @property
-    def detail(self) -> ContactDetail:
-        """The spots of the contact and, where they are known, its fields."""
-
-
-class Pressed(NamedTuple):
-    """The result of one load step.
-
-    Attributes:
-        response: The response, of one row.
-        plane: The plane in equilibrium.
-        start: Initial guess of the same model for a load step nearby.
-        state: The contact.
-    """
-
-    response: Response
-    plane: RigidPlane
-    start: Any
-    state: SolvedContact
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Response:
-    """Results at n approaches on N patches.
-
-    The separation of a patch is the average gap between the plane and the *displaced* surface,
-    g_i = z_M − mean height − mean approach + mean displacement. The paper's eq. 9 leaves the
-    displacement out. It is the displacement by the model's pressures, to the errors stated in
-    `micro.asperities.patch_sums`, also for the models without interaction.
+def press_along(
+    model: MicroModel,
+    approaches: ArrayLike,
+    *,
+    patches: Partition | None = None,
+    mean_heights: ArrayLike | None = None,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> list[ContactState]:
+    """Press to approaches, each from the solutions at the two below it, extrapolated.
 
     Args:
-        model: Name of the micro model.
-        contact_modulus: E* [MPa].
-        nominal_area: Area of all patches [mm²].
-        approach: Rigid approach at the centre, counted from first touch, shape (n,) [mm].
-        force: Normal force, shape (n,) [N].
-        moment: First moments Σ P (x − xc), Σ P (y − yc) of the pressures about the centre of the
-            surface's rectangle, shape (n, 2) [N mm].
-        contact_area: Real contact area, shape (n,) [mm²].
-        contacts: Number of asperities in contact, shape (n,).
-        mean_separation: Average gap, shape (n,) [mm].
-        iterations: Iterations of the solver, shape (n,).
-        residual: Complementarity error relative to the largest interference, shape (n,).
-        overlapping_contacts: Number of pairs of contacts that have grown into each other, (n,).
-        patch_force: Force on the patch, contacts across its border shared, shape (n, N) [N].
-        patch_contact_area: Real contact area in the patch, shared likewise, shape (n, N) [mm²].
-        patch_contacts: Number of contacts with their summit in the patch, shape (n, N).
-        patch_displacement: Mean normal displacement of the patch by all contacts, (n, N) [mm].
-        patch_separation: Average gap of the patch, shape (n, N) [mm].
-        warning: Why the approach lies outside the model's range of validity, shape (n,); empty
-            within it.
-    """
+        model: The micro model.
+        approaches: Rigid approaches δ in any order, shape (m,) [mm].
+        patches: As for `MicroModel.press`.
+        mean_heights: As for `MicroModel.press`.
+        tilt: Slopes of the plane.
 
-    model: str
-    contact_modulus: float
-    nominal_area: float
-    approach: Array
-    force: Array
-    moment: Array
-    contact_area: Array
-    contacts: Counts
-    mean_separation: Array
-    iterations: Counts
-    residual: Array
-    overlapping_contacts: Counts
-    patch_force: Array
-    patch_contact_area: Array
-    patch_contacts: Counts
-    patch_displacement: Array
-    patch_separation: Array
-    warning: NDArray[np.str_]
-
-    @classmethod
-    def of(
-        cls,
-        rows: Sequence[dict[str, Any]],
-        model: str,
-        contact_modulus: float,
-        patches: Partition,
-    ) -> Self:
-        """Put together the fields at single approaches, in their order.
-
-        Args:
-            rows: For each approach the fields that have one entry per approach.
-            model: Name of the micro model.
-            contact_modulus: E* [MPa].
-            patches: The patches.
-        """
-        columns = {key: np.array([row[key] for row in rows]) for key in rows[0]}
-        return cls(
-            model=model,
-            contact_modulus=contact_modulus,
-            nominal_area=float(np.prod(patches.sides)),
-            **columns,
-        )
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """A sentence for each approach that lies outside the model's range of validity."""
-        return tuple(str(sentence) for sentence in self.warning if sentence)
-
-    @property
-    def mean_pressure(self) -> Array:
-        """Force per nominal area, shape (n,) [MPa]."""
-        return np.divide(self.force, self.nominal_area)
-
-    @property
-    def patch_pressure(self) -> Array:
-        """Force per area of each of N equal patches, shape (n, N) [MPa]."""
-        return self.patch_force * (self.patch_force.shape[1] / self.nominal_area)
-
-    @property
-    def contact_area_fraction(self) -> Array:
-        """Real over nominal contact area A/A0, shape (n,)."""
-        return np.divide(self.contact_area, self.nominal_area)
-
-    def kappa(self, rms_slope: float) -> Array:
-        """Return κ of A/A0 = κ p/(rms slope · E*), shape (n,); NaN where nothing touches.
-
-        Args:
-            rms_slope: Root of the mean squared gradient of the surface, sqrt<|∇h|²>.
-
-        Source:
-            Waddad et al. 2016, section 2.2, doi 10.1016/j.triboint.2015.12.023.
-        """
-        area = self.contact_area_fraction * rms_slope * self.contact_modulus
-        result = np.full_like(area, np.nan)
-        return np.divide(area, self.mean_pressure, out=result, where=self.force > 0.0)
-
-
-def whole_patch(rough: Surface | Asperities) -> PatchGrid:
-    """Return the single patch that a surface's rectangle is."""
-    return PatchGrid(grid=(1, 1), lengths=rough.lengths)
-
-
-def checked_approaches(approaches: ArrayLike) -> Array:
-    """Return approaches as an array of shape (m,) [mm].
+    Returns:
+        A state for each approach, in their order.
 
     Raises:
-        InputError: When they are no finite, non-empty list of numbers.
+        InputError: When the approaches are no list of finite numbers, or as for
+            `MicroModel.press`.
+        NotConverged: When the contact conditions cannot be met.
     """
-    allowed = "a number or a list of finite numbers in mm"
-    given = np.atleast_1d(_numbers(approaches, "the approaches are no numbers", allowed))
-    if given.size == 0:
-        raise InputError("a response needs at least one approach", value=[])
-    if given.ndim != 1:
-        raise InputError("the approaches are no list", value=given.shape, allowed=allowed)
-    if not np.isfinite(given).all():
-        first = float(given[~np.isfinite(given)][0])
-        raise InputError("the approach must be finite", value=first, allowed="mm")
-    return given
+    wanted = np.atleast_1d(real_array(approaches))
+    if wanted.ndim != 1:
+        raise InputError("the approaches are no list", value=wanted.shape, allowed="numbers in mm")
+    states: dict[int, ContactState] = {}
+    before = last = None
+    for index in map(int, np.argsort(wanted, kind="stable")):
+        state = model.press(
+            Control(approach=float(wanted[index]), tilt=tilt),
+            patches=patches,
+            mean_heights=mean_heights,
+            start=_extrapolated(float(wanted[index]), last, before),
+        )
+        states[index], before, last = state, last, state
+    return [states[index] for index in range(len(wanted))]
+
+
+def _extrapolated(
+    approach: float, last: ContactState | None, before: ContactState | None
+) -> Start | None:
+    """Return what to start from at an approach, by the last two solutions."""
+    if last is None or before is None or not last.approach > before.approach:
+        return None if last is None else last.guess
+    ahead = (approach - last.approach) / (last.approach - before.approach)
+    own = last.guess.values
+    return replace(last.guess, values=np.maximum(own + ahead * (own - before.guess.values), 0.0))
 
 
 def checked_patches(
@@ -304,26 +171,18 @@ def checked_patches(
         InputError: When there is not one finite number for every patch, or only asperities are
             known and the patches have no mean heights.
     """
-    given, patches = patches, whole_patch(rough) if patches is None else patches
+    whole = patches is None
+    patches = PatchGrid(grid=(1, 1), lengths=rough.lengths) if patches is None else patches
     if mean_heights is None and isinstance(rough, Surface):
         return patches, patch_means(rough, patches)
-    if mean_heights is None and given is not None:
+    if mean_heights is None and not whole:
         raise InputError(
             "asperities do not know the mean heights of patches",
             allowed="mean_heights, or no patches",
         )
     mean_heights = [rough.mean_height] if mean_heights is None else mean_heights
-    allowed = f"shape ({patches.count},)"
-    means = _numbers(mean_heights, "the mean heights are no numbers", allowed)
-    if means.shape != (patches.count,):
-        raise InputError("every patch needs one mean height", value=means.shape, allowed=allowed)
-    if not np.isfinite(means).all():
-        raise InputError("a mean height is not finite", value=means.tolist(), allowed="mm")
+    means = real_array(mean_heights)
+    if means.shape != (patches.count,) or not np.isfinite(means).all():
+        problem, allowed = "every patch needs one finite mean height", f"{patches.count}, in mm"
+        raise InputError(problem, value=means.tolist(), allowed=allowed)
     return patches, means
-
-
-def _numbers(values: ArrayLike, problem: str, allowed: str) -> Array:
-    try:
-        return np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(problem, value=values, allowed=allowed) from None

@@ -29,7 +29,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from geometry import Control
-from micro import BodyModes, HalfSpaceModel, HalfSpaceState
+from micro import BodyModes, ContactState, HalfSpaceModel
 from multiscale.bodies.on_body import SLOPES, OnBody
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -133,7 +133,7 @@ class ErrorProbe:
         parts = {}
         if self.by_laws:
             free = Control(approach=approach, tilt=None if turns else tilt)
-            found = self.on_body(self.model, self.order).equilibrium(free)
+            found = self.on_body(self.model, self.order).press(free)
             parts["laws"] = abs(force - found.force)
             force, tilt = found.force, found.plane.tilt
         problems = _Problems(self, Control(approach=approach, tilt=tilt))
@@ -152,7 +152,7 @@ class _Problems:
         self._probe, self._control = probe, control
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
-        self._states: dict[tuple[tuple[int, int], int], HalfSpaceState] = {}
+        self._states: dict[tuple[tuple[int, int], int], ContactState] = {}
         # under small loads coarse cells may not touch, and would show no error
         self._others = self._half if self._force(self._half, 0) > 0.0 else self._grid
 
@@ -162,11 +162,11 @@ class _Problems:
         if not isinstance(model.body, BodyModes):
             return {}
         fewer = model.body.fewer(math.ceil(_FEWER_MODES * model.body.count))
-        found = replace(model, body=fewer).equilibrium(self._control, start=known)
+        found = replace(model, body=fewer).press(self._control, start=known.guess)
         error = abs(found.force - known.force)
         coarser = model.body.coarser()
         if coarser is not None:
-            found = replace(model, body=coarser).equilibrium(self._control, start=known)
+            found = replace(model, body=coarser).press(self._control, start=known.guess)
             error += _LINEAR * abs(found.force - known.force)
         return {"body": error}
 
@@ -180,7 +180,7 @@ class _Problems:
             return 0.0
         known, approach = self._state(self._others, 0), self._control.approach or 0.0
         nearer = replace(self._control, approach=approach + zero)
-        found = self._model(self._others, 0).equilibrium(nearer, start=known)
+        found = self._model(self._others, 0).press(nearer, start=known.guess)
         return max(found.force - known.force, 0.0)
 
     def slopes_error(self) -> float:
@@ -195,15 +195,15 @@ class _Problems:
         known, flat = self._state(self._others, SLOPES), self._model(self._others, 0)
         if not known.force:
             return 0.0
-        assert model.slopes is not None
+        missing = sum(each.error(known.pressures) for each in model.slopes)
         # to first order forces change as the elastic energy, ½ ∫ p u dA
-        error = known.force * model.slopes.error(known.pressure) / (2.0 * known.elastic_energy)
+        error = known.force * missing / (2.0 * known.elastic_energy)
         if not self._probe.order:
             return error + abs(known.force - self._force(self._others, 0))
         if model.body is None:
             return error
-        alone = replace(flat, slopes=model.slopes.on_half_space())
-        found = alone.equilibrium(self._control, start=known)
+        alone = replace(flat, slopes=tuple(each.on_half_space() for each in model.slopes))
+        found = alone.press(self._control, start=known.guess)
         return error + _ON_BODY * abs(known.force - found.force)
 
     def grid_error(self, force: float, others: float) -> float:
@@ -233,12 +233,12 @@ class _Problems:
     def _force(self, grid: tuple[int, int], order: int) -> float:
         return self._state(grid, order).force
 
-    def _state(self, grid: tuple[int, int], order: int) -> HalfSpaceState:
+    def _state(self, grid: tuple[int, int], order: int) -> ContactState:
         """Return the solution on a grid with finite slopes up to an order."""
         if (grid, order) not in self._states:
             known = [state for (cells, _), state in self._states.items() if cells == grid]
-            start = known[-1] if known else None
-            found = self._model(grid, order).equilibrium(self._control, start=start)
+            start = known[-1].guess if known else None
+            found = self._model(grid, order).press(self._control, start=start)
             self._states[grid, order] = found
         return self._states[grid, order]
 

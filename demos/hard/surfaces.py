@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from hard.bench import CELLS, case, lawless, of_heights, off, solved
 
-from geometry import Asperities, Material
+from geometry import Asperities, Control, Material
 from micro import AsperityModel
 
 x = (np.arange(CELLS) + 0.5) / CELLS - 0.5
@@ -82,7 +82,9 @@ def summits(ratio: float, place: list[float], lower: float = 0.0) -> Asperities:
 
 def pressed(approach: float, *given: Any) -> Any:
     """Press summits that interact."""
-    return AsperityModel("elliptic", summits(*given), contact_modulus=4000.0).solve(approach)
+    return AsperityModel("elliptic", summits(*given), contact_modulus=4000.0).press(
+        Control(approach=approach)
+    )
 
 
 @case(4, "merging summits: 0.04 mm apart, pressed 0.02 mm", "residual of gaps and forces", 1e-10)
@@ -94,7 +96,7 @@ def merging() -> tuple[Any, ...]:
 @case(4, "a summit 1e-9 mm off and 1e-9 mm lower, overlapping", "both carry what one does", 1e-6)
 def twin_beside_a_summit() -> tuple[Any, ...]:
     pair, one = pressed(0.02, 1.0, [0.5, 0.5 + 1e-9], 1e-9), pressed(0.02, 1.0, [0.5])
-    return off(pair.contacts.force.sum(), one.contacts.force[0]), pair
+    return off(pair.force, one.force), pair
 
 
 @case(5, "principal radii in a ratio of 10⁶, e → 1", "Hertz' asymptote", 1e-5)
@@ -106,13 +108,13 @@ def needle() -> tuple[Any, ...]:
         beta = 1e-6 / (np.log(4 / np.sqrt(beta)) - 1.0)
     log = np.log(4 / np.sqrt(beta))
     limit = np.pi / np.sqrt(2) * ((log - 1.0) / beta) ** 0.25 * log**-1.5
-    return off(needle.contacts.force[0], limit * ball.contacts.force[0]), needle
+    return off(needle.force, limit * ball.force), needle
 
 
 @case(5, "principal radii in a ratio of 1 + 10⁻⁹, e → 0", "as the circle", 1e-9)
 def nearly_round() -> tuple[Any, ...]:
     oval, ball = (pressed(1e-3, ratio, [0.5]) for ratio in (1.0 + 1e-9, 1.0))
-    return off(oval.contacts.force[0], ball.contacts.force[0]), oval
+    return off(oval.force, ball.force), oval
 
 
 def couplings_agree(heights: Any) -> tuple[Any, ...]:
@@ -152,4 +154,4 @@ def wide_patch() -> tuple[Any, ...]:
 @case(19, "summits 1e-13 mm apart: a singular matrix", "both carry what one does", 1e-6)
 def coincident() -> tuple[Any, ...]:
     pair, one = pressed(0.02, 1.0, [0.5, 0.5 + 1e-13]), pressed(0.02, 1.0, [0.5])
-    return off(pair.contacts.force.sum(), one.contacts.force[0]), pair
+    return off(pair.force, one.force), pair

@@ -2,35 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from matplotlib.figure import Figure
 
-from micro.model import Response
+from micro import ContactState, stacked
 from multiscale.figures.style import FULL_WIDTH, MODELS, add_legend, new_figure, styled
 
 
 @styled()
-def models_figure(responses: Mapping[str, Response], *, rms_slope: float) -> Figure:
+def models_figure(
+    curves: Mapping[str, Sequence[ContactState]], *, rms_slope: float, contact_modulus: float
+) -> Figure:
     """Draw the four panels of Waddad et al. 2016, Fig. 7, for several micro models.
 
     Args:
-        responses: Response of each micro model by its name.
+        curves: States of each micro model at rising approaches, by its name.
         rms_slope: rms gradient of the surface, which scales κ.
+        contact_modulus: E* [MPa], likewise.
     """
     figure = new_figure(FULL_WIDTH, 5.4)
     (motion, separation), (area, kappa) = figure.subplots(2, 2)
-    for name, response in responses.items():
+    for name, states in curves.items():
         look = {
             "ls": MODELS[name]["ls"],
             "color": MODELS[name]["color"],
             "label": name.replace("-independent", ", no interaction"),
         }
-        pressure, fraction = response.mean_pressure, 100 * response.contact_area_fraction
-        motion.plot(1e3 * response.approach, pressure, **look)
-        separation.plot(1e3 * response.mean_separation, pressure, **look)
+        pressure = stacked(states, "mean_pressure")
+        fraction = 100 * stacked(states, "contact_area_fraction")
+        motion.plot(1e3 * stacked(states, "approach"), pressure, **look)
+        separation.plot(1e3 * stacked(states, "mean_separation"), pressure, **look)
         area.plot(pressure, fraction, **look)
-        kappa.plot(fraction, response.kappa(rms_slope), **look)
+        values = [state.kappa(rms_slope, contact_modulus) for state in states]
+        kappa.plot(fraction, values, **look)
     motion.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]", title="(i)")
     separation.set(xlabel="mean separation [µm]", ylabel="mean pressure [MPa]", title="(ii)")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]", title="(iii)")

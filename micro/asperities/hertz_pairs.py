@@ -27,18 +27,14 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import elliprf
 
-from geometry import Partition
-from geometry.legendre_modes import mode_values
-from micro.asperities.contact_problem import InteractionDisplacement
+from micro.asperities.patch_sums import EllipticContacts
+from micro.asperities.summit_problem import InteractionDisplacement
+from micro.boundary_elements.body_modes import BodyPoints
 from micro.closed_forms.hertz import ShapeFactors
 from micro.closed_forms.hertz_field import circular_field, elliptic_field
-from micro.compliance.body_modes import BodyModes
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 """Largest relative stiffness c* of one contact at another's summit."""
@@ -46,70 +42,9 @@ MERGING_SLOPE = 2.0 ** (2.0 / 3.0) - 1.0
 SINE_MERGED = float(np.sin(0.5 * np.pi * MERGING_SLOPE))
 """a/r of a circular contact whose slope at distance r is c*."""
 
-_NEWTON_STEPS = 30
-
 _PAIRS_AT_ONCE = 2**16
 """Pairs whose fields are evaluated at once. 2,000 elliptic contacts took 141 ms of one core in such
 blocks and 283 ms in one piece, whose arrays leave the cache."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BodyPoints:
-    """Compliance of a body between n points of its contact face.
-
-    Args:
-        body: The compliance in modes.
-        values: Modes at the points, shape (K², n).
-    """
-
-    body: BodyModes
-    values: Array
-
-    @classmethod
-    def at(cls, body: BodyModes, x: Array, y: Array) -> Self:
-        """Evaluate the modes at points.
-
-        Args:
-            body: The compliance in modes.
-            x: Abscissae, shape (n,) [mm].
-            y: Ordinates, shape (n,) [mm].
-        """
-        along_x, along_y = (
-            mode_values(place - corner, length, body.count)
-            for place, corner, length in zip((x, y), body.origin, body.lengths, strict=True)
-        )
-        return cls(body=body, values=(along_x[:, None] * along_y).reshape(len(body.matrix), -1))
-
-    def among(self, index: Indices) -> Self:
-        """Return the compliance between some of the points."""
-        return replace(self, values=self.values[:, index])
-
-    def displacement(self, force: Array) -> Array:
-        """Return the displacements of the points by forces on them, shape (n,) [mm].
-
-        Args:
-            force: Forces, shape (n,) [N].
-        """
-        return np.asarray(self.values.T @ (self.body.matrix @ (self.values @ force)))
-
-    def by(self, loaded: BodyPoints) -> Array:
-        """Return the displacements of the points by unit forces on m others, (n, m) [mm/N].
-
-        Args:
-            loaded: The points that the forces act on, on the same body.
-        """
-        return np.asarray(self.values.T @ (self.body.matrix @ loaded.values))
-
-    def patch_means(self, patches: Partition, force: Array) -> Array:
-        """Return the mean displacements of patches, shape (N,) [mm].
-
-        Args:
-            patches: N patches within the face.
-            force: Forces on the points, shape (n,) [N].
-        """
-        cells = self.body.on(patches.borders_x, patches.borders_y)
-        amplitudes = (self.body.matrix @ (self.values @ force)).reshape(self.body.count, -1)
-        return np.asarray((cells.means_x.T @ amplitudes @ cells.means_y).ravel())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,6 +84,22 @@ class HertzPairs:
     def v_merged(self) -> Array:
         """Confocal parameters v* at which the slope is c*, shape (n,)."""
         return merging_parameter(self.shape.axis_ratio_squared, self.shape.integral)
+
+    @property
+    def interact(self) -> bool:
+        """Whether contacts displace each other's summits, through the half-space or a body."""
+        return self.half_space or self.body is not None
+
+    def ellipses(self, indentation: Array) -> EllipticContacts:
+        """Return the n contacts with given indentations t ≥ 0, shape (n,) [mm]."""
+        major = np.sqrt(self.size * indentation)
+        return EllipticContacts(
+            x=self.x,
+            y=self.y,
+            angle=self.angle,
+            semi_axes=np.stack([major, major * self.shape.axis_ratio], axis=1),
+            force=self.force(indentation),
+        )
 
     def subset(self, index: Indices) -> Self:
         """Return the interaction among some of the asperities."""
@@ -226,7 +177,7 @@ def merging_parameter(beta: Array, integral: Array) -> Array:
         integral: K(e), shape (n,).
     """
     v = beta**MERGING_SLOPE / np.tan(0.5 * np.pi * MERGING_SLOPE) ** 2
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(30):
         excess = elliprf(1.0 + v, beta + v, v) - MERGING_SLOPE * integral
         step = 2.0 * excess * np.sqrt((1.0 + v) * (beta + v) / v)
         v = v * np.exp(np.clip(step, -2.0, 2.0))

@@ -9,26 +9,41 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple, Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import Asperities, Control, Partition, PatchGrid
-from geometry.rigid_plane import RigidPlane, normal_stiffness
-from micro.asperities.contacts import SOLVERS, AsperityContacts, Equilibrium, ModelKind
-from micro.asperities.hertz_pairs import BodyPoints
-from micro.asperities.patch_sums import EllipticContacts, patch_displacements, patch_loads
-from micro.closed_forms.hertz import checked_modulus
-from micro.compliance.body_modes import BodyModes
-from micro.contact_detail import ContactDetail
-from micro.model import Pressed, Response, Stiffness, checked_approaches, checked_patches
+from geometry.contact_state import ContactState, Spots, Start
+from geometry.plane_equilibrium import PlaneResponse
+from geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
+from micro.asperities.contacts import SOLVERS, plane_stiffness, solve_summits
+from micro.asperities.hertz_pairs import HertzPairs
+from micro.asperities.patch_sums import patch_displacements, patch_loads
+from micro.asperities.plane_on_peaks import Peaks
+from micro.asperities.summit_problem import Solution
+from micro.boundary_elements.body_modes import BodyModes, BodyPoints
+from micro.closed_forms.hertz import checked_modulus, shape_factors
+from micro.model import Stiffness, checked_patches
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 LARGEST_AREA_FRACTION = 0.1
 """Contact area fraction up to which summits count as separate; errors may be large before."""
+
+
+class ModelKind(NamedTuple):
+    """What distinguishes the four models.
+
+    Attributes:
+        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
+        interacting: Whether contacts displace each other's summits through the half-space.
+    """
+
+    elliptic: bool
+    interacting: bool
+
 
 MODELS: Mapping[str, ModelKind] = MappingProxyType(
     {
@@ -41,54 +56,6 @@ MODELS: Mapping[str, ModelKind] = MappingProxyType(
 """The models (1) to (4) of Waddad et al. 2016, section 2.2, by name."""
 
 
-class ContactState(NamedTuple):
-    """Contacts in equilibrium with a plane.
-
-    Attributes:
-        start: The solution, which one for a load step nearby may start from.
-        contacts: The n contacts that there may be; those without force do not touch.
-    """
-
-    start: Equilibrium
-    contacts: EllipticContacts
-
-    @property
-    def plane(self) -> RigidPlane:
-        """The plane."""
-        return self.start.plane
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of the solver."""
-        return self.start.solution.iterations
-
-    @property
-    def residual(self) -> float:
-        """Complementarity error relative to the largest interference."""
-        return self.start.solution.residual
-
-    @property
-    def touching(self) -> EllipticContacts:
-        """The contacts that carry force."""
-        return self.contacts.subset(np.flatnonzero(self.contacts.force > 0.0))
-
-    @property
-    def peak_pressure(self) -> float:
-        """Largest pressure of a contact [MPa]."""
-        return float(self.detail.peak_pressure.max(initial=0.0))
-
-    @property
-    def detail(self) -> ContactDetail:
-        """The contacts as spots, with Hertz's pressures; fields are not known."""
-        spots = self.touching
-        return ContactDetail(
-            place=spots.position,
-            area=spots.area,
-            force=spots.force,
-            peak_pressure=1.5 * spots.force / spots.area,
-        )
-
-
 @dataclass(frozen=True, eq=False)
 class AsperityModel:
     """One of the four asperity models: a rigid plane touches given summits in separate ellipses.
@@ -98,8 +65,9 @@ class AsperityModel:
         asperities: The n summits, with the highest point z_M that the approach counts from.
         contact_modulus: E* [MPa].
         solver: Solver of the models with interaction, a name in `SOLVERS`.
-        body: What a finite body with its sides adds to the half-space, between all contacts; a
-            half-space when not given.
+        body: What a finite body with its sides adds to the half-space, between all contacts, also
+            those of the models without interaction; a half-space when not given. On thin blocks it
+            takes away from the interaction: models without any may then have no solution.
 
     Raises:
         InputError: When a name is unknown or the modulus not positive.
@@ -135,14 +103,20 @@ class AsperityModel:
         return float(self.reference_height - self.asperities.z.max(initial=-np.inf))
 
     @cached_property
-    def contacts(self) -> AsperityContacts:
-        """The contacts of the asperities."""
-        return AsperityContacts(
-            asperities=self.asperities,
+    def pairs(self) -> HertzPairs:
+        """The contacts of the asperities, and how they displace each other's summits."""
+        a, (elliptic, interacting) = self.asperities, MODELS[self.kind]
+        radii = (a.radius_major, a.radius_minor) if elliptic else (a.radius, a.radius)
+        return HertzPairs(
+            x=a.x,
+            y=a.y,
+            angle=a.angle,
+            radius=a.radius,
+            shape=shape_factors(*radii),
+            circular=not elliptic,
+            half_space=interacting,
+            body=None if self.body is None else BodyPoints.at(self.body, a.x, a.y),
             contact_modulus=self.contact_modulus,
-            kind=MODELS[self.kind],
-            solver=self.solver,
-            body=self.body,
         )
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
@@ -151,132 +125,116 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
-    def equilibrium(self, control: Control, start: Equilibrium | None = None) -> ContactState:
-        """Solve for the contacts, and the motions of the plane that are free.
-
-        Args:
-            control: What is prescribed of the plane.
-            start: `ContactState.start` of a solution nearby; without it the solution starts from
-                no contact.
-
-        Raises:
-            InputError: When the start does not fit, or the interaction of all contacts does not
-                fit into the memory.
-            NotConverged: When the contact conditions cannot be met, or no plane is in equilibrium.
-        """
-        found = self.contacts.equilibrium(control, start)
-        return ContactState(found, self.contacts.ellipses(found.solution.indentation))
-
-    def solve(
-        self,
-        approach: float,
-        *,
-        tilt: tuple[float, float] = (0.0, 0.0),
-        start: Equilibrium | None = None,
-    ) -> ContactState:
-        """Solve for the contacts at one approach of the plane; see `equilibrium`.
-
-        Args:
-            approach: Rigid approach δ at the centre of the rectangle [mm].
-            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
-            start: `ContactState.start` of a solution nearby.
-        """
-        return self.equilibrium(Control(approach=approach, tilt=tilt), start)
-
-    def respond(
-        self,
-        approaches: ArrayLike,
-        *,
-        patches: Partition | None = None,
-        mean_heights: ArrayLike | None = None,
-        tilt: tuple[float, float] = (0.0, 0.0),
-    ) -> Response:
-        """Solve along approaches, each from the solutions before it; see `MicroModel.respond`."""
-        patches, means = checked_patches(self.asperities, patches, mean_heights)
-        given = checked_approaches(approaches)
-        rows: list[dict[str, Any]] = [{}] * len(given)
-        last = before = None
-        for index in np.argsort(given, kind="stable"):
-            state = self.solve(float(given[index]), tilt=tilt, start=_extrapolated(last, before))
-            last, before = state.start, last
-            rows[index] = self._row(state, patches, means)
-        return Response.of(rows, self.name, self.contact_modulus, patches)
-
     def press(
         self,
         control: Control,
         *,
         patches: Partition | None = None,
         mean_heights: ArrayLike | None = None,
-        start: Equilibrium | None = None,
-    ) -> Pressed:
-        """Solve one load step; see `MicroModel.press`."""
-        patches, means = checked_patches(self.asperities, patches, mean_heights)
-        state = self.equilibrium(control, start)
-        rows = [self._row(state, patches, means)]
-        response = Response.of(rows, self.name, self.contact_modulus, patches)
-        return Pressed(response, state.plane, state.start, state)
-
-    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
-        indentation = state.start.solution.indentation
-        return Stiffness(normal_stiffness(self.contacts.tangent(indentation), turns=turns), 1)
-
-    def _row(self, state: ContactState, patches: Partition, mean_heights: Array) -> dict[str, Any]:
-        """Return the fields of a response for one plane.
+        start: Start | None = None,
+    ) -> ContactState:
+        """Solve the contacts and the free motions of the plane; see `MicroModel.press`.
 
         By `patch_loads` a contact that straddles borders is shared among patches. As a contact it
         counts for the patch that holds its summit. The paper assigns it whole.
+
+        Raises:
+            InputError: Also when the interaction of all contacts does not fit into the memory.
         """
-        plane, solution, contacts = state.plane, state.start.solution, state.touching
-        force, area = contacts.force, contacts.area.sum()
+        patches, means = checked_patches(self.asperities, patches, mean_heights)
+        plane, solution = self._equilibrium(control, start)
+        touching = np.flatnonzero(solution.indentation > 0.0)
+        contacts = self.pairs.subset(touching).ellipses(solution.indentation[touching])
+        force, area = float(contacts.force.sum()), float(contacts.area.sum())
         displacement = patch_displacements(patches, contacts, self.contact_modulus)
         if self.body is not None:
             points = BodyPoints.at(self.body, contacts.x, contacts.y)
-            displacement = displacement + points.patch_means(patches, force)
-        below = self.reference_height - plane.means(patches)
-        separation = below - mean_heights + displacement
+            displacement = displacement + points.patch_means(patches, contacts.force)
+        separation = self.reference_height - plane.means(patches) - means + displacement
         patch_force, patch_area = patch_loads(patches, contacts)
-        owner = patches.index_of(contacts.x, contacts.y)
-        return {
-            "approach": plane.approach,
-            "force": force.sum(),
-            "moment": plane.moment(contacts.x, contacts.y, force),
-            "contact_area": area,
-            "contacts": len(force),
-            "mean_separation": np.average(separation, weights=patches.areas),
-            "iterations": solution.iterations,
-            "residual": solution.residual,
-            "overlapping_contacts": solution.overlapping_contacts,
-            "patch_force": patch_force,
-            "patch_contact_area": patch_area,
-            "patch_contacts": np.bincount(owner, minlength=patches.count),
-            "patch_displacement": displacement,
-            "patch_separation": separation,
-            "warning": self._warning(state, len(force), float(area / np.prod(patches.sides))),
-        }
+        spots = Spots(
+            place=contacts.position,
+            area=contacts.area,
+            force=contacts.force,
+            peak_pressure=1.5 * contacts.force / contacts.area,
+        )
+        state = ContactState(
+            plane=plane,
+            patches=patches,
+            force=force,
+            moment=plane.moment(contacts.x, contacts.y, contacts.force),
+            contact_area=area,
+            contacts=len(spots),
+            peak_pressure=float(spots.peak_pressure.max(initial=0.0)),
+            mean_separation=float(np.average(separation, weights=patches.areas)),
+            iterations=solution.iterations,
+            residual=solution.residual,
+            overlapping_contacts=solution.overlapping_contacts,
+            patch_force=patch_force,
+            patch_area=patch_area,
+            patch_contacts=spots.per_patch(patches),
+            patch_displacement=displacement,
+            patch_separation=separation,
+            spots=spots,
+            indentation=solution.indentation,
+        )
+        return replace(state, warning=self._warning(state))
 
-    def _warning(self, state: ContactState, contacts: int, area_fraction: float) -> str:
+    def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
+        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
+        tangent = plane_stiffness(self.pairs, state.guess.values, self._peaks.modes.matrix)
+        return Stiffness(normal_stiffness(tangent, turns=turns), 1)
+
+    @property
+    def _peaks(self) -> Peaks:
+        """The summits under the plane; not cached, because models are sent between processes."""
+        a = self.asperities
+        modes = PlaneLevers.at(a.x, a.y, a.lengths)
+        return Peaks(modes=modes, depth=a.highest - a.z, force=self.pairs.force(np.ones(len(a))))
+
+    def _equilibrium(self, control: Control, start: Start | None) -> tuple[RigidPlane, Solution]:
+        """Solve the contacts, and the motions of the plane that are free."""
+        asperities, pairs = self.asperities, self.pairs
+        own = np.zeros(len(asperities)) if start is None else start.values
+        if own.shape != (len(asperities),):
+            raise InputError(
+                "the solution to start from is of other asperities",
+                value=own.shape,
+                allowed=f"({len(asperities)},)",
+            )
+        if control.approach is not None and control.tilt is not None:
+            plane = RigidPlane.above(asperities, control.approach, control.tilt)
+            return plane, solve_summits(pairs, asperities.interference(plane), own, self.solver)
+        useful = start is not None and (own.any() or control.force == 0.0)
+        peaks, spent = self._peaks, 0
+
+        def respond(motion: Array) -> PlaneResponse[Solution]:
+            nonlocal own, spent
+            interference = asperities.interference(RigidPlane.moved(asperities, motion))
+            solution = solve_summits(pairs, interference, own, self.solver)
+            own, spent = solution.indentation, spent + solution.iterations
+            return PlaneResponse(
+                loads=peaks.modes.loads(pairs.force(own)),
+                stiffness=lambda: plane_stiffness(pairs, solution.indentation, peaks.modes.matrix),
+                state=solution._replace(iterations=spent),
+            )
+
+        near = start.plane if start is not None and useful else None
+        motion, solution = peaks.equilibrium(respond, control, near)
+        return RigidPlane.moved(asperities, motion), solution
+
+    def _warning(self, state: ContactState) -> str:
         """Return why contacts are too large to count as separate; empty while they are not."""
         # A single contact, in a small patch say, is Hertz's at any area.
-        single = contacts + state.start.solution.overlapping_contacts <= 1
-        if area_fraction <= LARGEST_AREA_FRACTION or single:
+        single = state.contacts + state.overlapping_contacts <= 1
+        fraction = state.contact_area_fraction
+        if fraction <= LARGEST_AREA_FRACTION or single:
             return ""
         return (
-            f"at an approach of {state.plane.approach:.4g} mm the contacts cover"
-            f" {area_fraction:.1%} of the surface: the model {self.name} of separate summits stands"
-            f" for up to {LARGEST_AREA_FRACTION:.0%}"
+            f"at an approach of {state.approach:.4g} mm the contacts cover {fraction:.1%} of the"
+            f" surface: the model {self.name} of separate summits stands for up to"
+            f" {LARGEST_AREA_FRACTION:.0%}"
         )
-
-
-def _extrapolated(last: Equilibrium | None, before: Equilibrium | None) -> Equilibrium | None:
-    """Return what to start from; with equal steps it is right to second order."""
-    if last is None:
-        return None
-    own = last.solution.indentation
-    gained = own if before is None else own - before.solution.indentation
-    ahead = np.maximum(own + gained, 0.0)
-    return last._replace(solution=last.solution._replace(indentation=ahead))
 
 
 def _checked_name(name: str, table: Collection[str], what: str) -> None:

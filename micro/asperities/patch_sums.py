@@ -23,18 +23,15 @@ Theory: docs/theory.md, section 8.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_jacobi
 
 from geometry import Partition
 from micro.closed_forms.love import corner_integral
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 _RADII, _RADIUS_WEIGHTS = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
 _ANGLES = 16
@@ -72,12 +69,6 @@ class EllipticContacts:
         """Centres (x, y), shape (m, 2) [mm]."""
         return np.stack([self.x, self.y], axis=1)
 
-    def subset(self, index: Indices) -> EllipticContacts:
-        """Return some of the contacts."""
-        return EllipticContacts(
-            **{item.name: getattr(self, item.name)[index] for item in fields(self)}
-        )
-
 
 class Shares(NamedTuple):
     """Sparse table: contact k has a share of its force and of its area in a patch.
@@ -102,10 +93,10 @@ def patch_loads(patches: Partition, contacts: EllipticContacts) -> tuple[Array, 
         patches: The N patches.
         contacts: The m contacts.
     """
-    found = shares(patches, contacts)
-    force = found.force * contacts.force[found.contact]
-    area = found.area * contacts.area[found.contact]
-    sums = [np.bincount(found.patch, part, patches.count) for part in (force, area)]
+    parts = shares(patches, contacts)
+    force = parts.force * contacts.force[parts.contact]
+    area = parts.area * contacts.area[parts.contact]
+    sums = [np.bincount(parts.patch, part, patches.count) for part in (force, area)]
     return np.asarray(sums[0], float), np.asarray(sums[1], float)
 
 

@@ -1,8 +1,7 @@
-"""A rigid plane on few contacts: where its search for equilibrium starts, and their stiffness.
+"""A rigid plane on few contacts: where its search for equilibrium starts.
 
-The equilibrium itself is found by `geometry.plane_equilibrium`. Contacts of asperities are few, so
-that their stiffness can be formed, and cheap alone, so that contacts that do not see each other
-give a start close to the solution.
+The equilibrium itself is found by `geometry.plane_equilibrium`. Contacts of asperities are few and
+cheap alone, so that contacts that do not displace each other give a start close to the solution.
 """
 
 from __future__ import annotations
@@ -12,68 +11,72 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq, linprog
 
 from geometry import Control
 from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
 from geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
-TOLERANCE = 1e-9
+_TOLERANCE = 1e-9
 """What force and moments may miss, relative to the force and to that times half the diagonal; the
 contact conditions themselves are met to 1e-10."""
-
-_LEVEL = (0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Peaks:
-    """Points that a rigid plane can touch, with forces that do not see each other.
+    """Points that a rigid plane can touch, each by Hertz's law, without displacing the others.
 
     Args:
-        levers: Levers of the n points.
+        modes: Rigid-body modes of the plane at the n points.
         depth: Depths below the height that approaches count from, shape (n,) [mm].
-        force: Returns the force of a plane that penetrates the points by (n,) mm [N].
+        force: Forces of the points alone, indented by 1 mm, shape (n,) [N].
     """
 
-    levers: PlaneLevers
+    modes: PlaneLevers
     depth: Array
-    force: Callable[[Array], float]
+    force: Array
 
-    @property
-    def lever(self) -> Array:
-        """1 and the distances along x and y from the centre, shape (n, 3) [1, mm, mm]."""
-        return self.levers.matrix
-
-    def first_touch(self, tilt: tuple[float, float]) -> float:
-        """Return the approach at which a plane of given slopes touches first [mm]."""
-        return self.levers.first_touch(self.depth, tilt)
-
-    def first_plane(self, control: Control, near: RigidPlane | None) -> Array:
-        """Return a plane to start from: one near, or one that suits contacts that stand alone.
+    def equilibrium(
+        self,
+        respond: Callable[[Array], PlaneResponse[T]],
+        control: Control,
+        near: RigidPlane | None = None,
+    ) -> tuple[Array, T]:
+        """Find the plane in equilibrium with contacts on these points.
 
         Args:
+            respond: Returns what the contacts do to a plane (3,), and their state.
             control: What is prescribed.
             near: A plane in equilibrium nearby.
 
         Returns:
-            Approach and slopes, shape (3,).
+            The plane, shape (3,), and the state of the contacts.
 
         Raises:
-            NotConverged: When no plane can be in equilibrium.
+            NotConverged: When no plane is in equilibrium, or ``respond`` fails at first touch.
+        """
+        start = self._first_plane(control, near)
+        touch = self.modes.first_touch(self.depth, start[1:])
+        half = self.modes.half
+        return find_equilibrium(respond, control, start, half, aim=_TOLERANCE, first_touch=touch)
+
+    def _first_plane(self, control: Control, near: RigidPlane | None) -> Array:
+        """Return a plane to start from: one near, or one that suits contacts that stand alone.
+
+        It is approach and slopes, shape (3,).
         """
         tilt = control.tilt
         if tilt is None and near is not None:
             nearer = (control.approach or np.inf) >= near.approach
             tilt = near.tilt if nearer or control.force == 0.0 else None
         if tilt is None:
-            tilt = _LEVEL if control.force == 0.0 else self._resting(control)
+            tilt = (0.0, 0.0) if control.force == 0.0 else self._resting(control)
         if control.approach is not None:
             return np.array([control.approach, *tilt])
-        touch = self.first_touch(tilt)
+        touch = self.modes.first_touch(self.depth, tilt)
         if not np.isfinite(touch):
             raise plane_failure(control, "NO_CONTACT")
         if near is not None and control.force and near.approach > touch:
@@ -84,13 +87,13 @@ class Peaks:
         """Return how far a plane of given slopes moves from first touch under a force [mm]."""
         if force == 0.0:
             return 0.0
-        gap = self.depth - self.lever[:, 1:] @ np.asarray(tilt)
+        gap = self.depth - self.modes.matrix[:, 1:] @ np.asarray(tilt)
         gap = gap - gap.min()
 
         def residual(depth: float) -> float:
-            return self.force(depth - gap) - force
+            return float(self.force @ np.maximum(depth - gap, 0.0) ** 1.5) - force
 
-        most = 1e-6 * self.levers.half
+        most = 1e-6 * self.modes.half
         while residual(most) < 0.0:
             most *= 4.0
         return float(brentq(residual, 0.0, most, rtol=1e-3))
@@ -102,57 +105,17 @@ class Peaks:
         linear programme. Where the approach is prescribed, it need not be much larger than that.
         """
         if not len(self.depth):
-            return _LEVEL
+            return 0.0, 0.0
         scale = float(np.ptp(self.depth)) or 1.0
         most = None if control.approach is None else control.approach / scale + 1.0
-        found = linprog(
+        programme = linprog(
             [-1.0, 0.0, 0.0],
-            A_ub=self.lever / [1.0, self.levers.half, self.levers.half],
+            A_ub=self.modes.matrix / [1.0, self.modes.half, self.modes.half],
             b_ub=self.depth / scale,
             bounds=[(None, most), (None, None), (None, None)],
             method="highs",
         )
-        if found.status != 0:  # the centre lies outside of the peaks' hull
+        if programme.status != 0:  # the centre lies outside of the peaks' hull
             raise plane_failure(control, "NO_EQUILIBRIUM")
-        slopes = found.x[1:] * (scale / self.levers.half)
+        slopes = programme.x[1:] * (scale / self.modes.half)
         return float(slopes[0]), float(slopes[1])
-
-    def equilibrium(
-        self, respond: Callable[[Array], PlaneResponse[T]], control: Control, start: Array
-    ) -> tuple[Array, T]:
-        """Find the plane in equilibrium with contacts on these points.
-
-        Args:
-            respond: Returns what the contacts do to a plane (3,), and their state.
-            control: What is prescribed.
-            start: A plane to start from, with the prescribed approach or slopes, shape (3,).
-
-        Returns:
-            The plane, shape (3,), and the state of the contacts.
-
-        Raises:
-            NotConverged: When no plane is found, or ``respond`` fails at first touch.
-        """
-        return find_equilibrium(
-            respond,
-            control,
-            start,
-            self.levers.half,
-            aim=TOLERANCE,
-            nearly=True,
-            first_touch=self.first_touch((start[1], start[2])),
-        )
-
-
-def contact_stiffness(lever: Array, rate: Array, coupling: Array) -> Array:
-    """Return the derivative of a rigid plane's loads by its motions, shape (k, k).
-
-    Args:
-        lever: Displacements of the m contacts by unit motions, shape (m, k).
-        rate: Derivatives dP/dt of the forces by the own indentations, shape (m,) [N/mm].
-        coupling: Derivatives of the displacements by all contacts' own indentations but a
-            contact's own through the half-space, shape (m, m).
-    """
-    own = np.linalg.solve(np.eye(len(rate)) + coupling, lever)
-    found = lever.T @ (rate[:, None] * own)
-    return np.asarray(0.5 * (found + found.T))

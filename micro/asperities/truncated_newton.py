@@ -15,25 +15,25 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
-from micro.asperities.contact_problem import (
+from micro.asperities.summit_problem import (
     TOLERANCE,
-    ContactProblem,
     InteractionDisplacement,
     Solution,
+    SummitProblem,
     damped_step,
+    failure,
 )
-from support.errors import NotConverged
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from support.arrays import Array, Flags
 
 _MOST_ITERATIONS = 60
 _MOST_SETS = 200
 _BLOCK_CHANGES = 5
 
+_WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
+
 
 def truncated_newton(
-    problem: ContactProblem,
+    problem: SummitProblem,
     start: Array,
     *,
     most_iterations: int = _MOST_ITERATIONS,
@@ -75,11 +75,11 @@ def truncated_newton(
             wrong[np.flatnonzero(wrong)[:-1]] = False
         contacting = contacting ^ wrong
         indentation = np.where(contacting, indentation, 0.0)
-    raise _failure("CONTACTING_SET", spent)
+    raise failure(_WHAT, "CONTACTING_SET", spent, _ELSE)
 
 
 def _minimise(
-    problem: ContactProblem, contacting: Mask, start: Array, most_iterations: int
+    problem: SummitProblem, contacting: Flags, start: Array, most_iterations: int
 ) -> tuple[Array, InteractionDisplacement, int]:
     """Bring w − d to 0 over the set of contacts; a negative t displaces no other summit."""
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale
@@ -97,7 +97,7 @@ def _minimise(
         forcing = min(0.1, float(np.linalg.norm(error)) / problem.scale)
         step[rows] = _gauss_newton_step(caused, rows, error, forcing)
         t, caused, error = damped_step(evaluate, t, step, error)
-    raise _failure("MAX_ITERATIONS", most_iterations)
+    raise failure(_WHAT, "MAX_ITERATIONS", most_iterations, _ELSE)
 
 
 def _gauss_newton_step(
@@ -107,12 +107,3 @@ def _gauss_newton_step(
     jacobian = np.eye(len(rows))
     jacobian[:, np.searchsorted(rows, caused.active)] += caused.derivative[rows]
     return lsqr(jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows))[0]
-
-
-def _failure(reason: str, iterations: int) -> NotConverged:
-    return NotConverged(
-        "the truncated Newton minimisation",
-        reason=reason,
-        iterations=iterations,
-        remedy='lower load.approach, or choose solver = "active-set"',
-    )

@@ -10,15 +10,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import elliprd, elliprf
 
 from micro.closed_forms.hertz_field import elliptic_field
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_NEWTON_STEPS = 30
 
 
 class ShapeFactors(NamedTuple):
@@ -104,7 +101,7 @@ def _axis_ratio_squared(radius_major: ArrayLike, radius_minor: ArrayLike) -> Arr
     """
     target = np.log(_radius_ratio(radius_major, radius_minor))
     log_beta = -4.0 / 3.0 * target
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(30):
         beta = np.exp(log_beta)
         ratio = elliprd(0.0, 1.0, beta) / elliprd(0.0, beta, 1.0)
         gap = 1.0 - beta

@@ -28,10 +28,9 @@ Theory: docs/theory.md, section 8.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import elliprd, elliprf
 
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 NEAREST = 30.0
 """Smallest confocal parameter v for which the series is exact to rounding."""

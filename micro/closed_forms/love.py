@@ -15,12 +15,11 @@ from itertools import product
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import toeplitz
 
 from geometry.patches import PatchGrid
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _FAR = 6.0
 """Distance over the longer side from which on Gauss' rule is the better of the two."""

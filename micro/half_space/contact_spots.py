@@ -2,72 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from geometry import Partition
-from micro.contact_detail import peaks_of
+from geometry.contact_state import Spots, peaks_of
+from support.arrays import Array
 
-Array = NDArray[np.float64]
-Labels = NDArray[np.int64]
+Labels = NDArray[np.integer]
 
 EDGE_EXCESS = (np.pi - 1.0 + np.log(2.0)) / 24.0
 """Area, in cells, by which an edge of the counted contact makes it too large on average."""
-_ROUNDING = 1e-9
-"""Of a cell: a centre that is no further beyond a border lies on it."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Contacts:
-    """The m contacts of a map, connected over the edges of its cells.
-
-    Args:
-        labels: Number 1 … m of the contact that holds each cell, 0 outside, shape (nx, ny).
-        share: Part of every cell that is in contact, corrected by the perimeter, shape (nx, ny).
-        force: Forces, shape (m,) [N].
-        area: Areas corrected by the perimeter, shape (m,) [mm²].
-        peak_pressure: Largest pressures, shape (m,) [MPa].
-        peak: Centres of the cells that carry them, shape (m, 2) [mm].
-    """
-
-    labels: Labels
-    share: Array
-    force: Array
-    area: Array
-    peak_pressure: Array
-    peak: Array
-
-    def __len__(self) -> int:
-        return len(self.force)
-
-    def per_patch(self, patches: Partition, spacing: tuple[float, float]) -> NDArray[np.int64]:
-        """Return how many contacts have their largest pressure in each patch, shape (N,).
-
-        Args:
-            patches: The N patches.
-            spacing: Sides of a cell [mm]; peaks that rounding alone puts beyond the outer borders
-                count as within.
-        """
-        x, y = patches.borders_x, patches.borders_y
-        nearest = np.clip(self.peak, (x[0], y[0]), (x[-1], y[-1]))
-        beyond = np.abs(self.peak - nearest) > _ROUNDING * np.array(spacing)
-        owner = patches.index_of(*np.where(beyond, self.peak, nearest).T)
-        return np.bincount(owner, minlength=patches.count)
-
-
-def find_contacts(
+def find_spots(
     pressure: Array,
     spacing: tuple[float, float],
     *,
     periodic: bool,
     hardness: float | None = None,
-) -> Contacts:
-    """Find the connected contacts of a map of pressures.
+) -> tuple[Spots, Array]:
+    """Find the contacts of a map of pressures, connected over the edges of its cells.
 
     Args:
         pressure: Pressures ≥ 0, shape (nx, ny) [MPa].
@@ -75,6 +32,10 @@ def find_contacts(
         periodic: Whether contacts continue over the borders.
         hardness: Largest pressure that contacts can bear [MPa]; none when not given. The load of a
             cell needs p/H of its area at least, so that cells that yield are in contact whole.
+
+    Returns:
+        The spots, their areas corrected by the perimeter; and the part of every cell that is in
+        contact, likewise, shape (nx, ny).
     """
     labels, count = ndimage.label(pressure > 0.0)
     if periodic and count:
@@ -88,14 +49,13 @@ def find_contacts(
         np.maximum(share, pressure / hardness, out=share)
     top = cells[peaks_of(which, load, count)]
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
-    return Contacts(
-        labels=labels.astype(np.int64),
-        share=share,
-        force=np.bincount(which, load, minlength=count) * cell,
+    spots = Spots(
+        place=np.multiply(middle, spacing),
         area=np.bincount(which, share.ravel()[cells], minlength=count) * cell,
+        force=np.bincount(which, load, minlength=count) * cell,
         peak_pressure=pressure.ravel()[top],
-        peak=np.multiply(middle, spacing),
     )
+    return spots, share
 
 
 def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:

@@ -17,10 +17,9 @@ Theory: docs/theory.md, section 4.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft
 
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _DECAYED = 20.0
 """q z from which on a wave is left out: 2e-9 of it are left at that depth."""
@@ -61,8 +60,8 @@ def stresses_below(
     factors[[2, 5], :, grid[1]] = 0.0
     waves = fft.fft(fft.rfft(pressure, n=padded[0], axis=0), n=padded[1], axis=1)
     waves *= np.exp(2j * np.pi * np.arange(padded[1]) * row / padded[1]) / padded[1]
-    found = np.empty((len(depths), grid[0], 3, 3))
-    for at, depth in zip(found, depths, strict=True):
+    stresses = np.empty((len(depths), grid[0], 3, 3))
+    for at, depth in zip(stresses, depths, strict=True):
         kept = slice(np.searchsorted(kx[:, 0] * depth, _DECAYED, side="right"))
         decayed = waves[kept] * np.exp(-q[kept] * depth)
         # sums over ky of the pressures by the products of directions, alone and times q z
@@ -79,4 +78,4 @@ def stresses_below(
         }
         for (i, j), line in parts.items():
             at[:, i, j] = at[:, j, i] = fft.irfft(line, n=padded[0])[: grid[0]]
-    return found
+    return stresses

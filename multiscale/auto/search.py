@@ -173,7 +173,7 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
     worst: Errors = {"grid": 0.0}
     model = probe.on_body(probe.model, probe.order)
     for value in sorted({load_history.largest, load_history.points[-1]}):
-        state = model.equilibrium(load_history.control(value))
+        state = model.press(load_history.control(value))
         if not state.force > 0.0:
             continue
         measured = probe.measure(state.force, state.plane.approach, state.plane.tilt)

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from geometry import MaterialPair, Surface
-from micro import FiniteSlopes, HalfSpaceModel, SlopesOfBodies
+from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import Bodies
 
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
@@ -62,14 +62,13 @@ def on_body(bodies: Bodies | None, materials: MaterialPair, counter: Surface | N
         slopes = FiniteSlopes(
             surface,
             materials.first,
-            order=order,
             periodic=model.periodic,
             plane=plane,
             edge_stresses=stresses,
         )
         if above is None or materials.second is None:
-            return replace(model, slopes=slopes)
-        others = FiniteSlopes(above, materials.second, order=order, periodic=model.periodic)
-        return replace(model, slopes=SlopesOfBodies((slopes, others)))
+            return replace(model, slopes=(slopes,))
+        others = FiniteSlopes(above, materials.second, periodic=model.periodic)
+        return replace(model, slopes=(slopes, others))
 
     return put

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from micro.contact_detail import ContactDetail
+from geometry.contact_state import ContactState
 from micro.model import Stiffness
 from multiscale.couplings.contact_solver import ContactSolver
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -76,7 +76,7 @@ class ConcurrentCoupling(MicroCoupling):
         """Return the contact at the latest load step, on rank 0 alone."""
         return self._solver.latest
 
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail] | None:
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState] | None:
         """Return the spots and fields of the contact of a load step."""
         return step, self._solver.detail(state)
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
-from micro import HalfSpaceModel, HalfSpaceState, MicroModel
-from micro.contact_detail import ContactDetail
-from micro.model import SolvedContact, Stiffness
+from geometry.contact_state import ContactState, Start
+from micro import HalfSpaceModel, MicroModel, Stiffness
 from multiscale.loading.load_step import LoadStep
 from support.collective import on_root, on_root_alone
 
@@ -38,30 +37,30 @@ class ContactSolver:
     ) -> None:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
         self._comm = comm
-        self._start: Any = None
+        self._start: Start | None = None
         self._turns = False
-        self.latest: SolvedContact | None = None
+        self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `Solver.press`."""
 
         def solve() -> LoadStep:
-            response, plane, self._start, self.latest = self._model.press(
+            state = self._model.press(
                 control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
             )
-            self._turns = control.tilt is None
+            self.latest, self._start, self._turns = state, state.start, control.tilt is None
             return LoadStep.of_patches(
                 self._patches,
-                plane=(plane.approach, *plane.tilt),
-                load=(response.force[0], *response.moment[0]),
-                closure=plane.means(self._patches) - response.patch_displacement[0],
-                pressure=response.patch_force[0] / self._patches.area,
-                area_fraction=response.patch_contact_area[0] / self._patches.area,
-                separation=response.mean_separation,
-                contacts=response.contacts,
-                newton_iterations=int(response.iterations[0]),
-                warnings=response.warnings,
-                peak_pressure_MPa=self.latest.peak_pressure,
+                plane=(state.approach, *state.tilt),
+                load=(state.force, *state.moment),
+                closure=state.patch_closure,
+                pressure=state.patch_force / self._patches.area,
+                area_fraction=state.patch_area / self._patches.area,
+                separation=state.mean_separation,
+                contacts=state.contacts,
+                newton_iterations=state.iterations,
+                warnings=(state.warning,) if state.warning else (),
+                peak_pressure_MPa=state.peak_pressure,
                 **self._of_cells(),
             )
 
@@ -70,16 +69,16 @@ class ContactSolver:
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""
         state = self.latest
-        if not isinstance(state, HalfSpaceState):
+        if state is None or state.pressure is None:
             return {}
-        found = {
+        columns = {
             "elastic_energy_mJ": state.elastic_energy,
             "plastic_work_mJ": state.plastic_work,
         }
-        if state.plastic_depth is not None:
-            found["yielding_area_fraction"] = float(np.mean(state.yielding))
-            found["plastic_depth_mm"] = float(state.plastic_depth.max())
-        return found
+        if state.plastic_depth is not None and state.yielding is not None:
+            columns["yielding_area_fraction"] = float(np.mean(state.yielding))
+            columns["plastic_depth_mm"] = float(state.plastic_depth.max())
+        return columns
 
     @property
     def past(self) -> Any:
@@ -109,11 +108,12 @@ class ContactSolver:
         def pressures() -> Array:
             assert self.latest is not None
             if isinstance(self._model, HalfSpaceModel):
-                pressure, surface = self._start[0], self._model.surface
+                pressure, surface = self.latest.pressures, self._model.surface
                 borders = parts.borders_x, parts.borders_y
                 x, y = map(overlaps, borders, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
-            spots = self.latest.detail
+            spots = self.latest.spots
+            assert spots is not None
             owner = parts.index_of(*spots.place.T)
             return np.bincount(owner, spots.force, minlength=parts.count) / parts.area
 
@@ -122,7 +122,7 @@ class ContactSolver:
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step."""
         return on_root_alone(
-            self._comm, lambda: self._model.stiffness(self.latest, turns=self._turns)
+            self._comm, lambda: self._model.stiffness(self._solved(), turns=self._turns)
         )
 
     def interface_stiffness(self) -> float:
@@ -134,7 +134,13 @@ class ContactSolver:
         Note:
             Collective.
         """
-        return on_root_alone(self._comm, lambda: self._solved_cells().interface_stiffness())
+
+        def stiffness() -> float:
+            if not isinstance(self._model, HalfSpaceModel):
+                raise InputError("contacts without cells have no conductance")
+            return self._model.interface_stiffness(self._solved())
+
+        return on_root_alone(self._comm, stiffness)
 
     @property
     def gaps(self) -> Array | None:
@@ -143,16 +149,16 @@ class ContactSolver:
         Shape (nx, ny), on rank 0 alone.
         """
         state = self.latest
-        if not isinstance(state, HalfSpaceState):
+        if state is None or state.gap is None:
             return None
         return np.where(state.in_contact, 0.0, np.maximum(state.gap, 0.0))
 
-    def _solved_cells(self) -> HalfSpaceState:
-        if not isinstance(self.latest, HalfSpaceState):
-            raise InputError("contacts without cells have no conductance")
+    def _solved(self) -> ContactState:
+        if self.latest is None:
+            raise ValueError("no load step is solved yet")
         return self.latest
 
-    def detail(self, latest: Any) -> ContactDetail:
+    def detail(self, latest: Any) -> ContactState:
         """Return the spots and fields of a contact, the same on every rank.
 
         Args:
@@ -161,7 +167,7 @@ class ContactSolver:
         Note:
             Collective.
         """
-        return on_root_alone(self._comm, lambda: latest.detail)
+        return on_root_alone(self._comm, lambda: latest)
 
     def state(self) -> Any:
         """Return the latest solution; it is whole on rank 0 alone."""

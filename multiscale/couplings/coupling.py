@@ -22,7 +22,7 @@ from geometry import (
     InputError,
     Surface,
 )
-from micro.contact_detail import ContactDetail
+from geometry.contact_state import ContactState
 from micro.model import Stiffness
 from multiscale.bodies.bodies import Bodies
 from multiscale.bodies.scene_body import SceneBody
@@ -391,7 +391,7 @@ class Coupling(SceneParts, ABC):
         """Return what `contact` takes of the latest load step."""
         return None
 
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail] | None:
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState] | None:
         """Return the spots and fields of the contact of a load step.
 
         Args:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
-from micro.contact_detail import ContactDetail
 from multiscale.bodies.on_body import on_body
 from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -132,7 +132,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Return the micro model on the body, which laws stand for; collective."""
         return self.model_on_body()
 
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail] | None:
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         solver = self.contact_solver(self.model_behind_laws())
         solved = solver.press(Control(approach=step.approach_mm, tilt=step.tilt))

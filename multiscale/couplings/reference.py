@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from geometry.contact_state import ContactState, Spots, peaks_of
+from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
-from micro.contact_detail import ContactDetail, peaks_of
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling, Facts
 from multiscale.couplings.estimate import estimated_plane
@@ -175,7 +176,7 @@ class ReferenceCoupling(PressedSurface):
             ),
         )
 
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail]:
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState]:
         """Return the spots and fields of the contact of a load step; see `Coupling.contact`.
 
         The area of a spot is that of its nodes times the area with its border in the facets over
@@ -191,11 +192,17 @@ class ReferenceCoupling(PressedSurface):
         share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > _NO_AREA * nodes.area.max()
-        contact = ContactDetail(
+        spots = Spots(
             place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
             area=share * np.bincount(region, nodes.area[touching], minlength=count),
             force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
             peak_pressure=nodes.pressure[top],
+        )
+        contact = ContactState(
+            plane=RigidPlane(approach=latest.approach, tilt=latest.tilt),
+            patches=self.patches,
+            force=latest.force,
+            spots=spots,
             x=nodes.x[some],
             y=nodes.y[some],
             pressure=nodes.pressure[some],

@@ -107,7 +107,7 @@ class SampleLaws:
         model = replace(self.model, surface=sample, contact_modulus=pair.contact_modulus)
         if not self.finite_slopes:
             return model
-        return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
+        return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
 
     def largest_loads(self) -> tuple[float, float | None]:
         """Return the largest local pressure that laws are made for [MPa], and closure [mm].

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from micro import HalfSpaceModel, MicroModel, Pressed, Response, RigidPlane, influence_matrix
+from micro import ContactState, MicroModel, Start, influence_matrix, stacked
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -152,7 +152,7 @@ class WholeSurface:
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
     observe: Callable[[int], None] | None = None
-    _solved: dict[float, tuple[Response, RigidPlane]] = field(default_factory=dict, init=False)
+    _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
     _seconds: dict[float, float] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
@@ -163,13 +163,12 @@ class WholeSurface:
         """
         free, force, end, start = largest.tilt is None, 0.0, largest, None
         if free or largest.approach is None:
-            pressed = self._press(largest, start)
-            plane, start = pressed.plane, pressed.start
-            end = Control(approach=plane.approach, tilt=plane.tilt)
-            force = float(pressed.response.force[0])
+            state = self._press(largest, start)
+            start, force = state.guess, state.force
+            end = Control(approach=state.approach, tilt=state.tilt)
         # the tilt of a free plane without force is not determined
         touch = Control(force=_SMALL_LOAD * force if free else 0.0, tilt=largest.tilt)
-        first, last = self._press(touch, start).plane.approach, float(end.approach or 0.0)
+        first, last = self._press(touch, start).approach, float(end.approach or 0.0)
         if touch.force:
             first -= _SMALL_LOAD ** (2 / 3) * (last - first)
         return first, last, end.tilt or (0.0, 0.0)
@@ -188,25 +187,22 @@ class WholeSurface:
         """
         solved = self._solve(approaches)
         self._solved.update(zip(map(float, approaches), solved, strict=True))
-        responses, planes = zip(*solved, strict=True)
-
-        def found(name: str) -> NDArray[Any]:
-            return np.array([getattr(response, name)[0] for response in responses])
 
         def in_all_patches(values: NDArray[Any]) -> NDArray[Any]:
             return np.broadcast_to(values[:, None], pressure.shape)
 
-        pressure, local = found("patch_pressure"), np.array([p.means(self.patches) for p in planes])
+        pressure = stacked(solved, "patch_pressure")
+        local = np.array([state.plane.means(self.patches) for state in solved])
         loaded, macro_displacement = pressure > 0.0, self.displacements(pressure)
-        area_fraction = found("patch_contact_area") / self.patches.area
+        area_fraction = stacked(solved, "patch_area") / self.patches.area
         return SolvedRows(
             approach=local if self.tilt is not None else in_all_patches(approaches),
             closure=local - macro_displacement,
             pressure=pressure,
             contact_area_fraction=np.where(loaded, area_fraction, 0.0),
-            contacts=np.where(loaded, found("patch_contacts"), 0),
-            unresolved_displacement=found("patch_displacement") - macro_displacement,
-            outside_range=in_all_patches(found("warning") != ""),
+            contacts=np.where(loaded, stacked(solved, "patch_contacts"), 0),
+            unresolved_displacement=stacked(solved, "patch_displacement") - macro_displacement,
+            outside_range=in_all_patches(stacked(solved, "warning") != ""),
         )
 
     def laws(self, rows: SolvedRows) -> list[PatchLaw]:
@@ -223,36 +219,36 @@ class WholeSurface:
         """The planes of all rows so far."""
         solved = [self._solved[approach] for approach in sorted(self._solved)]
         return PlanePath(
-            approach=np.array([plane.approach for _, plane in solved]),
-            tilt=np.array([plane.tilt for _, plane in solved]),
-            force=np.array([response.force[0] for response, _ in solved]),
-            moment=np.array([response.moment[0] for response, _ in solved]),
+            approach=np.array([state.approach for state in solved]),
+            tilt=np.array([state.tilt for state in solved]),
+            force=np.array([state.force for state in solved]),
+            moment=np.array([state.moment for state in solved]),
         )
 
-    def _solve(self, approaches: Array) -> list[tuple[Response, RigidPlane]]:
+    def _solve(self, approaches: Array) -> list[ContactState]:
         """Solve the contact problem at all approaches, shared by the ranks."""
         count = _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
-        def solve(part: int) -> list[tuple[Response, RigidPlane, float]]:
-            found, start = [], None
+        def solve(part: int) -> list[tuple[ContactState, float]]:
+            rows, start = [], None
             for approach in parts[part]:
                 began = time.process_time()
                 control = Control(approach=float(approach), tilt=self.tilt)
-                pressed = self._press(control, start)
-                start = pressed.start
-                found.append((pressed.response, pressed.plane, time.process_time() - began))
-            return found
+                state = self._press(control, start)
+                start = state.guess
+                rows.append((state.summary(), time.process_time() - began))
+            return rows
 
         def solved(done: int) -> None:
             if self.observe is not None:
                 self.observe(len(self._solved) + min(count * done, len(approaches)))
 
         costs = [float(self._costs(part).sum()) for part in parts]
-        found = shared(self.comm, len(parts), solve, costs=costs, observe=solved)
-        rows = [row for part in found for row in part]
-        self._seconds.update((float(a), row[2]) for a, row in zip(approaches, rows, strict=True))
-        return [row[:2] for row in rows]
+        solutions = shared(self.comm, len(parts), solve, costs=costs, observe=solved)
+        rows = [row for part in solutions for row in part]
+        self._seconds.update((float(a), row[1]) for a, row in zip(approaches, rows, strict=True))
+        return [row[0] for row in rows]
 
     def _costs(self, approaches: Array) -> Array:
         """Return what rows cost, relative to each other: as long as those next to them took."""
@@ -261,9 +257,8 @@ class WholeSurface:
         known = sorted(self._seconds)
         return np.interp(approaches, known, [self._seconds[approach] for approach in known])
 
-    def _press(self, control: Control, start: Any) -> Pressed:
-        if isinstance(self.model, HalfSpaceModel):
-            start = self.model.guess(start)  # rows are those of rising loads, in whatever order
+    def _press(self, control: Control, start: Start | None) -> ContactState:
+        """Press once; rows are those of rising loads, in whatever order: without plastic depth."""
         return self.model.press(
             control, patches=self.patches, mean_heights=self.mean_heights, start=start
         )

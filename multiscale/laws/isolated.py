@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import PatchGrid
-from micro import MicroModel
+from micro import MicroModel, press_along, stacked
 from micro.closed_forms.love import love_centre, love_mean
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -62,22 +62,24 @@ class IsolatedPatch:
 
     def rows(self, approaches: Array) -> SolvedRows:
         """Return rows at approaches of shape (n,) [mm], columns of the same shape."""
-        response = self.model.respond(
-            approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
+        states = press_along(
+            self.model, approaches, patches=self.patch, mean_heights=np.array([self.mean_height])
         )
         # exactly nothing before and at first touch, without the rounding of a solution
         loaded = approaches > self.first_touch
-        pressure = np.where(loaded, response.mean_pressure, 0.0)
+        pressure = np.where(loaded, stacked(states, "mean_pressure"), 0.0)
         # the block's closure is a mean over the patch, whichever displacement made the law's
-        unresolved = response.patch_displacement[:, 0] - self._displacement("mean") * pressure
+        unresolved = (
+            stacked(states, "patch_displacement")[:, 0] - self._displacement("mean") * pressure
+        )
         return SolvedRows(
             approach=approaches,
             closure=approaches - self.compliance * pressure,  # eq. 31
             pressure=pressure,
-            contact_area_fraction=np.where(loaded, response.contact_area_fraction, 0.0),
-            contacts=np.where(loaded, response.contacts, 0),
+            contact_area_fraction=np.where(loaded, stacked(states, "contact_area_fraction"), 0.0),
+            contacts=np.where(loaded, stacked(states, "contacts"), 0),
             unresolved_displacement=np.where(loaded, unresolved, 0.0),
-            outside_range=response.warning != "",
+            outside_range=stacked(states, "warning") != "",
         )
 
     def law(self, closure_end: float, tolerance: float, most_rows: int = MOST_ROWS) -> PatchLaw:

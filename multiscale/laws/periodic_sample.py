@@ -74,14 +74,14 @@ class PeriodicSample:
         """
         surface = self.model.surface
         if self.yields:
-            return self.model.solve(self.reference).force / self.area
+            return self.model.press(Control(approach=self.reference)).force / self.area
         slopes = np.gradient(surface.heights, *surface.spacing)
         pressure = self.model.contact_modulus * float(np.sqrt(np.mean(np.square(slopes))))
         while True:
             pressure *= 2.0
-            found = self.model.solve_force(pressure * self.area).pressure
-            if found.min() > 0.0:
-                return float(found.mean() - found.min())
+            cells = self.model.press(Control(force=pressure * self.area)).pressures
+            if cells.min() > 0.0:
+                return float(cells.mean() - cells.min())
 
     def separation_under(self, pressure: float) -> float:
         """Return the mean separation under a mean pressure [mm]; exactly 0 in full contact.
@@ -91,8 +91,8 @@ class PeriodicSample:
         """
         if self.model.hardness is not None and pressure >= self.model.hardness:
             return 0.0
-        state = self.model.solve_force(pressure * self.area)
-        if not self.yields and state.pressure.min() > 0.0:  # what is left is rounding
+        state = self.model.press(Control(force=pressure * self.area))
+        if not self.yields and state.pressures.min() > 0.0:  # what is left is rounding
             return 0.0
         return max(self.reference - state.approach, 0.0)
 
@@ -111,14 +111,14 @@ class PeriodicSample:
                 rows.append(SampleRow())
             else:
                 approach = float(self.reference - separation)
-                pressed = self.model.press(Control(approach=approach), start=start)
-                start, response = self.model.guess(pressed.start), pressed.response
+                state = self.model.press(Control(approach=approach), start=start)
+                start = state.guess
                 rows.append(
                     SampleRow(
-                        pressure=float(response.mean_pressure[0]),
-                        contact_area_fraction=float(response.contact_area_fraction[0]),
-                        contacts=int(response.contacts[0]),
-                        outside_range=bool(response.warning[0]),
+                        pressure=state.mean_pressure,
+                        contact_area_fraction=state.contact_area_fraction,
+                        contacts=state.contacts,
+                        outside_range=bool(state.warning),
                     )
                 )
         return rows

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from micro import START_KINDS
+from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
 from multiscale.loading.load_step import LoadStep, PatchState
@@ -64,7 +64,16 @@ class Checkpoint:
     log: Mark = START
 
 
-_KINDS = (Checkpoint, Mark, LoadPosition, ContactRecord, DenseState, LawPoint, *START_KINDS)
+_KINDS = (
+    Checkpoint,
+    Mark,
+    LoadPosition,
+    ContactRecord,
+    DenseState,
+    LawPoint,
+    RigidPlane,
+    Start,
+)
 """What a checkpoint may consist of: its own records, and those of the states of couplings."""
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from micro.contact_detail import ContactDetail
+from geometry.contact_state import ContactState
 from multiscale.loading.load_step import LoadStep
 from support.packages import optional_packages
 
@@ -54,30 +54,36 @@ class ContactRecord:
     plastic_depth_mm: Array | None = None
 
     @classmethod
-    def of(
-        cls, detail: ContactDetail, step: LoadStep, lengths: tuple[float, float]
-    ) -> ContactRecord:
+    def of(cls, state: ContactState, step: LoadStep, lengths: tuple[float, float]) -> ContactRecord:
         """Return the record of a load step.
 
         Args:
-            detail: The contact.
+            state: The contact, with its spots.
             step: The load step.
             lengths: Sides of the surface [mm].
         """
-        columns = detail.place.T, (detail.area, detail.force, detail.peak_pressure)
+        assert state.spots is not None
+        columns = (
+            state.spots.place.T,
+            (
+                state.spots.area,
+                state.spots.force,
+                state.spots.peak_pressure,
+            ),
+        )
         spots = np.concatenate(columns).T
         order = np.lexsort((spots[:, 1], spots[:, 0], -spots[:, 3]))
         return cls(
             step=step.step,
             approach_mm=step.approach_mm,
-            force_N=float(detail.force.sum()),
+            force_N=float(state.spots.force.sum()),
             lengths_mm=(float(lengths[0]), float(lengths[1])),
             spots=np.ascontiguousarray(spots[order]),
-            x_mm=detail.x,
-            y_mm=detail.y,
-            pressure_MPa=detail.pressure,
-            gap_mm=detail.gap,
-            plastic_depth_mm=detail.plastic_depth,
+            x_mm=state.x,
+            y_mm=state.y,
+            pressure_MPa=state.pressure,
+            gap_mm=state.gap,
+            plastic_depth_mm=state.plastic_depth,
         )
 
     @property

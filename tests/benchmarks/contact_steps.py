@@ -16,6 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from geometry import Control
 from multiscale import Scene, make_setup
 from multiscale.couplings.contact import contact_model
 
@@ -38,7 +39,7 @@ def scene(grid, seed):
 
 def step(model, start):
     began = time.process_time()
-    found = model.solve(8e-3, start=start)
+    found = model.press(Control(approach=8e-3), start=start.guess)
     return time.process_time() - began, found.iterations
 
 
@@ -53,9 +54,9 @@ def main():
         ratios = []
         for seed in choice.seeds:
             whole = contact_model(make_setup(scene(grid, seed)), None)
-            small = replace(whole, slopes=None)
+            small = replace(whole, slopes=())
             models = [replace(small, body=None), small, whole]
-            starts = [model.solve(6e-3) for model in models]
+            starts = [model.press(Control(approach=6e-3)) for model in models]
             times = np.empty((choice.repeat, 3))
             for turn in range(choice.repeat):
                 found = [step(*pair) for pair in zip(models, starts, strict=True)]

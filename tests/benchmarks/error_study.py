@@ -128,7 +128,7 @@ def finer_force(run, number):
     surface = surface_of(number, min(FINER * setup.model.surface.grid[0], MOST_CELLS))
     model = replace(setup.model, surface=surface, highest=surface.highest)
     order = SLOPES if setup.finite_slopes else 0
-    return body(model, order).equilibrium(Control(approach=step.approach_mm, tilt=step.tilt)).force
+    return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt)).force
 
 
 def measured(numbers):

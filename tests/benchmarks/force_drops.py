@@ -11,6 +11,7 @@ import sys
 import time
 
 import numpy as np
+from helpers.along import respond
 
 from geometry import PatchGrid, Spectrum, find_asperities, synthesise
 from micro import MODELS, AsperityModel
@@ -32,7 +33,7 @@ def study(surfaces):
     for seed in range(surfaces):
         for name, model in models(seed):
             start = time.perf_counter()
-            response = model.respond(APPROACHES, patches=PATCHES, mean_heights=[0.0])
+            response = respond(model, APPROACHES, patches=PATCHES, mean_heights=[0.0])
             spent = (time.perf_counter() - start) / len(APPROACHES)
             fall = -np.diff(response.force) / np.maximum(response.force[1:], 1e-12)
             worst = int(np.argmax(fall))

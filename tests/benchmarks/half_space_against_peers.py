@@ -31,7 +31,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from geometry import Spectrum, Surface, synthesise  # noqa: E402
+from geometry import Control, Spectrum, Surface, synthesise  # noqa: E402
 from micro import HalfSpaceModel  # noqa: E402
 
 CODES = ("patchlaw", "tamaas", "contactmechanics")
@@ -72,7 +72,7 @@ def reference(heights):
     """Solve far more strictly than any code that is timed."""
     periodic = Surface(heights=heights, lengths=(1.0, 1.0), periodic=True)
     model = HalfSpaceModel(surface=periodic, contact_modulus=1.0, periodic=True, tolerance=1e-12)
-    return model.solve_force(LOAD).pressure
+    return model.press(Control(force=LOAD)).pressure
 
 
 def compare(pythons, task, repeats, exact):

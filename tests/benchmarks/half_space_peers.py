@@ -26,11 +26,14 @@ class Patchlaw:
         self.model = HalfSpaceModel(
             surface=surface, contact_modulus=1.0, periodic=periodic, tolerance=tolerance
         )
-        self.state = None
+        self.guess = None
 
     def solve(self, pressure):
-        self.state = self.model.solve_force(pressure, start=self.state)
-        return self.state.pressure, self.state.iterations
+        from geometry import Control
+
+        state = self.model.press(Control(force=pressure), start=self.guess)
+        self.guess = state.guess
+        return state.pressure, state.iterations
 
 
 class Tamaas:

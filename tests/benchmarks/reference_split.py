@@ -59,7 +59,7 @@ def concurrent(surface, approach, body):
     """Return the force of the contact problem on the block."""
     modulus = MATERIAL.contact_modulus
     model = HalfSpaceModel(surface=surface, contact_modulus=modulus, sides=SIDES, body=body)
-    return model.solve(approach).force
+    return model.press(Control(approach=approach)).force
 
 
 def meshed(surface, approach, scale, edges, meshes):

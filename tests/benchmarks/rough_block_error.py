@@ -93,10 +93,11 @@ def _small(setup):
 
 
 def curve(model, scale, approaches):
-    forces, start = [], None
+    forces, guess = [], None
     for approach in approaches:
-        start = model.solve(scale * approach, start=start)
-        forces.append(start.force / scale)
+        state = model.press(Control(approach=scale * approach), start=guess)
+        guess = state.guess
+        forces.append(state.force / scale)
     return np.array(forces)
 
 

@@ -66,7 +66,7 @@ def concurrent(surface):
         sides=sides,
         body=body.term(body.face(COMM)),
     )
-    forces = [model.solve(approach).force for approach in APPROACHES]
+    forces = [model.press(Control(approach=approach)).force for approach in APPROACHES]
     if COMM.rank == 0:
         told = ", ".join(f"{force:.4f}" for force in forces)
         print(f"concurrent: F = {told} N", flush=True)
@@ -79,8 +79,11 @@ def main():
     surface = synthesise(SPECTRUM, grid=(256, 256), lengths=(1.0, 1.0))
     model = HalfSpaceModel(surface=surface, contact_modulus=MATERIAL.contact_modulus)
     slopes = FiniteSlopes(surface, MATERIAL)
-    sloped = replace(model, slopes=slopes)
-    effects = [sloped.solve(at).force / model.solve(at).force - 1.0 for at in APPROACHES]
+    sloped = replace(model, slopes=(slopes,))
+    effects = [
+        sloped.press(Control(approach=at)).force / model.press(Control(approach=at)).force - 1.0
+        for at in APPROACHES
+    ]
     if COMM.rank == 0:
         told = ", ".join(f"{effect:+.1%}" for effect in effects)
         print(f"finite slopes change the force by {told}", flush=True)

@@ -24,13 +24,13 @@ def steps(surface, hardness, also):
     model.press(Control(approach=1e-3))  # makes transforms
     began, start, products, more = time.process_time(), None, 0, 0
     for approach in APPROACHES:
-        pressed = model.press(Control(approach=float(approach)), start=start)
-        start, state = pressed.start, pressed.state
+        state = model.press(Control(approach=float(approach)), start=start)
+        start = state.start
         products += state.iterations
         if also == "stiffness":
             more += model.stiffness(state, turns=False).iterations
         elif also == "conductance":
-            state.interface_stiffness()
+            model.interface_stiffness(state)
     yields = np.count_nonzero(state.yielding) / max(np.count_nonzero(state.in_contact), 1)
     return time.process_time() - began, products, more, yields
 

@@ -12,7 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-FOLDERS = ("verification", "unit/micro", "unit/micro/compliance", "unit/multiscale", "")
+from geometry import Control
+
+FOLDERS = ("verification", "unit/micro", "unit/micro/boundary_elements", "unit/multiscale", "")
 sys.path[:0] = [str(Path(__file__).parents[1] / folder) for folder in FOLDERS]
 
 
@@ -29,14 +31,16 @@ def closed_forms():
     yield "its contact area [mm²]", float(exact.area), state.contact_area
     yield "its largest pressure [MPa]", float(exact.peak_pressure), float(state.pressure.max())
     surface = hertz.paraboloid((120, 60), (0.5, 0.25), (3.0, 0.4))
-    state = hertz.HalfSpaceModel(surface, contact_modulus=hertz.E_STAR).solve(0.01)
+    state = hertz.HalfSpaceModel(surface, contact_modulus=hertz.E_STAR).press(
+        Control(approach=0.01)
+    )
     yield "Hertz, ellipsoid: force [N]", float(hertz.hertz(3.0, 0.4, 0.01).force), state.force
     punch = 2.0 * waves.punch(128) - waves.punch(64)
     yield "square punch: F / E* δ L", waves.SQUARE_PUNCH, punch
     x = (np.arange(256) + 0.5) / 256 - 0.5
     sphere = waves.Surface(heights=-(x[:, None] ** 2 + x**2) / 10.0, lengths=(1.0, 1.0))
     model = waves.HalfSpaceModel(sphere, contact_modulus=spots.MODULUS)
-    stiffness = model.solve(2e-2).interface_stiffness()
+    stiffness = model.interface_stiffness(model.press(Control(approach=2e-2)))
     found = spots.total_conductance(stiffness, spots.MODULUS, spots.pair_conductivity([40.0]))
     yield "conductance of a spot, 4 k a [W/K]", 4e-3 * 40.0 * np.sqrt(0.1), found
 
@@ -46,12 +50,12 @@ def waves_and_sides():
     waves, laws, quarter = modules("half_space_closed_forms representative_laws quarter_space")
     wave = waves.wave((256, 5), (1.0, 0.3), 0.01)
     model = waves.HalfSpaceModel(wave, contact_modulus=1.0, periodic=True)
-    state = model.solve_force(0.5 * waves.FULL * 0.3)
-    area = state.counted_area / wave.area
+    state = model.press(Control(force=0.5 * waves.FULL * 0.3))
+    area = state.in_contact.mean()
     yield "Westergaard, half of full pressure: contact", waves.wet(0.5), area
     exact = waves.westergaard(wave.x, 0.5)[0]
     yield "its pressure at the crest / E*", float(exact), float(state.pressure[0, 0])
-    energy = model.solve_force(waves.FULL * 0.3).elastic_energy / wave.area
+    energy = model.press(Control(force=waves.FULL * 0.3)).elastic_energy / wave.area
     yield "energy of the flattened wave / E* [mm]", 0.25 * waves.FULL * 0.01, energy
     x = np.cos(2.0 * np.pi * (np.arange(128) + 0.5) / 128)
     surface = waves.Surface(heights=0.01 * np.outer(x, x), lengths=(1.0, 1.0), periodic=True)
@@ -78,11 +82,19 @@ def other_codes():
         table, rough = np.loadtxt(peer.TABLE, delimiter=","), peer.surface()
         model = peer.HalfSpaceModel(rough, contact_modulus=peer.E_STAR, periodic=periodic)
         row = table[np.isclose(table[:, 0], 8e-3)][0]
-        yield f"ContactMechanics, {name}: force [N]", row[column], model.solve(row[0]).force
+        yield (
+            f"ContactMechanics, {name}: force [N]",
+            row[column],
+            model.press(Control(approach=row[0])).force,
+        )
     seed, approach, hardness, force, _ = plastic.TABLE[2]
     rough, options = plastic.surface(int(seed)), {"hardness": hardness, "tolerance": 1e-10}
     model = plastic.HalfSpaceModel(rough, contact_modulus=plastic.E_STAR, **options)
-    yield "ContactMechanics, hardness 100 MPa: force [N]", force, model.solve(approach).force
+    yield (
+        "ContactMechanics, hardness 100 MPa: force [N]",
+        force,
+        model.press(Control(approach=approach)).force,
+    )
     counted, corrected, energy = gfmd.found(gfmd.surface(3.45, 1176, seed=1), gfmd.PRESSURES)
     for i, pressure in enumerate(gfmd.PRESSURES):
         yield f"GFMD, {pressure:g} E*: contact", gfmd.AREAS[i], counted[i]

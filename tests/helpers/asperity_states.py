@@ -2,7 +2,25 @@
 
 import numpy as np
 
+from geometry import Control
 from micro import HertzContact
+
+
+class AsperityState:
+    """A contact state of an asperity model, with all contacts that there may be."""
+
+    def __init__(self, model, state):
+        self._state = state
+        self.ellipses = model.pairs.ellipses(state.indentation)
+
+    def __getattr__(self, name):
+        return getattr(self._state, name)
+
+
+def pressed(model, approach, *, tilt=(0.0, 0.0), start=None):
+    """Press an asperity model to an approach."""
+    state = model.press(Control(approach=approach, tilt=tilt), start=start)
+    return AsperityState(model, state)
 
 
 def places(asperities):
@@ -17,20 +35,21 @@ def interference(asperities, state):
 
 def displacement(model, state):
     """Return the displacements of all summits by all contacts, also of summits below the plane."""
-    own = state.start.solution.indentation
-    interacting = model.contacts.kind.interacting or model.body is not None
-    return own + model.contacts.pairs.evaluate(own).displacement if interacting else own
+    own = state.indentation
+    interacting = model.pairs.interact
+    return own + model.pairs.evaluate(own).displacement if interacting else own
 
 
 def surface_displacement(model, state, x, y):
     """Add up the fields of all contacts at points, each Hertz's, also where contacts merge."""
     total = np.zeros(np.broadcast_shapes(np.shape(x), np.shape(y)))
-    a, hertz, own = model.asperities, model.contacts.hertz, state.start.solution.indentation
+    a, own = model.asperities, state.indentation
+    round_ = model.pairs.circular
     for k in np.flatnonzero(own):  # one field at a time bounds the memory
         contact = HertzContact(
-            contact_modulus=hertz.contact_modulus,
-            radius_major=hertz.radius_major[k],
-            radius_minor=hertz.radius_minor[k],
+            contact_modulus=model.contact_modulus,
+            radius_major=(a.radius if round_ else a.radius_major)[k],
+            radius_minor=(a.radius if round_ else a.radius_minor)[k],
             indentation=own[k],
         )
         turned = ((x - a.x[k]) + 1j * (y - a.y[k])) * np.exp(-1j * a.angle[k])

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from micro.compliance.grid_compliance import Compliance
-from micro.contact.problem import ContactProblem
-from micro.contact.rigid_motions import Motions
-from micro.contact.slope_iteration import solve_contact
+from micro.boundary_elements.grid_compliance import Compliance
+from micro.complementarity.cell_problem import CellProblem
+from micro.complementarity.rigid_motions import Motions
+from micro.complementarity.slope_iteration import solve_contact
 
 
 def turning(x, y, total):
@@ -30,7 +30,7 @@ def contact_problem(
     interference, spacing, motions=None, *, tolerance=1e-11, periodic=False, hardness=np.inf
 ):
     """Return a contact problem on the half-space, by default of a body that does not move."""
-    return ContactProblem(
+    return CellProblem(
         compliance=Compliance(periodic=periodic),
         spacing=spacing,
         interference=interference,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from micro.compliance.free_sides import distance_nodes, means_over, values_at
+from micro.boundary_elements.free_sides import distance_nodes, means_over, values_at
 
 SHORTEST = 24.0  # waves on the shortest rectangle along the side
 NEAREST = 1.0 / 256.0  # of the narrowest rectangle across it: the first node

@@ -9,6 +9,7 @@ from scipy.special import gamma
 from geometry import BlockShape, Control, Surface, reference_shapes
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, HertzContact
+from micro.boundary_elements.body_modes import BodyPoints
 from multiscale.bodies.block import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -63,7 +64,8 @@ def give():
     It varies by a hundredth over a contact in the middle, whose shape it does not change.
     """
     middle = np.array([0.5])
-    return float(body_term(known=False).between(middle, middle)[0, 0])
+    point = BodyPoints.at(body_term(known=False), middle, middle)
+    return float(point.by(point)[0, 0])
 
 
 def on_the_block(force_of, approach):

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from geometry import Material
+from geometry import Control, Material
 from micro import FiniteSlopes, coarse_grid, side_stresses
 
 
@@ -17,5 +17,5 @@ def slope_effect(model, approach, poisson_ratio, tilt=(0.0, 0.0)):
         young_modulus=model.contact_modulus * (1.0 - poisson_ratio**2), poisson_ratio=poisson_ratio
     )
     slopes = FiniteSlopes(surface, material, periodic=model.periodic, edge_stresses=edges)
-    found = replace(model, slopes=slopes).solve(approach, tilt=tilt)
-    return found.force / model.solve(approach, tilt=tilt).force - 1.0
+    found = replace(model, slopes=(slopes,)).press(Control(approach=approach, tilt=tilt))
+    return found.force / model.press(Control(approach=approach, tilt=tilt)).force - 1.0

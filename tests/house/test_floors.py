@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "cores errors small_caches",
+        "arrays cores errors small_caches",
         "checks collective fields packages quantities whole_files",
         "checked_store",
     ],
@@ -32,12 +32,12 @@ FLOORS = {
         "plausibility",
         "facing preparation rigid_plane",
         "files",
-        "asperities meshes plane_equilibrium",
+        "asperities contact_state meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms conductance contact_detail",
-        "compliance model",
-        "asperities contact",
+        "closed_forms conductance",
+        "boundary_elements model",
+        "asperities complementarity",
         "half_space",
         "by_name",
     ],

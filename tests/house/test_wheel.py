@@ -19,12 +19,13 @@ PACKAGES = ("geometry", "macro", "micro", "multiscale", "support")
 CONTACTS = """
 import sys
 from micro import MODEL_NAMES, micro_model
-from patchlaw import HalfSpaceModel, Spectrum, synthesise
+from patchlaw import Control, HalfSpaceModel, Spectrum, synthesise
 spectrum = Spectrum(hurst=0.8, waves=(2, 16), rms_slope=0.1, seed=7)
 surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
-print(HalfSpaceModel(surface, contact_modulus=4000.0, periodic=True).solve(2e-3).force)
+load = Control(approach=2e-3)
+print(HalfSpaceModel(surface, contact_modulus=4000.0, periodic=True).press(load).force)
 for name in MODEL_NAMES:
-    print(micro_model(name, surface, contact_modulus=4000.0).respond([2e-3]).force[0])
+    print(micro_model(name, surface, contact_modulus=4000.0).press(load).force)
 """
 EVERY_MODULE = """
 import importlib, pkgutil, geometry, micro, support

@@ -35,7 +35,7 @@ def main():
     model = Watched(micro_model("half-space", surface, contact_modulus=4000.0))
     coupling = ContactSolver(model, patches, patch_means(surface, patches), COMM)
     step = coupling.press(Control(force=2.0, tilt=None))
-    spots = coupling.detail(coupling.latest)
+    spots = coupling.detail(coupling.latest).spots
     found = [
         step.approach_mm, *step.tilt, step.contact_area_fraction, *step.patches.pressure_MPa,
         float(spots.force.sum()), float(spots.area.sum()),

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from geometry import BlockShape, PatchGrid
 from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 from micro import FreeSides
+from micro.boundary_elements.body_modes import BodyPoints
 from multiscale.bodies.block import BlockTerms
 
 COMM = MPI.COMM_SELF
@@ -71,8 +72,11 @@ def test_modes_of_a_shape_resolve_points(height, miss):
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1))
     block = body(shape)
     places = np.array([0.5, 0.31, 0.02, 0.5, 0.9]), np.array([0.5, 0.44, 0.5, 0.97, 0.85])
-    usual = block.term(block.face(COMM)).between(*places)
-    more = block.term(block.face(COMM, modes=block.modes + 5)).between(*places)
+    points = [
+        BodyPoints.at(block.term(face), *places)
+        for face in (block.face(COMM), block.face(COMM, modes=block.modes + 5))
+    ]
+    usual, more = (each.by(each) for each in points)
     own = 1.0 / (2.0 * 0.02 * block.material.contact_modulus)
     # 0.16, 0.03 and 0.04 %
     assert np.abs(usual - more).max() < miss * own

@@ -151,5 +151,8 @@ def test_contacts_near_a_free_side_feel_it_on_their_own_scale():
     x = (np.arange(96) + 0.5) / 96
     ball = ((x[:, None] - 0.02) ** 2 + (x - 0.4) ** 2) / (2.0 * 0.1)
     surface = Surface(heights=-np.minimum(ball, 0.02), lengths=(1.0, 1.0))
-    known, unknown = (on_block(surface, known=known).solve(2e-3).force for known in (True, False))
+    known, unknown = (
+        on_block(surface, known=known).press(Control(approach=2e-3)).force
+        for known in (True, False)
+    )
     assert known < 0.98 * unknown

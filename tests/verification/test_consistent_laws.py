@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.along import respond
 from scipy.optimize import root
 
 from geometry import Control, PatchGrid, Spectrum, patch_means, synthesise
@@ -53,7 +54,7 @@ def test_force_of_the_whole_surface(name, count):
     rows = law.rows.approach[[-1, len(law.rows) // 2]]
     between = np.random.default_rng(3).uniform(0.1 * END, END, 5)
     asked = np.sort(np.append(rows, between))
-    forces = model.respond(asked, patches=patches, mean_heights=means).force
+    forces = respond(model, asked, patches=patches, mean_heights=means).force
     for approach, force in zip(asked, forces, strict=True):
         # at rows the identity c_i = δ − Σ Λ p; between them what the table promises, measured
         # half-way: on grids of cells, whose force has kinks, it was up to twice as much elsewhere
@@ -80,7 +81,7 @@ def test_tilted_plane(seed, count, allowed):
     surface, tilt = rough(seed, cells=128), (10e-3, 0.0)
     patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
     model, means, table = table_of(surface, patches, end=14e-3, tolerance=1e-2)
-    force = model.respond([8e-3], patches=patches, mean_heights=means, tilt=tilt).force[0]
+    force = respond(model, [8e-3], patches=patches, mean_heights=means, tilt=tilt).force[0]
     distance = 8e-3 + tilt[0] * (patches.centres[:, 0] - 0.5)
     assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
@@ -93,7 +94,7 @@ def test_laws_made_under_the_tilt(name, count):
     patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
     model, means, table = table_of(surface, patches, name, tilt=tilt)
     for approach in (3e-3, 8e-3):
-        force = model.respond([approach], patches=patches, mean_heights=means, tilt=tilt).force[0]
+        force = respond(model, [approach], patches=patches, mean_heights=means, tilt=tilt).force[0]
         distance = approach + (patches.centres - 0.5) @ tilt
         # between rows: what the table promises half-way, and up to twice as much elsewhere
         assert macro_force(table, distance) == pytest.approx(force, rel=2 * TOLERANCE)

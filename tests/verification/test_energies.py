@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from geometry import Spectrum, Surface, synthesise
+from geometry import Control, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
 
 MODULUS = 1000.0
@@ -14,7 +14,7 @@ def test_full_contact_of_a_periodic_surface():
     spectrum = Spectrum(hurst=0.8, waves=(1, 6), rms_slope=0.05, seed=3)
     surface = synthesise(spectrum, grid=(32, 40), lengths=(1.0, 1.5))
     model = HalfSpaceModel(surface, contact_modulus=MODULUS, periodic=True, tolerance=1e-12)
-    state = model.solve_force(0.2 * MODULUS)
+    state = model.press(Control(force=0.2 * MODULUS))
     assert state.in_contact.all()
     waves = np.fft.fft2(surface.heights) / surface.heights.size
     along = (
@@ -31,6 +31,8 @@ def test_hertz(cells, bound):
     x = (np.arange(cells) + 0.5) / cells - 0.5
     radius, approach = 2.0, 2e-2
     sphere = Surface(heights=-(x[:, None] ** 2 + x**2) / (2 * radius), lengths=(1.0, 1.0))
-    state = HalfSpaceModel(sphere, contact_modulus=MODULUS, highest=0.0).solve(approach)
+    state = HalfSpaceModel(sphere, contact_modulus=MODULUS, highest=0.0).press(
+        Control(approach=approach)
+    )
     force = 4 / 3 * MODULUS * np.sqrt(radius * approach**3)
     assert state.elastic_energy == pytest.approx(0.4 * force * approach, rel=bound)

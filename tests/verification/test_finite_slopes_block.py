@@ -57,20 +57,24 @@ def meshed(surface):
 def test_slopes_soften_a_low_block_as_its_mesh():
     expected = meshed(setup(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
     steep, flat = (setup(slopes=slopes).model_on_body() for slopes in (True, False))
-    small = flat.solve(APPROACH).force
-    found = replace(steep, tolerance=1e-8).solve(APPROACH).force / small - 1.0
+    small = flat.press(Control(approach=APPROACH)).force
+    found = replace(steep, tolerance=1e-8).press(Control(approach=APPROACH)).force / small - 1.0
     assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
     # without the body's own stresses, and its height above the mean plane
-    material = steep.slopes.material
-    slopes = FiniteSlopes(steep.surface, material, edge_stresses=steep.slopes.edge_stresses[:-1])
-    alone = replace(flat, slopes=slopes, tolerance=1e-8).solve(APPROACH).force / small - 1.0
+    (known,) = steep.slopes
+    edges = known.edge_stresses[:-1]
+    slopes = (FiniteSlopes(steep.surface, known.material, edge_stresses=edges),)
+    alone = (
+        replace(flat, slopes=slopes, tolerance=1e-8).press(Control(approach=APPROACH)).force / small
+        - 1.0
+    )
     assert alone - expected > 8e-3  # −3.01 %
 
 
 def test_heights_count_from_the_highest_point_of_a_higher_block():
     steep, flat = (setup(slopes=slopes).model_on_body() for slopes in (True, False))
-    assert flat.slopes is None
-    assert len(steep.slopes.edge_stresses) == 2  # the sides' stresses, and the body's
+    assert flat.slopes == ()
+    assert len(steep.slopes[0].edge_stresses) == 2  # the sides' stresses, and the body's
     surface = steep.surface
     gained = steep.body.matrix - flat.body.matrix
     # uniform pressure shortens a column without walls by p/E of its length; the bottom is clamped

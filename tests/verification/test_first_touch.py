@@ -6,6 +6,7 @@ is 2 E* r δ on a half-space; a block as high as it is wide does not change that
 
 import numpy as np
 import pytest
+from helpers.along import respond
 from helpers.hard_cases import KINDS, history, scene
 
 from geometry import Material, MaterialPair, PatchGrid, patch_means
@@ -56,6 +57,6 @@ def test_nothing_touches_before_first_touch(model, patches):
                 continue
             assert touch > -1e-12  # mm: rounding of the highest point
             near = touch + np.array([-1e-2, -1e-6, -1e-12, 1e-6])
-            force = part.respond(near, patches=patch, mean_heights=heights).force
+            force = respond(part, near, patches=patch, mean_heights=heights).force
             assert np.all(force[:3] == 0.0)
             assert 0.0 < force[3] <= PUNCH * 1e-6

@@ -9,7 +9,7 @@ Area_GFMD_Zhou.mat and Uel_GFMD_Zhou.mat). Hurst exponent 0.8, no roll-off, angu
 import numpy as np
 import pytest
 
-from geometry import Spectrum, synthesise
+from geometry import Control, Spectrum, synthesise
 from micro import HalfSpaceModel
 
 HURST, LOWEST, HEIGHT = 0.8, 10.0, 6e-3  # 1/mm, mm
@@ -41,9 +41,12 @@ def surface(waves, cells, seed):
 def found(rough, pressures):
     """Return counted and corrected areas and energies of the surface in their units."""
     model = HalfSpaceModel(rough, contact_modulus=1.0, periodic=True, tolerance=1e-6)
-    states = [model.solve_force(pressure * rough.area) for pressure in pressures]
+    states = [model.press(Control(force=pressure * rough.area)) for pressure in pressures]
     counted, corrected, energy = np.transpose(
-        [(state.counted_area, state.contact_area, state.elastic_energy) for state in states]
+        [
+            (state.in_contact.mean() * rough.area, state.contact_area, state.elastic_energy)
+            for state in states
+        ]
     )
     return counted / rough.area, corrected / rough.area, energy / rough.area * 1e-3  # mm to m
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from half_space_peer_table import APPROACHES, E_STAR, force, surface
 
+from geometry import Control
 from micro import HalfSpaceModel
 
 TABLE = Path(__file__).parent / "data" / "half_space_peer.csv"
@@ -17,7 +18,7 @@ def test_recorded_forces(periodic):
     rough = surface()
     model = HalfSpaceModel(surface=rough, contact_modulus=E_STAR, periodic=periodic)
     assert table[:, 0] == pytest.approx(APPROACHES)
-    forces = [model.solve(approach).force for approach in APPROACHES]
+    forces = [model.press(Control(approach=approach)).force for approach in APPROACHES]
     # same kernel, same conditions: what differs is the peer's remaining penetration, 1e-9 δ
     assert forces == pytest.approx(table[:, 1 + periodic], rel=1e-6)
 
@@ -29,4 +30,6 @@ def test_forces_today(periodic):
     model = HalfSpaceModel(surface=rough, contact_modulus=E_STAR, periodic=periodic)
     for approach in APPROACHES[::4]:
         expected = force(rough, approach, periodic=periodic)
-        assert model.solve(approach).force == pytest.approx(expected, rel=1e-6)  # as above
+        assert model.press(Control(approach=approach)).force == pytest.approx(
+            expected, rel=1e-6
+        )  # as above

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.asperity_states import pressed
 from helpers.interaction_cases import E_STAR, summits
 from scipy.optimize import brentq
 
@@ -15,10 +16,10 @@ every_model = pytest.mark.parametrize("name", MODELS)
 def test_two_summits_that_nearly_coincide(name, apart):
     # hard: the interaction matrix is singular to 1e-7 and less; both together carry one's force
     pair = AsperityModel(name, summits([0.5, 0.5 + apart], 0.5), contact_modulus=E_STAR)
-    one = AsperityModel(name, summits(0.5, 0.5), contact_modulus=E_STAR).solve(0.02)
-    found = pair.solve(0.02)
+    one = pressed(AsperityModel(name, summits(0.5, 0.5), contact_modulus=E_STAR), 0.02)
+    found = pressed(pair, 0.02)
     # the gap between the summits changes the force by its square over the radius
-    assert found.contacts.force.sum() == pytest.approx(one.contacts.force[0], rel=1e-6)
+    assert found.ellipses.force.sum() == pytest.approx(one.ellipses.force[0], rel=1e-6)
     assert found.residual <= 1e-10 and found.iterations <= 30
 
 
@@ -28,9 +29,9 @@ def test_a_twin_a_little_lower_overlaps(name):
     forces = []
     for lower in (0.0, 1e-12, 1e-9, 1e-6, 1e-3):
         twins = summits([0.5, 0.5 + 1e-9], 0.5, z=[0.0, -lower])
-        state = AsperityModel(name, twins, contact_modulus=E_STAR).solve(0.02)
+        state = pressed(AsperityModel(name, twins, contact_modulus=E_STAR), 0.02)
         assert state.residual <= 1e-10
-        forces.append(state.contacts.force.sum())
+        forces.append(state.ellipses.force.sum())
     np.testing.assert_allclose(forces[:3], forces[0], rtol=1e-6)
     assert np.all(np.isfinite(forces))
 
@@ -43,8 +44,8 @@ def test_radii_from_a_circle_to_a_line(name):
     for ratio in ratios:
         # the same R = √(R'R'') of 0.1 mm
         one = summits(0.5, 0.5, major=0.1 * np.sqrt(ratio), minor=0.1 / np.sqrt(ratio))
-        state = AsperityModel(name, one, contact_modulus=E_STAR).solve(1e-3)
-        forces.append(float(state.contacts.force[0]))
+        state = pressed(AsperityModel(name, one, contact_modulus=E_STAR), 1e-3)
+        forces.append(float(state.ellipses.force[0]))
     # F1(e) = 1 + O(ε²)
     np.testing.assert_allclose(forces[:4], forces[0], rtol=1e-9)
     if name.startswith("circular"):
@@ -63,10 +64,10 @@ def test_needles_side_by_side():
     radii = {"major": 0.1 * 1e3, "minor": 0.1 / 1e3}
     two = summits([0.2, 0.8], 0.5, angle=np.pi / 2, **radii)
     model = AsperityModel("elliptic", two, contact_modulus=E_STAR)
-    state = model.solve(1e-4)
-    alone = AsperityModel("elliptic-independent", two, contact_modulus=E_STAR).solve(1e-4)
+    state = pressed(model, 1e-4)
+    alone = pressed(AsperityModel("elliptic-independent", two, contact_modulus=E_STAR), 1e-4)
     assert state.residual <= 1e-10
-    assert state.contacts.force[0] == pytest.approx(state.contacts.force[1], rel=1e-9)
+    assert state.ellipses.force[0] == pytest.approx(state.ellipses.force[1], rel=1e-9)
     assert (
-        0.3 < state.contacts.force.sum() / alone.contacts.force.sum() < 1.0
+        0.3 < state.ellipses.force.sum() / alone.ellipses.force.sum() < 1.0
     )  # each sinks by the other

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hardness_peer_table import CASES, E_STAR, SEEDS, surface
 
+from geometry import Control
 from micro import HalfSpaceModel
 
 TABLE = np.loadtxt(Path(__file__).parent / "data" / "hardness_peer.csv", delimiter=",")
@@ -18,6 +19,6 @@ def test_recorded_forces(seed):
     assert [tuple(row) for row in rows[:, 1:3]] == CASES
     for _, approach, hardness, force, yielding in rows:
         model = HalfSpaceModel(rough, contact_modulus=E_STAR, hardness=hardness, tolerance=1e-10)
-        state = model.solve(approach)
+        state = model.press(Control(approach=approach))
         assert state.force == pytest.approx(force, rel=1e-6)
         assert np.count_nonzero(state.yielding) == yielding

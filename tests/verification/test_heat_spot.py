@@ -8,7 +8,7 @@ from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from geometry import Surface
+from geometry import Control, Surface
 from macro.compat import assemble_matrix, assemble_vector, compile_form, scalar_space
 from micro import HalfSpaceModel
 from micro.conductance import total_conductance
@@ -71,7 +71,7 @@ def test_heat_through_a_meshed_spot_is_that_of_its_stiffness():
     x = (np.arange(192) + 0.5) / 192 - 0.5
     sphere = Surface(heights=-(x[:, None] ** 2 + x**2) / (2 * RADIUS), lengths=(1.0, 1.0))
     model = HalfSpaceModel(sphere, contact_modulus=MODULUS, highest=0.0)
-    stiffness = model.solve(APPROACH).interface_stiffness()
+    stiffness = model.interface_stiffness(model.press(Control(approach=APPROACH)))
     by_stiffness = total_conductance(stiffness, MODULUS, CONDUCTIVITY)
     # cells at the edge of the contact: 0.5 % (test_conductance)
     assert by_stiffness == pytest.approx(fine / finite, abs=bar + 5e-3 * fine)

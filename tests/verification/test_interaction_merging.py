@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.along import respond
+from helpers.asperity_states import pressed
 from helpers.interaction_cases import E_STAR, PATCHES, summits
 
 from micro import AsperityModel
@@ -42,7 +44,7 @@ both_shapes = pytest.mark.parametrize("name", ["circular", "elliptic"])
 
 def curve(case, name, approaches):
     model = AsperityModel(name, CASES[case], contact_modulus=E_STAR)
-    return model.respond(approaches, patches=PATCHES, mean_heights=np.zeros(16))
+    return respond(model, approaches, patches=PATCHES, mean_heights=np.zeros(16))
 
 
 @both_shapes
@@ -67,10 +69,10 @@ def test_result_does_not_depend_on_the_path(case, name):
     # One solution per approach: from nothing, from below and from far above.
     model = AsperityModel(name, CASES[case], contact_modulus=E_STAR)
     for approach in (0.01, 0.04):
-        cold = model.solve(approach)
-        above = model.solve(approach, start=model.solve(0.1).start)
-        assert above.contacts.force == pytest.approx(
-            cold.contacts.force, rel=1e-7, abs=1e-7 * cold.contacts.force.max()
+        cold = pressed(model, approach)
+        above = pressed(model, approach, start=pressed(model, 0.1).guess)
+        assert above.ellipses.force == pytest.approx(
+            cold.ellipses.force, rel=1e-7, abs=1e-7 * cold.ellipses.force.max()
         )
 
 
@@ -79,23 +81,23 @@ def test_result_does_not_depend_on_the_path(case, name):
 def test_coincident_summits_share_the_force_of_one(name, count, share):
     same, one = summits(np.full(count, 0.5), 0.5), summits(0.5, 0.5)
     all_of_them, alone = (
-        AsperityModel(name, case, contact_modulus=E_STAR).solve(0.02) for case in (same, one)
+        pressed(AsperityModel(name, case, contact_modulus=E_STAR), 0.02) for case in (same, one)
     )
     # n (1 + (n − 1) c*)^(−3/2): exactly 1 for two by the choice of c*, three digits given else.
     tolerance = 1e-9 if count == 2 else 1e-3
-    assert all_of_them.contacts.force.sum() / alone.contacts.force[0] == pytest.approx(
+    assert all_of_them.ellipses.force.sum() / alone.ellipses.force[0] == pytest.approx(
         share, rel=tolerance
     )
-    assert all_of_them.start.solution.overlapping_contacts == count * (count - 1)
+    assert all_of_them.overlapping_contacts == count * (count - 1)
 
 
 @both_shapes
 def test_kernel_is_exact_before_merging(name):
     # Circles of radius a, r apart, are within reach of each other's summit from a = 0.797 r on.
     model = AsperityModel(name, CASES["two equal"], contact_modulus=E_STAR)
-    states = [model.solve(approach) for approach in np.linspace(1e-3, 0.03, 100)]
-    reach = np.array([state.contacts.semi_axes[0, 0] for state in states]) / 0.04
-    overlapping_contacts = np.array([state.start.solution.overlapping_contacts for state in states])
+    states = [pressed(model, approach) for approach in np.linspace(1e-3, 0.03, 100)]
+    reach = np.array([state.ellipses.semi_axes[0, 0] for state in states]) / 0.04
+    overlapping_contacts = np.array([state.overlapping_contacts for state in states])
     assert np.all(overlapping_contacts[reach < 0.796] == 0) and np.all(
         overlapping_contacts[reach > 0.798] == 2
     )

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.asperity_states import displacement, interference
+from helpers.asperity_states import displacement, interference, pressed
 from helpers.interaction_cases import E_STAR, oracle, summits
 
 from micro import SOLVERS, AsperityModel
@@ -41,24 +41,24 @@ def test_against_brute_force(case, solver):
     asperities, approach, contacting = CASES[case]
     force, moved = oracle(asperities, approach, contacting)
     model = AsperityModel("elliptic", asperities, contact_modulus=E_STAR, solver=solver)
-    state = model.solve(approach)
-    assert np.flatnonzero(state.contacts.force).tolist() == contacting
-    assert state.start.solution.overlapping_contacts == 0  # the oracle has the exact kernel
+    state = pressed(model, approach)
+    assert np.flatnonzero(state.ellipses.force).tolist() == contacting
+    assert state.overlapping_contacts == 0  # the oracle has the exact kernel
     # The oracle's quadratures are good to 1e-10 at these distances, the solver stops at 1e-10.
-    assert state.contacts.force == pytest.approx(E_STAR * force, rel=1e-7, abs=1e-12)
+    assert state.ellipses.force == pytest.approx(E_STAR * force, rel=1e-7, abs=1e-12)
     assert displacement(model, state) == pytest.approx(moved, rel=1e-8)
 
 
 def test_shielded_summit_is_in_the_inequality():
     asperities, approach, _ = CASES["three, one shielded"]
     model = AsperityModel("elliptic", asperities, contact_modulus=E_STAR)
-    state = model.solve(approach)
+    state = pressed(model, approach)
     required = interference(asperities, state)[1]
     assert required == pytest.approx(5e-4)  # it would touch if it were alone
     assert displacement(model, state)[1] > 1.5 * required  # the others push it further
-    assert state.contacts.force[1] == 0.0
+    assert state.ellipses.force[1] == 0.0
     alone = AsperityModel("elliptic-independent", asperities, contact_modulus=E_STAR)
-    assert alone.solve(approach).contacts.force[1] > 0.0
+    assert pressed(alone, approach).ellipses.force[1] > 0.0
 
 
 @pytest.mark.parametrize("name", ["elliptic", "circular"])
@@ -67,15 +67,17 @@ def test_far_apart_is_independent(name):
     for radius in (1e-6, 1e-8):
         pair = summits([0.1, 0.9], 0.5, major=2 * radius, minor=radius)
         approach = 0.01 * radius
-        state = AsperityModel(name, pair, contact_modulus=E_STAR).solve(approach)
-        alone = AsperityModel(f"{name}-independent", pair, contact_modulus=E_STAR).solve(approach)
-        lost = 1 - state.contacts.force / alone.contacts.force
-        expected = 1.5 * alone.contacts.force / (np.pi * E_STAR * 0.8 * approach)
+        state = pressed(AsperityModel(name, pair, contact_modulus=E_STAR), approach)
+        alone = pressed(
+            AsperityModel(f"{name}-independent", pair, contact_modulus=E_STAR), approach
+        )
+        lost = 1 - state.ellipses.force / alone.ellipses.force
+        expected = 1.5 * alone.ellipses.force / (np.pi * E_STAR * 0.8 * approach)
         assert lost == pytest.approx(expected, rel=1e-3)  # next order: the loss itself, 1e-7
         assert np.all(lost < 0.2 * radius)
 
 
 def test_symmetric_pair_shares_equally():
     pair = summits([0.46, 0.54], [0.47, 0.53], major=0.2, minor=0.1, angle=0.8)
-    state = AsperityModel("elliptic", pair, contact_modulus=E_STAR).solve(6e-3)
-    assert state.contacts.force[0] == pytest.approx(state.contacts.force[1], rel=1e-13)
+    state = pressed(AsperityModel("elliptic", pair, contact_modulus=E_STAR), 6e-3)
+    assert state.ellipses.force[0] == pytest.approx(state.ellipses.force[1], rel=1e-13)

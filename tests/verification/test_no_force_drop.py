@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.along import respond
 from helpers.interaction_cases import E_STAR, PATCHES, set_1
 
 from micro import MODELS, AsperityModel
@@ -14,7 +15,7 @@ APPROACHES = np.linspace(0.5e-3, 52e-3, 52)
 def test_force_never_falls(seed, kind):
     _, asperities, means = set_1(seed)
     model = AsperityModel(kind, asperities, contact_modulus=E_STAR)
-    response = model.respond(APPROACHES, patches=PATCHES, mean_heights=means)
+    response = respond(model, APPROACHES, patches=PATCHES, mean_heights=means)
     assert np.all(np.diff(response.force) > 0.0)
     # Ellipses overlap long before: the kernel of merging contacts starts to act.
     assert response.contact_area_fraction[-1] > 0.1

@@ -37,7 +37,7 @@ def two_spheres():
 
 
 def test_two_spheres_feel_each_other(balls):
-    expected = on_block(balls).solve(APPROACH).force
+    expected = on_block(balls).press(Control(approach=APPROACH)).force
     _, state = pressed(balls, APPROACH, fine=SIZE / 3.0, patches=HALVES)
     alone = 8.0 / 3.0 * MODULUS * np.sqrt(RADIUS) * APPROACH**1.5
     assert expected / alone < 0.9  # measured 0.83: each sinks in the other's pit

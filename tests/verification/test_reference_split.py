@@ -47,7 +47,7 @@ def forces(seed, scale, edges):
     "seed", [3, *(pytest.param(seed, marks=pytest.mark.long) for seed in (2, 4))]
 )
 def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
-    force = on_block(rough(seed)).solve(APPROACH).force
+    force = on_block(rough(seed)).press(Control(approach=APPROACH)).force
     found, sizes = forces(seed, FLAT, 2.0)
     estimate = extrapolated(found[:, None], sizes, 3.0)
     value, bar = float(estimate.value[0]), float(estimate.error[0])

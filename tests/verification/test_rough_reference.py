@@ -37,7 +37,7 @@ def expected(sphere):
     model = on_block(sphere)
     slopes = slope_effect(model, APPROACH, MATERIAL.poisson_ratio)
     assert slopes == pytest.approx(-1.5e-3, abs=2e-4)  # the height of the cap is 8e-4 of the block
-    return model.solve(APPROACH).force * (1.0 + slopes)
+    return model.press(Control(approach=APPROACH)).force * (1.0 + slopes)
 
 
 def pressed(sphere, element, refinement):

@@ -114,22 +114,3 @@ def test_refused_depths_shorten_steps_and_starts():
         assert plane[0] == pytest.approx(exact, rel=1e-12)  # 1e-13 of the force
     with pytest.raises(NotConverged, match="TOO_DEEP"):  # where a refusal is final
         find_equilibrium(respond, control, np.array([10.0 * exact, 0.0, 0.0]), 1.0)
-
-
-@pytest.mark.parametrize("known", [0.3, 1.0, 3.0])
-def test_inexact_stiffness_is_corrected_by_the_last_step(known):
-    supports, calls = Supports(*TRIANGLE.T, power=1.0), []
-
-    def respond(plane):
-        calls.append(plane)
-        return PlaneResponse(
-            loads=supports(plane).loads,
-            stiffness=lambda: known * supports(plane).stiffness(),
-            state=supports.forces(plane),
-        )
-
-    control = Control(force=1.0, tilt=None)
-    start = np.array([1e-2, 0.0, 0.0])
-    _, found = find_equilibrium(respond, control, start, 1.0, aim=1e-9, nearly=True)
-    np.testing.assert_allclose(found, SHARES, rtol=1e-8)
-    assert len(calls) <= 12

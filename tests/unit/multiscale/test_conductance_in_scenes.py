@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from geometry import Control
 from micro import HalfSpaceModel
 from micro.conductance import STEFAN_BOLTZMANN
 from multiscale import Run, Scene, make_setup, run
@@ -47,7 +48,9 @@ def test_contacts_on_half_spaces_conduct_by_their_stiffness():
     for approach, conductance in zip(
         history.approach_mm, history.thermal_conductance_W_per_K, strict=True
     ):
-        ahead, behind = (model.solve(approach + way).force for way in (step, -step))
+        ahead, behind = (
+            model.press(Control(approach=approach + way)).force for way in (step, -step)
+        )
         rate = (ahead - behind) / (2 * step)
         expected = 2.0 * PAIR / model.contact_modulus * rate * 1e-3  # N/mm / MPa = mm
         assert conductance == pytest.approx(expected, rel=1e-4)

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from geometry import Control
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup, run, sweep
 from multiscale.loading.energy import BALANCE, missing_energy
@@ -65,7 +66,7 @@ def test_the_scene_is_the_model_under_a_bound():
         setup.surface, contact_modulus=setup.materials.contact_modulus, hardness=HARDNESS
     )
     (step,) = run(setup.scene)
-    assert step.force_N == pytest.approx(model.solve(0.008).force, rel=1e-7)
+    assert step.force_N == pytest.approx(model.press(Control(approach=0.008)).force, rel=1e-7)
 
 
 def test_laws_of_rising_loads_meet_the_contact_problem():
@@ -85,9 +86,9 @@ def test_representative_laws_end_below_the_hardness():
         make_model=lambda sample: HalfSpaceModel(sample, **given),
     )  # fmt: skip
     # the last row has the plane at the height of the mean plane
-    end = HalfSpaceModel(surface, **given).solve(law.initial_separation)
+    end = HalfSpaceModel(surface, **given).press(Control(approach=law.initial_separation))
     assert law.rows.pressure[-1] == pytest.approx(end.force / surface.area, rel=1e-6)
-    state = HalfSpaceModel(surface, **given).solve_force(0.2 * HARDNESS * surface.area)
+    state = HalfSpaceModel(surface, **given).press(Control(force=0.2 * HARDNESS * surface.area))
     # closure and approach both count from the highest point
     assert law.pressure(state.approach) == pytest.approx(0.2 * HARDNESS, rel=2e-2)
 

@@ -106,8 +106,8 @@ def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
     setup = Run(scene("concurrent")).coupling
     probe = ErrorProbe(model=setup.micro, on_body=setup.put_on_body, order=0, by_laws=True)
     free = Control(approach=0.006, tilt=None)
-    turned = probe.on_body(setup.micro, 0).equilibrium(free)
-    level = probe.on_body(setup.micro, 0).solve(0.006)
+    turned = probe.on_body(setup.micro, 0).press(free)
+    level = probe.on_body(setup.micro, 0).press(Control(approach=0.006))
     assert max(map(abs, turned.plane.tilt)) > 1e-4
     for turns, force in ((True, turned.force), (False, level.force)):
         found = probe.measure(force + 0.1, 0.006, (0.0, 0.0), turns=turns)
@@ -162,7 +162,7 @@ def test_fewer_modes_are_solved_on_the_body_itself():
     body = setup.put_on_body
     probe = ErrorProbe(model=setup.micro, on_body=body, order=2)
     stiff = replace(probe, on_body=lambda model, order: replace(body(model, order), body=None))
-    force = body(setup.micro, 2).solve(0.006).force
+    force = body(setup.micro, 2).press(Control(approach=0.006)).force
     assert probe.measure(force, 0.006, (0.0, 0.0)).parts["body"] > 0.0
     assert "body" not in stiff.measure(force, 0.006, (0.0, 0.0)).parts
 

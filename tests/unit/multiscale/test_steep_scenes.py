@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from geometry import InputError
+from geometry import Control, InputError
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, run
 from multiscale.output.results import write_results
@@ -95,6 +95,6 @@ class Repelling:
 
 def test_pressures_without_an_energy_are_no_solution():
     surface = Run(scene(0.2)).coupling.surface
-    model = HalfSpaceModel(surface, contact_modulus=4000.0, slopes=Repelling())
+    model = HalfSpaceModel(surface, contact_modulus=4000.0, slopes=(Repelling(),))
     with pytest.raises(NotConverged, match=r"finite slopes.*micro\.finite_slopes = false"):
-        model.solve_force(1.3)
+        model.press(Control(force=1.3))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from helpers.asperity_states import displacement, interference, surface_displacement
+from helpers.along import respond
+from helpers.asperity_states import displacement, interference, pressed, surface_displacement
 
 from geometry import Control, InputError, PatchGrid, Surface
 from micro import MODELS, AsperityModel, HertzContact, micro_model
-from micro.asperities.patch_sums import patch_loads
 
 E_STAR = 4000.0
 ONE_PATCH = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -15,71 +15,70 @@ every_model = pytest.mark.parametrize("name", MODELS)
 interacting = pytest.mark.parametrize("name", ["elliptic", "circular"])
 
 
-def respond(model, approaches, patches=PATCHES, **options):
+def curve(model, approaches, patches=PATCHES, **options):
     heights = np.full(patches.count, model.asperities.mean_height)
-    return model.respond(approaches, patches=patches, mean_heights=heights, **options)
+    return respond(model, approaches, patches=patches, mean_heights=heights, **options)
 
 
 @every_model
 def test_name_and_kind(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     assert model.name == name
-    assert model.contacts.kind.elliptic == name.startswith("elliptic")
-    assert model.contacts.kind.interacting == (not name.endswith("independent"))
+    assert (not model.pairs.circular) == name.startswith("elliptic")
+    assert model.pairs.half_space == (not name.endswith("independent"))
 
 
 @every_model
 def test_single_asperity_is_hertz(summits, name):
     one = summits(0.3, 0.7, z=-1e-3, major=0.4, minor=0.1, highest=0.0)
     model = AsperityModel(name, one, contact_modulus=E_STAR)
-    state = model.solve(5e-3)
+    state = pressed(model, 5e-3)
     radii = (0.4, 0.1) if name.startswith("elliptic") else (0.2, 0.2)
     hertz = HertzContact(
         contact_modulus=E_STAR, radius_major=radii[0], radius_minor=radii[1], indentation=4e-3
     )
     assert interference(one, state) == pytest.approx([4e-3])
     assert displacement(model, state) == pytest.approx([4e-3])
-    assert state.contacts.force == pytest.approx([hertz.force])
-    assert state.contacts.area == pytest.approx([hertz.area])
+    assert state.ellipses.force == pytest.approx([hertz.force])
+    assert state.ellipses.area == pytest.approx([hertz.area])
     axes = np.array([[hertz.semi_major, hertz.semi_minor]])
-    assert state.contacts.semi_axes == pytest.approx(axes)
+    assert state.ellipses.semi_axes == pytest.approx(axes)
 
 
 @pytest.mark.parametrize("name", ["elliptic-independent", "circular-independent"])
 def test_independent_models_are_sums(cluster, name):
-    solution = AsperityModel(name, cluster, contact_modulus=E_STAR).solve(3e-3).start.solution
-    assert solution.displacement == pytest.approx(np.maximum(3e-3 + cluster.z, 0.0))
-    assert solution.indentation == pytest.approx(solution.displacement)
-    assert solution.iterations == 0 and solution.residual == 0.0
+    state = pressed(AsperityModel(name, cluster, contact_modulus=E_STAR), 3e-3)
+    assert state.indentation == pytest.approx(np.maximum(3e-3 + cluster.z, 0.0))
+    assert state.iterations == 0 and state.residual == 0.0
 
 
 @interacting
 def test_neighbours_share_the_load(cluster, name):
-    alone = AsperityModel(f"{name}-independent", cluster, contact_modulus=E_STAR).solve(3e-3)
+    alone = pressed(AsperityModel(f"{name}-independent", cluster, contact_modulus=E_STAR), 3e-3)
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    state = model.solve(3e-3)
+    state = pressed(model, 3e-3)
     moved = displacement(model, state)
-    assert np.all(state.contacts.force <= alone.contacts.force)
-    assert state.contacts.force.sum() < 0.9 * alone.contacts.force.sum()
+    assert np.all(state.ellipses.force <= alone.ellipses.force)
+    assert state.ellipses.force.sum() < 0.9 * alone.ellipses.force.sum()
     assert np.all(moved >= interference(cluster, state) - 1e-10 * 3e-3)
-    assert np.all(moved > state.start.solution.indentation)  # the others press every summit
+    assert np.all(moved > state.indentation)  # the others press every summit
 
 
 @every_model
 def test_state_is_consistent(cluster, name):
-    state = AsperityModel(name, cluster, contact_modulus=E_STAR).solve(4e-3)
-    on = state.start.solution.indentation > 0.0
-    assert 0 < on.sum() and np.all(state.contacts.force[~on] == 0.0)
-    assert state.contacts.area == pytest.approx(np.pi * state.contacts.semi_axes.prod(axis=1))
+    state = pressed(AsperityModel(name, cluster, contact_modulus=E_STAR), 4e-3)
+    on = state.indentation > 0.0
+    assert 0 < on.sum() and np.all(state.ellipses.force[~on] == 0.0)
+    assert state.ellipses.area == pytest.approx(np.pi * state.ellipses.semi_axes.prod(axis=1))
 
 
 @every_model
 @pytest.mark.parametrize("approach", [0.0, -1e-3])
 def test_before_touch(cluster, name, approach):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    state = model.solve(approach)
-    assert not state.contacts.force.any() and not displacement(model, state).any()
-    response = respond(model, [approach])
+    state = pressed(model, approach)
+    assert not state.ellipses.force.any() and not displacement(model, state).any()
+    response = curve(model, [approach])
     assert response.force == [0.0] and response.contacts == [0] and not response.patch_force.any()
     assert response.mean_separation == pytest.approx([0.02 - approach])
 
@@ -88,52 +87,37 @@ def test_before_touch(cluster, name, approach):
 def test_no_asperities(summits, name):
     none = summits([], [], highest=0.0)
     model = AsperityModel(name, none, contact_modulus=E_STAR)
-    assert len(model.solve(1e-3).contacts.force) == 0
-    assert respond(model, [1e-3, 2e-3]).force.tolist() == [0.0, 0.0]
+    assert len(pressed(model, 1e-3).ellipses.force) == 0
+    assert curve(model, [1e-3, 2e-3]).force.tolist() == [0.0, 0.0]
 
 
 @interacting
 def test_warm_start(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    near = model.solve(4.0e-3)
-    cold, warm = model.solve(4.1e-3), model.solve(4.1e-3, start=near.start)
-    assert warm.start.solution.iterations < cold.start.solution.iterations
+    near = pressed(model, 4.0e-3)
+    cold, warm = pressed(model, 4.1e-3), pressed(model, 4.1e-3, start=near.guess)
+    assert warm.iterations < cold.iterations
     # both stop at 1e-10 in displacement
-    assert warm.contacts.force == pytest.approx(cold.contacts.force, rel=1e-8)
-
-
-@every_model
-def test_curve_is_made_of_states(cluster, name):
-    model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    approaches = np.array([4e-3, 0.0, 1e-3, 8e-3, 4e-3])  # any order, repeated
-    response = respond(model, approaches)
-    assert response.approach.tolist() == approaches.tolist()
-    for row, approach in enumerate(approaches):
-        state = model.solve(approach)
-        assert response.force[row] == pytest.approx(state.contacts.force.sum(), rel=1e-7, abs=1e-15)
-        assert response.contact_area[row] == pytest.approx(state.contacts.area.sum(), rel=1e-7)
-        assert response.contacts[row] == (state.contacts.force > 0.0).sum()
-        by_patch, _ = patch_loads(PATCHES, state.contacts)
-        assert response.patch_force[row] == pytest.approx(by_patch, rel=1e-7, abs=1e-12)
+    assert warm.ellipses.force == pytest.approx(cold.ellipses.force, rel=1e-8)
 
 
 def test_without_patches_the_whole_surface_is_one(cluster):
     model = AsperityModel("elliptic", cluster, contact_modulus=E_STAR)
-    alone, given = model.respond([4e-3]), respond(model, [4e-3], ONE_PATCH)
+    alone, given = respond(model, [4e-3]), curve(model, [4e-3], ONE_PATCH)
     assert alone.patch_force[0] == alone.force == given.force
     assert alone.mean_separation == given.mean_separation
-    pressed = model.press(Control(force=float(alone.force[0]))).response
-    assert pressed.approach == pytest.approx([4e-3], rel=1e-8)  # forces are met to 1e-9
+    forced = model.press(Control(force=float(alone.force[0])))
+    assert forced.approach == pytest.approx(4e-3, rel=1e-8)  # forces are met to 1e-9
     message = r"asperities do not know the mean heights of patches \(allowed: mean_heights, or no"
     with pytest.raises(InputError, match=message):
-        model.respond([4e-3], patches=PATCHES)
+        respond(model, [4e-3], patches=PATCHES)
 
 
 @every_model
 def test_tilt(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
     tilt = (5e-3, -8e-3)
-    state = model.solve(3e-3, tilt=tilt)
+    state = pressed(model, 3e-3, tilt=tilt)
     # The same as asperities of other heights under a level plane.
     raise_by = tilt[0] * (cluster.x - 0.5) + tilt[1] * (cluster.y - 0.5)
     arrays = {key: getattr(cluster, key) for key in ("x", "y", "radius_major", "radius_minor")}
@@ -145,10 +129,10 @@ def test_tilt(cluster, name):
         highest=0.0,
         mean_height=-0.02,
     )
-    level = AsperityModel(name, turned, contact_modulus=E_STAR).solve(3e-3)
-    assert state.contacts.force == pytest.approx(level.contacts.force, rel=1e-9)
-    response = respond(model, [3e-3], tilt=tilt)
-    assert response.force[0] == pytest.approx(state.contacts.force.sum(), rel=1e-9)
+    level = pressed(AsperityModel(name, turned, contact_modulus=E_STAR), 3e-3)
+    assert state.ellipses.force == pytest.approx(level.ellipses.force, rel=1e-9)
+    response = curve(model, [3e-3], tilt=tilt)
+    assert response.force[0] == pytest.approx(state.ellipses.force.sum(), rel=1e-9)
     # The plane's mean approach is that of its centre, patch by patch that of the patch's centre.
     local = 3e-3 + (PATCHES.centres - 0.5) @ np.array(tilt)
     gap = 0.02 - local + response.patch_displacement[0]
@@ -158,11 +142,13 @@ def test_tilt(cluster, name):
 
 @every_model
 def test_homogeneous_in_the_modulus(cluster, name):
-    soft, hard = (AsperityModel(name, cluster, contact_modulus=E).solve(4e-3) for E in (1.0, 7e4))
+    soft, hard = (
+        pressed(AsperityModel(name, cluster, contact_modulus=E), 4e-3) for E in (1.0, 7e4)
+    )
     # rounding only
-    assert hard.contacts.force == pytest.approx(7e4 * soft.contacts.force, rel=1e-12)
-    assert hard.contacts.area == pytest.approx(soft.contacts.area, rel=1e-12)
-    moved = [state.start.solution.displacement for state in (soft, hard)]
+    assert hard.ellipses.force == pytest.approx(7e4 * soft.ellipses.force, rel=1e-12)
+    assert hard.ellipses.area == pytest.approx(soft.ellipses.area, rel=1e-12)
+    moved = [state.indentation for state in (soft, hard)]
     assert moved[1] == pytest.approx(moved[0], rel=1e-12)
 
 
@@ -172,24 +158,24 @@ def test_round_asperities_make_the_models_equal(summits):
         *rng.random((2, 40)), z=-5e-3 * rng.random(40), major=0.02 + 0.1 * rng.random(40)
     )
     ellipse, circle = (
-        AsperityModel(name, balls, contact_modulus=E_STAR).solve(8e-3)
+        pressed(AsperityModel(name, balls, contact_modulus=E_STAR), 8e-3)
         for name in ("elliptic", "circular")
     )
-    assert (circle.contacts.force > 0.0).sum() > 10
+    assert (circle.ellipses.force > 0.0).sum() > 10
     # Kernels agree to 1e-13; both iterations take the same path to the same 1e-10.
-    assert ellipse.contacts.force == pytest.approx(circle.contacts.force, rel=1e-12)
-    assert ellipse.contacts.area == pytest.approx(circle.contacts.area, rel=1e-12)
+    assert ellipse.ellipses.force == pytest.approx(circle.ellipses.force, rel=1e-12)
+    assert ellipse.ellipses.area == pytest.approx(circle.ellipses.area, rel=1e-12)
 
 
 @interacting
 def test_surface_displacement(cluster, name):
     model = AsperityModel(name, cluster, contact_modulus=E_STAR)
-    state = model.solve(2e-4)  # small contacts: no kernel is continued
-    assert state.start.solution.overlapping_contacts == 0
+    state = pressed(model, 2e-4)  # small contacts: no kernel is continued
+    assert state.overlapping_contacts == 0
     summits = surface_displacement(model, state, cluster.x, cluster.y)
     assert summits == pytest.approx(displacement(model, state), rel=1e-12)
     far = surface_displacement(model, state, 1e3, 0.0)
-    assert far == pytest.approx(state.contacts.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
+    assert far == pytest.approx(state.ellipses.force.sum() / (np.pi * E_STAR * 1e3), rel=1e-2)
 
 
 def test_refuses(cluster):
@@ -203,14 +189,12 @@ def test_refuses(cluster):
         AsperityModel("circular", cluster, contact_modulus=-1.0)
     model = AsperityModel("elliptic", cluster, contact_modulus=1.0)
     with pytest.raises(InputError, match="inf: the approach must be finite"):
-        model.solve(np.inf)
-    with pytest.raises(InputError, match=r"\(3,\): every patch needs one mean height"):
-        model.respond([1e-3], patches=PATCHES, mean_heights=np.zeros(3))
-    with pytest.raises(InputError, match="a response needs at least one approach"):
-        model.respond([], patches=ONE_PATCH, mean_heights=[0.0])
+        pressed(model, np.inf)
+    with pytest.raises(InputError, match="every patch needs one finite mean height"):
+        respond(model, [1e-3], patches=PATCHES, mean_heights=np.zeros(3))
     corner = PatchGrid(grid=(1, 1), lengths=(0.5, 0.5))
     with pytest.raises(InputError, match="points lie outside the patches"):
-        model.respond([1e-3], patches=corner, mean_heights=[0.0])
+        respond(model, [1e-3], patches=corner, mean_heights=[0.0])
 
 
 def test_unknown_model_by_name():

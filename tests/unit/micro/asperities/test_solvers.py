@@ -5,8 +5,8 @@ import pytest
 from helpers.asperity_states import places
 
 from geometry import NotConverged
-from micro.asperities.contact_problem import TOLERANCE, ContactProblem, active_set, damped_step
 from micro.asperities.hertz_pairs import HertzPairs
+from micro.asperities.summit_problem import TOLERANCE, SummitProblem, active_set, damped_step
 from micro.asperities.truncated_newton import truncated_newton
 from micro.closed_forms.hertz import shape_factors
 
@@ -15,7 +15,7 @@ def problem(asperities, approach):
     shape = shape_factors(asperities.radius_major, asperities.radius_minor)
     kernel = HertzPairs(**places(asperities), shape=shape, circular=False)
     interference = np.maximum(approach + asperities.z, 1e-9)
-    return ContactProblem(interaction=kernel.evaluate, interference=interference)
+    return SummitProblem(interaction=kernel.evaluate, interference=interference)
 
 
 both = pytest.mark.parametrize("method", [active_set, truncated_newton])

@@ -6,8 +6,8 @@ import pytest
 
 from geometry import PatchGrid
 from micro import influence_matrix
+from micro.boundary_elements.grid_compliance import Compliance
 from micro.closed_forms.love import love_mean, mutual_influence
-from micro.compliance.grid_compliance import Compliance
 
 
 def _exact(dx, dy, a, b):

@@ -4,9 +4,10 @@ import pickle
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
 from geometry import Control, InputError, PatchGrid, Spectrum, patch_means, synthesise
-from micro import MODEL_NAMES, HalfSpaceModel, micro_model
+from micro import MODEL_NAMES, HalfSpaceModel, micro_model, press_along
 
 SPECTRUM = Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=5)
 SURFACE = synthesise(SPECTRUM, grid=(48, 40), lengths=(1.0, 0.9))
@@ -27,36 +28,40 @@ def press(model, *, start=None, **given):
 
 
 def same(one, other, rel):
-    assert one.force[0] == pytest.approx(other.force[0], rel=rel)
+    assert one.force == pytest.approx(other.force, rel=rel)
     assert one.patch_force == pytest.approx(other.patch_force, rel=10 * rel, abs=rel)
-    assert one.moment == pytest.approx(other.moment, abs=10 * rel * other.force[0])
+    assert one.moment == pytest.approx(other.moment, abs=10 * rel * other.force)
     assert one.patch_separation == pytest.approx(other.patch_separation, abs=1e-8)
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
-def test_is_a_row_of_the_curve(model, tilt):
-    row = model.respond([APPROACH], patches=PATCHES, mean_heights=MEANS, tilt=tilt)
-    assert row.force[0] > 0.0
-    same(press(model, approach=APPROACH, tilt=tilt).response, row, rel=1e-12)
+def test_a_path_is_made_of_states(model, tilt):
+    approaches = APPROACH * np.array([0.5, -0.1, 1.0, 0.25, 0.5])  # any order, repeated
+    path = press_along(model, approaches, patches=PATCHES, mean_heights=MEANS, tilt=tilt)
+    assert [state.approach for state in path] == approaches.tolist()
+    for state in path:
+        alone = press(model, approach=state.approach, tilt=tilt)
+        same(state, alone, rel=1e-7)  # residuals of 1e-8 of the approach
+        assert state.contacts == alone.contacts
 
 
 def test_a_model_can_be_sent_to_other_ranks_after_it_was_pressed(model):
-    found = press(model, force=0.5, tilt=None).response
+    found = press(model, force=0.5, tilt=None)
     sent = pickle.loads(pickle.dumps(model))
-    same(press(sent, force=0.5, tilt=None).response, found, rel=1e-12)  # the same arithmetic
+    same(press(sent, force=0.5, tilt=None), found, rel=1e-12)  # the same arithmetic
 
 
 def test_a_vanishing_tilt_changes_nothing(model):
-    level = press(model).response
+    level = press(model)
     # 1e-12 of tilt are 1e-10 of the approach at the border
-    same(press(model, approach=APPROACH, tilt=(1e-12, 0.0)).response, level, rel=1e-9)
+    same(press(model, approach=APPROACH, tilt=(1e-12, 0.0)), level, rel=1e-9)
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
 def test_force_finds_the_plane_that_gave_it(model, tilt):
-    force = press(model, approach=APPROACH, tilt=tilt).response.force[0]
+    force = press(model, approach=APPROACH, tilt=tilt).force
     found = press(model, force=force, tilt=tilt)
-    assert found.response.force[0] == pytest.approx(force, rel=1e-8)
+    assert found.force == pytest.approx(force, rel=1e-8)
     # forces of asperities are met to 1e-9; those of the half-space to its residual of 1e-6
     assert found.plane.approach == pytest.approx(APPROACH, rel=1e-7)
     assert found.plane.tilt == tilt
@@ -65,25 +70,25 @@ def test_force_finds_the_plane_that_gave_it(model, tilt):
 @pytest.mark.parametrize("share", [1.0, 1e-4])
 def test_free_plane_has_no_moment(model, share):
     """Also where three contacts bear hardly anything."""
-    force = share * press(model).response.force[0]
+    force = share * press(model).force
     found = press(model, force=force, tilt=None)
-    assert found.response.force[0] == pytest.approx(force, rel=1e-8)
-    assert np.abs(found.response.moment).max() <= 1e-8 * HALF * force
-    there = press(model, approach=found.plane.approach, tilt=found.plane.tilt).response
-    assert there.force[0] == pytest.approx(force, rel=1e-6)  # the residual of the half-space
+    assert found.force == pytest.approx(force, rel=1e-8)
+    assert np.abs(found.moment).max() <= 1e-8 * HALF * force
+    there = press(model, approach=found.plane.approach, tilt=found.plane.tilt)
+    assert there.force == pytest.approx(force, rel=1e-6)  # the residual of the half-space
 
 
 def test_plane_turns_under_a_given_approach(model):
     found = press(model, approach=APPROACH, tilt=None)
     assert found.plane.approach == APPROACH
-    force = found.response.force[0]
-    assert 0.0 < force < press(model).response.force[0]  # it gives way
-    assert np.abs(found.response.moment).max() <= 1e-8 * HALF * force
+    force = found.force
+    assert 0.0 < force < press(model).force  # it gives way
+    assert np.abs(found.moment).max() <= 1e-8 * HALF * force
 
 
 def test_free_plane_gives_way_where_it_can(model):
     found = press(model, approach=-APPROACH, tilt=None)
-    assert found.response.force[0] == 0.0
+    assert found.force == 0.0
 
 
 @pytest.mark.parametrize("tilt", [(0.0, 0.0), TILT])
@@ -92,10 +97,8 @@ def test_no_force_is_first_touch(model, tilt):
     found = press(model, force=0.0, tilt=tilt)
     touch = found.plane.approach
     assert found.plane.tilt == tilt
-    assert found.response.force[0] < 1e-15
-    nearer, above = (
-        press(model, approach=touch + step, tilt=tilt).response.force[0] for step in (1e-6, -1e-6)
-    )
+    assert found.force < 1e-15
+    nearer, above = (press(model, approach=touch + step, tilt=tilt).force for step in (1e-6, -1e-6))
     assert nearer > 0.0
     assert above == 0.0
     if tilt == (0.0, 0.0):
@@ -110,18 +113,18 @@ def test_unloading_a_free_plane_keeps_its_slopes_without_force(model):
 
 def test_goes_on_from_a_plane_nearby(model):
     first = press(model)
-    again = press(model, start=first.start).response
+    again = press(model, start=first.start)
     # each solution stops at its own tolerance, at worst 1e-6 of the approach
-    same(again, first.response, rel=1e-6)
-    assert again.iterations[0] <= first.response.iterations[0]
+    same(again, first, rel=1e-6)
+    assert again.iterations <= first.iterations
     nearby = press(model, approach=1.01 * APPROACH, start=first.start)
-    same(nearby.response, press(model, approach=1.01 * APPROACH).response, rel=1e-5)
+    same(nearby, press(model, approach=1.01 * APPROACH), rel=1e-5)
 
 
 def test_the_same_plane_again_costs_nothing(model):
     first = press(model)
     # the half-space evaluates the displacement once to see that nothing is left to do
-    assert press(model, start=first.start).response.iterations[0] <= 1
+    assert press(model, start=first.start).iterations <= 1
 
 
 def test_cells_that_reach_out_of_a_patch_alone_stay_in_it():
@@ -131,20 +134,20 @@ def test_cells_that_reach_out_of_a_patch_alone_stay_in_it():
     for index in range(patches.count):
         alone, patch = model.of_patch(patches, index)
         control = Control(approach=4 * APPROACH)
-        found = alone.press(control, patches=patch, mean_heights=np.zeros(1)).response
-        assert found.force[0] > 0.0
+        found = alone.press(control, patches=patch, mean_heights=np.zeros(1))
+        assert found.force > 0.0
         assert found.patch_force[0] == pytest.approx(found.force, rel=1e-13)
-        assert found.patch_contact_area[0] == pytest.approx(found.contact_area, rel=1e-13)
+        assert found.patch_area[0] == pytest.approx(found.contact_area, rel=1e-13)
 
 
 def test_moment_of_cells():
     model = HalfSpaceModel(surface=SURFACE, contact_modulus=4000.0)
-    state = model.solve(APPROACH, tilt=TILT)
+    state = model.press(Control(approach=APPROACH, tilt=TILT))
     found = press(model, approach=APPROACH, tilt=TILT)
     dx, dy = SURFACE.spacing
     x, y = np.meshgrid(SURFACE.x - 0.5, SURFACE.y - 0.45, indexing="ij")
     expected = [(state.pressure * arm).sum() * dx * dy for arm in (x, y)]
-    assert found.response.moment[0] == pytest.approx(expected, rel=1e-12)
+    assert found.moment == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("name", MODEL_NAMES)
@@ -152,42 +155,44 @@ def test_moment_turns_with_the_surface(name):
     """Mirrored along x the moment about the centre changes its sign along x alone."""
     mirrored = type(SURFACE)(heights=SURFACE.heights[::-1], lengths=SURFACE.lengths)
     results = [
-        micro_model(name, surface, contact_modulus=4000.0)
-        .respond([APPROACH], patches=PATCHES, mean_heights=MEANS)
-        .moment[0]
+        respond(
+            micro_model(name, surface, contact_modulus=4000.0),
+            [APPROACH],
+            patches=PATCHES,
+            mean_heights=MEANS,
+        ).moment[0]
         for surface in (SURFACE, mirrored)
     ]
     # the spline through periodic and through free heights differs at the border
     assert results[1] == pytest.approx(results[0] * [-1.0, 1.0], rel=0.02)
 
 
+@pytest.mark.parametrize("model", ["half-space"], indirect=True)  # no model sees them
 @pytest.mark.parametrize(
     ("approaches", "problem"),
     [
-        ([], "at least one approach"),
         ([[1e-3, 2e-3]], r"\(1, 2\): the approaches are no list"),
-        (["deep"], r"\['deep'\]: the approaches are no numbers"),
+        (["deep"], "not an array of real numbers"),
         ([1e-3, np.nan], "nan: the approach must be finite"),
     ],
 )
 def test_refuses_approaches_that_are_no_finite_list(model, approaches, problem):
     with pytest.raises(InputError, match=problem):
-        model.respond(approaches, patches=PATCHES, mean_heights=MEANS)
+        respond(model, approaches, patches=PATCHES, mean_heights=MEANS)
 
 
+@pytest.mark.parametrize("model", ["half-space", "circular"], indirect=True)  # cells, summits
 @pytest.mark.parametrize(
     ("means", "problem"),
     [
-        (np.full(PATCHES.count, np.nan), "a mean height is not finite"),
-        (MEANS[:-1], r"\(5,\): every patch needs one mean height"),
-        (MEANS.reshape(PATCHES.grid), r"\(3, 2\): every patch needs one mean height"),
-        (0.0, r"\(\): every patch needs one mean height"),
-        (["low"] * PATCHES.count, "the mean heights are no numbers"),
+        (np.full(PATCHES.count, np.nan), "every patch needs one finite mean height"),
+        (MEANS[:-1], "every patch needs one finite mean height"),
+        (["low"] * PATCHES.count, "not an array of real numbers"),
     ],
 )
 def test_refuses_mean_heights_that_do_not_fit(model, means, problem):
     with pytest.raises(InputError, match=problem):
-        model.respond([APPROACH], patches=PATCHES, mean_heights=means)
+        respond(model, [APPROACH], patches=PATCHES, mean_heights=means)
     with pytest.raises(InputError, match=problem):
         model.press(Control(approach=APPROACH), patches=PATCHES, mean_heights=means)
 

@@ -4,7 +4,7 @@ import tomllib
 
 import pytest
 
-from geometry import Material, Spectrum, synthesise
+from geometry import Control, Material, Spectrum, synthesise
 from micro import HalfSpaceModel
 from multiscale.cli.new_scene import (
     CONTACT_AREA,
@@ -46,7 +46,7 @@ def test_force_makes_the_contact_area_that_it_says(seed, slope, modulus):
     material = Material(young_modulus=modulus, poisson_ratio=0.3)
     force = parse_quantity(sensible_force(surface, material), "N")
     model = HalfSpaceModel(surface=surface, contact_modulus=material.contact_modulus)
-    area = model.solve_force(force).contact_area / surface.area
+    area = model.press(Control(force=force)).contact_area / surface.area
     assert area == pytest.approx(CONTACT_AREA, rel=0.6)
 
 

@@ -74,7 +74,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
     coupling = FreePlaneLaws(table, lambda pressures: pressures @ compliance.T)
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
-        _, plane, *_ = model.press(control, patches=patches, mean_heights=means)
+        plane = model.press(control, patches=patches, mean_heights=means).plane
         step = coupling.press(control)
         assert step.force_N == pytest.approx(force, rel=1e-8)
         assert step.approach_mm == pytest.approx(plane.approach, rel=1e-3)

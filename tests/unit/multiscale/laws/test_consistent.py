@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
@@ -42,7 +43,7 @@ def test_whole_surface_comes_back(surface, grid, name):
     rows = law.rows.approach[[len(law.rows) // 2, -1]]
     for approach in (*rows, 0.537 * END):
         step = coupling.press(Control(approach=approach))
-        whole = model.respond([approach], patches=patches, mean_heights=means)
+        whole = respond(model, [approach], patches=patches, mean_heights=means)
         # at rows the micro model's own tolerance; between them that of the tables
         allowed = 1e-6 if approach in rows else 1e-3
         assert step.force_N == pytest.approx(whole.force[0], rel=allowed)
@@ -58,7 +59,7 @@ def test_whole_surface_comes_back(surface, grid, name):
 def test_tables_keep_their_tolerance_and_say_so(surface):
     model, patches, means, table, _ = parts(surface, (3, 2))
     approach = np.random.default_rng(4).uniform(1e-3, END, 100)
-    pressure = model.respond(approach, patches=patches, mean_heights=means).patch_pressure
+    pressure = respond(model, approach, patches=patches, mean_heights=means).patch_pressure
     load = np.maximum(pressure.mean(axis=1), 0.01 * pressure.mean(axis=1).max())
     made = np.column_stack([law.along(approach).pressure for law in table.laws])
     # what the tables say is measured half-way between rows; elsewhere it may be a little more
@@ -110,9 +111,8 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)
-        whole, plane, start, _ = model.press(
-            control, patches=patches, mean_heights=means, start=start
-        )
+        whole = model.press(control, patches=patches, mean_heights=means, start=start)
+        plane, start = whole.plane, whole.start
         step = coupling.press(control)
         assert step.force_N == pytest.approx(force, rel=1e-9)
         # the tables' tolerance of the force, of which the approach takes two thirds (Hertz)
@@ -120,7 +120,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         assert step.approach_mm - touch == pytest.approx(plane.approach - touch, rel=1e-3)
         np.testing.assert_allclose(
             step.patches.pressure_MPa,
-            whole.patch_pressure[0],
+            whole.patch_pressure,
             atol=3e-3 * whole.patch_pressure.max(),
         )
         if tilt is None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
 from geometry import PatchGrid, Spectrum, find_asperities, patch_means, synthesise
 from micro import AsperityModel, micro_model
@@ -38,8 +39,8 @@ def whole(surface, model):
 def test_rows_are_the_micro_model_and_love(surface, model, whole, love, factor):
     patch = IsolatedPatch(model=model, patch=whole.patch, mean_height=whole.mean_height, love=love)
     law = patch.law(10e-3, TOLERANCE, ROWS)
-    response = model.respond(
-        law.rows.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
+    response = respond(
+        model, law.rows.approach, patches=whole.patch, mean_heights=np.array([whole.mean_height])
     )
     # the same solver from another start: its tolerance of 1e-10
     np.testing.assert_allclose(law.rows.pressure, response.mean_pressure, rtol=1e-8, atol=1e-12)
@@ -97,7 +98,7 @@ def test_stiff_patch_goes_on_where_closure_falls(surface, model):
     assert law.range[1] == law.rows.closure.max() < 60e-3
     assert law.rows.approach[-1] >= 60e-3
     local = np.linspace(1e-3, 60e-3, 50)
-    response = model.respond(local, patches=patch.patch, mean_heights=[surface.mean_height])
+    response = respond(model, local, patches=patch.patch, mean_heights=[surface.mean_height])
     # the tolerance, of the pressure or a hundredth of the last, is measured half-way between rows
     scale = np.maximum(response.mean_pressure, 0.01 * law.rows.pressure[-1])
     assert np.all(np.abs(law.along(local).pressure - response.mean_pressure) < 3e-4 * scale)
@@ -110,8 +111,8 @@ def test_surface_models_make_laws_too(surface):
     patches = PatchGrid(grid=(1, 1), lengths=surface.lengths)
     alone, patch = model.of_patch(patches, 0)
     law = IsolatedPatch(model=alone, patch=patch, mean_height=surface.mean_height).law(8e-3, 1e-3)
-    response = model.respond(
-        law.rows.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
+    response = respond(
+        model, law.rows.approach[1:], patches=patches, mean_heights=np.array([surface.mean_height])
     )
     # the same solver from other starts, to its tolerance of 1e-8 of the largest pressure
     np.testing.assert_allclose(law.rows.pressure[1:], response.mean_pressure, rtol=1e-7)
@@ -122,12 +123,12 @@ def test_patches_of_the_half_space_press_alone(surface):
     model = micro_model("half-space", surface, contact_modulus=MODULUS)
     patches = PatchGrid(grid=(3, 2), lengths=surface.lengths)
     means = patch_means(surface, patches)
-    whole = model.respond([10e-3], patches=patches, mean_heights=means).patch_force[0]
+    whole = respond(model, [10e-3], patches=patches, mean_heights=means).patch_force[0]
     alone = []
     for index in range(6):
         piece, patch = model.of_patch(patches, index)
         assert piece.reference_height == model.reference_height
-        response = piece.respond([10e-3], patches=patch, mean_heights=means[index : index + 1])
+        response = respond(piece, [10e-3], patches=patch, mean_heights=means[index : index + 1])
         alone.append(response.force[0])
     assert np.sum(alone) > np.sum(whole)
     np.testing.assert_array_less(whole, np.array(alone) * 1.001 + 1e-12)

@@ -6,8 +6,9 @@ from io import BytesIO, StringIO
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
-from geometry import InputError, Regions, Spectrum, Surface, synthesise
+from geometry import Control, InputError, Regions, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
 from multiscale.exports.export import export_texts
 from multiscale.laws.law_file import law_bytes, read_laws
@@ -36,7 +37,7 @@ def direct(separation):
     for surface in SAMPLES:
         model = HalfSpaceModel(surface, contact_modulus=MODULUS, periodic=True)
         approach = model.reference_height - surface.mean_height - separation
-        found = model.respond([approach])
+        found = respond(model, [approach])
         pressures.append(found.mean_pressure[0])
         contacts.append(found.contacts[0])
     return np.array(pressures), np.array(contacts)
@@ -117,7 +118,7 @@ def test_closure_ends_the_law(limits, end):
 
 def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     model = HalfSpaceModel(SAMPLES[0], contact_modulus=MODULUS, periodic=True)
-    flat = model.solve_force(3000.0).pressure  # in full contact
+    flat = model.press(Control(force=3000.0)).pressure  # in full contact
     full = flat.mean() - flat.min()
     assert flat.min() > 0.0
     law = representative_law(SAMPLES[:1], MODULUS, largest_pressure=2.0 * full)

@@ -151,7 +151,7 @@ def test_the_error_of_the_zero_is_a_cause():
     error = setup.zero_error
     assert error > 0.0
     model = setup.micro  # half as many cells a side do not touch
-    nearer = [model.equilibrium(Control(approach=0.5 * UP + more)).force for more in (0.0, error)]
+    nearer = [model.press(Control(approach=0.5 * UP + more)).force for more in (0.0, error)]
     assert dict(last.errors)["zero"] == pytest.approx(np.diff(nearer)[0], rel=1e-4)  # residuals
     forced = run(scene("first touch", load={"approach": None, "force": "2 N"})).steps[-1]
     assert forced.approach_error_mm > error

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.along import respond
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
@@ -42,12 +43,12 @@ def test_a_model_solved_at_every_step_speaks_for_itself(parts, body):
     model = replace(model, body=body)
     coupling = ContactSolver(model, PATCHES, means)
     few, many = (coupling.press(Control(approach=approach)) for approach in (4e-3, END))
-    whole = model.respond([4e-3, END], patches=PATCHES, mean_heights=means)
-    assert few.warnings == () and many.warnings == whole.warnings != ()
+    whole = model.press(Control(approach=END), patches=PATCHES, mean_heights=means)
+    assert few.warnings == () and many.warnings == (whole.warning,) != ("",)
     assert noted([few]) == []
     (note,) = noted([few, step(2, warnings=many.warnings)])
     assert note.startswith("load steps outside the micro model's range of validity: 1 of 2; first")
-    assert f"step 2: {whole.warnings[0]}" in note
+    assert f"step 2: {whole.warning}" in note
 
 
 @pytest.mark.parametrize("coupling", ["isolated", "consistent"])
@@ -65,7 +66,7 @@ def test_laws_know_from_where_on_they_were_warned_of(parts, coupling):
         row = int(np.searchsorted(law.rows.pressure, law.warning_pressure))
         assert law.rows.pressure[row] == law.warning_pressure
         told = (
-            micro.respond(law.rows.approach[1:], patches=patches, mean_heights=heights).warning
+            respond(micro, law.rows.approach[1:], patches=patches, mean_heights=heights).warning
             != ""
         )
         assert told[row - 1] and not told[: row - 1].any()

@@ -1,0 +1,260 @@
+"""The contact of a rough surface with a rigid plane at one load step, as any solver returns it.
+
+Cells, asperities, patch laws and meshes know different things of a contact. What a solver does not
+know has its default, which says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.patches import Partition
+from geometry.rigid_plane import RigidPlane
+from support.arrays import Array, Counts, Flags
+from support.errors import InputError
+
+_LARGE = (
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation".split()
+)
+_ROUNDING = 1e-12
+"""Of the sides of the patches: a place that is no further beyond their border lies on it."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Spots:
+    """The m connected spots of a contact.
+
+    Args:
+        place: Where the pressure of each spot is largest, shape (m, 2) [mm].
+        area: Real contact areas of the spots, shape (m,) [mm²].
+        force: Their forces, shape (m,) [N].
+        peak_pressure: Their largest pressures, shape (m,) [MPa].
+    """
+
+    place: Array
+    area: Array
+    force: Array
+    peak_pressure: Array
+
+    def __len__(self) -> int:
+        return len(self.force)
+
+    def per_patch(self, patches: Partition) -> Counts:
+        """Return how many spots have their largest pressure in each patch, shape (N,).
+
+        Args:
+            patches: The N patches; places that rounding alone puts beyond them count as within.
+        """
+        x, y = patches.borders_x, patches.borders_y
+        nearest = np.clip(self.place, (x[0], y[0]), (x[-1], y[-1]))
+        beyond = np.abs(self.place - nearest) > _ROUNDING * np.array(patches.sides)
+        owner = patches.index_of(*np.where(beyond, self.place, nearest).T)
+        return np.bincount(owner, minlength=patches.count)
+
+
+def peaks_of(group: NDArray[np.integer], values: Array, count: int) -> NDArray[np.intp]:
+    """Return the index of the largest value in each of some groups, shape (count,).
+
+    Args:
+        group: Number 0 … count − 1 of the group of every value, shape (n,); none is empty.
+        values: The values, shape (n,).
+        count: Number of groups.
+    """
+    rising = np.argsort(values, kind="stable")
+    peaks = np.zeros(count, np.intp)
+    peaks[group[rising]] = rising  # the last, largest one stays
+    return peaks
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Start:
+    """What the solution of a load may start from: a solution of the same model at another load.
+
+    Args:
+        plane: The plane there.
+        values: Pressures of the cells, shape (nx, ny) [MPa], or indentations of the asperities,
+            shape (n,) [mm].
+        plastic_depth: Plastic depth that loads so far have left in the cells, by which the heights
+            are lower, shape (nx, ny) [mm]; None for the surface as it was made.
+    """
+
+    plane: RigidPlane
+    values: Array
+    plastic_depth: Array | None = None
+
+
+def _nothing() -> Array:
+    return np.zeros(0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactState:
+    """A rough surface in contact with a rigid plane, and its sums over N patches.
+
+    Fields are given at points: the centres of nx × ny cells, or n points anywhere. A number that is
+    not known is NaN; an array by patches that is not known is empty.
+
+    Args:
+        plane: The plane in equilibrium: its approach counts from first touch, at its centre.
+        patches: The patches, which make up the nominal area.
+        force: Normal force [N].
+        moment: First moments Σ P (x − xc), Σ P (y − yc) about the plane's centre [N mm].
+        contact_area: Real contact area [mm²].
+        contacts: Number of spots, or of asperities in contact.
+        peak_pressure: Largest contact pressure [MPa]; 0 without contact.
+        mean_separation: Mean gap between the plane and the displaced surface [mm].
+        iterations: Iterations of the solver.
+        linear_iterations: Iterations of linear solvers in them, all together.
+        reason: Why the solver stopped, where it says so.
+        residual: Largest violation of the contact conditions over the largest interference.
+        overlapping_contacts: Pairs of contacts of asperities that have grown into each other.
+        warning: Why the load lies outside the model's range of validity; empty within it.
+        patch_force: Forces on the patches, shape (N,) [N].
+        patch_area: Real contact areas in the patches, shape (N,) [mm²].
+        patch_contacts: Numbers of contacts that have their largest pressure in them, shape (N,).
+        patch_displacement: Mean displacements of the patches into the body, shape (N,) [mm].
+        patch_separation: Mean gaps of the patches, shape (N,) [mm].
+        spots: The connected spots of the contact.
+        x: Abscissae of the points, shape (nx,) or (n,) [mm].
+        y: Their ordinates, shape (ny,) or (n,) [mm].
+        pressure: Contact pressures, shape (nx, ny) or (n,) [MPa].
+        gap: Distances of the displaced surface from the plane, shape (nx, ny) or (n,) [mm]; in
+            contact 0 up to the residual.
+        displacement: Displacements of the surface, positive into the body, shape (nx, ny) [mm];
+            of a periodic surface they count from their own mean.
+        yielding: Points that bear the hardness, shape (nx, ny).
+        plastic_depth: Plastic depth that loads so far have left, by which the heights are lower,
+            shape (nx, ny) [mm].
+        earlier_depth: That of the loads before this one, shape (nx, ny) [mm]; None: none.
+        elastic_energy: Energy ½ ∫ p u dA of the elastic deformation [N mm].
+        plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
+        indentation: Indentations of the asperities, shape (n,) [mm].
+    """
+
+    plane: RigidPlane
+    patches: Partition
+    force: float
+    moment: tuple[float, float] = (0.0, 0.0)
+    contact_area: float = np.nan
+    contacts: int = 0
+    peak_pressure: float = np.nan
+    mean_separation: float = np.nan
+    iterations: int = 0
+    linear_iterations: int = 0
+    reason: str = ""
+    residual: float = 0.0
+    overlapping_contacts: int = 0
+    warning: str = ""
+    patch_force: Array = field(default_factory=_nothing)
+    patch_area: Array = field(default_factory=_nothing)
+    patch_contacts: Counts = field(default_factory=lambda: np.zeros(0, np.int64))
+    patch_displacement: Array = field(default_factory=_nothing)
+    patch_separation: Array = field(default_factory=_nothing)
+    spots: Spots | None = None
+    x: Array | None = None
+    y: Array | None = None
+    pressure: Array | None = None
+    gap: Array | None = None
+    displacement: Array | None = None
+    yielding: Flags | None = None
+    plastic_depth: Array | None = None
+    earlier_depth: Array | None = None
+    elastic_energy: float = np.nan
+    plastic_work: float = np.nan
+    indentation: Array | None = None
+
+    @property
+    def approach(self) -> float:
+        """Approach δ of the plane at its centre, counted from first touch [mm]."""
+        return self.plane.approach
+
+    @property
+    def tilt(self) -> tuple[float, float]:
+        """Slopes (tx, ty) of the approach [mm/mm]."""
+        return self.plane.tilt
+
+    @property
+    def nominal_area(self) -> float:
+        """Area of all patches [mm²]."""
+        return float(np.prod(self.patches.sides))
+
+    @property
+    def mean_pressure(self) -> float:
+        """Force per nominal area [MPa]."""
+        return self.force / self.nominal_area
+
+    @property
+    def contact_area_fraction(self) -> float:
+        """Real over nominal contact area A/A0."""
+        return self.contact_area / self.nominal_area
+
+    @property
+    def patch_pressure(self) -> Array:
+        """Mean pressures of the patches, shape (N,) [MPa]."""
+        return np.asarray(self.patch_force / self.patches.areas)
+
+    @property
+    def patch_closure(self) -> Array:
+        """Mean approach of the plane less the mean displacement of each patch, (N,) [mm]."""
+        return np.asarray(self.plane.means(self.patches) - self.patch_displacement)
+
+    @property
+    def in_contact(self) -> Flags:
+        """Which points carry a pressure, shape (nx, ny) or (n,)."""
+        return np.asarray(self.pressures > 0.0)
+
+    @property
+    def pressures(self) -> Array:
+        """Contact pressures at the points, of a model that knows them [MPa].
+
+        Raises:
+            InputError: When the model has no cells.
+        """
+        if self.pressure is None:
+            raise InputError("these contacts are not made of cells", allowed="the model half-space")
+        return self.pressure
+
+    @property
+    def guess(self) -> Start:
+        """What any other load may start from, on the surface as it was made."""
+        own = self.indentation
+        return Start(plane=self.plane, values=self.pressures if own is None else own)
+
+    @property
+    def start(self) -> Start:
+        """What the next load starts from, the plastic depth of all loads so far included."""
+        return replace(self.guess, plastic_depth=self.plastic_depth)
+
+    def summary(self) -> ContactState:
+        """Return the state without spots and fields, which is small."""
+        fields: dict[str, Any] = dict.fromkeys(_LARGE)
+        return replace(self, **fields)
+
+    def kappa(self, rms_slope: float, contact_modulus: float) -> float:
+        """Return κ of A/A0 = κ p/(rms slope · E*); NaN where nothing touches.
+
+        Args:
+            rms_slope: Root of the mean squared gradient of the surface, sqrt<|∇h|²>.
+            contact_modulus: E* [MPa].
+
+        Source:
+            Waddad et al. 2016, section 2.2, doi 10.1016/j.triboint.2015.12.023.
+        """
+        if not self.force > 0.0:
+            return float(np.nan)
+        return self.contact_area_fraction * rms_slope * contact_modulus / self.mean_pressure
+
+
+def stacked(states: Sequence[ContactState], name: str) -> NDArray[Any]:
+    """Return what several states know under one name, as an array whose first axis counts them.
+
+    Args:
+        states: The states.
+        name: Name of an attribute.
+    """
+    return np.array([getattr(state, name) for state in states])

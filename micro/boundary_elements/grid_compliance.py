@@ -1,0 +1,217 @@
+"""The compliance of an elastic body as a sum of terms, on grids of cells; pressures are over E*.
+
+    half-space  +  free sides  +  finite body  (+ finite slopes, which act on the whole surface).
+
+`Compliance` holds the terms of one body and makes them for any grid. `GridCompliance` is their sum
+on one grid. A new term needs the two methods of `ComplianceTerm` and a line in `Compliance`.
+
+Theory: docs/theory.md, section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache, partial
+from typing import Any, Protocol, Self
+
+import numpy as np
+
+from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
+from micro.boundary_elements.finite_slopes import FiniteSlopes
+from micro.boundary_elements.free_sides import FreeSides
+from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from micro.boundary_elements.side_cells import side_cells
+from support.arrays import Array, Indices
+from support.small_caches import cached_where_small
+
+Grid = tuple[int, ...]
+"""Numbers of cells (nx, ny)."""
+Pair = tuple[float, float]
+"""Lengths along x and y [mm]."""
+
+_MOST_GRIDS = 24
+"""Half-spaces that are cached: three sizes of box with their coarse grids."""
+_FEW_CELLS = 2**14
+"""Cells up to which half-spaces are cached for other surfaces too, with 2 MB then."""
+_half_space = cached_where_small(
+    lambda grid, spacing, *, periodic: grid[0] * grid[1] <= _FEW_CELLS, most=_MOST_GRIDS + 8
+)(HalfSpaceGrid)
+_DIFFERENCE = 1e-6
+"""Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
+slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
+
+
+class ComplianceTerm(Protocol):
+    """A symmetric part of the compliance of the cells where rows and columns of a grid cross."""
+
+    def displacement(self, pressure: Array, /) -> Array:
+        """Return the displacements by pressures / E* on all these cells, shape (r, c) [mm]."""
+        ...
+
+    def among(self, rows: Indices, columns: Indices, /) -> Self:
+        """Return the same for some of these rows and columns, by ascending indices."""
+        ...
+
+
+class GridCompliance:
+    """Compliance of nx × ny cells under pressures that are uniform on each.
+
+    Displacements are evaluated in double precision. Corrections only have to reduce an error that
+    is then evaluated anew, and use the half-space's products in single precision.
+
+    Args:
+        half_space: The half-space.
+        terms: What else adds to the compliance.
+
+    Attributes:
+        products: Products with pressures so far.
+    """
+
+    def __init__(self, half_space: HalfSpaceGrid, terms: Sequence[ComplianceTerm] = ()) -> None:
+        self._half_space, self._terms = half_space, tuple(terms)
+        self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
+        self.products = 0
+
+    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the displacement by pressures / E* on all cells, shape (nx, ny) [mm].
+
+        Args:
+            pressure: The pressures, shape (nx, ny).
+            out: Where the displacement is put; new memory if not given.
+        """
+        self.products += 1
+        moved = np.empty_like(pressure) if out is None else out
+        moved[:] = pressure
+        self._half_space.compliance(moved)
+        for term in self._terms:
+            moved += term.displacement(pressure)
+        return moved
+
+    def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
+        """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        self.products += 1
+        moved = self._half_space.rough_compliance.on_cells(cells, pressure)
+        if self._terms:
+            terms, place, shape = self._among(cells)
+            some = np.zeros(shape)
+            some.ravel()[place] = pressure
+            for term in terms:
+                moved += term.displacement(some).ravel()[place]
+        return moved
+
+    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
+        """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
+        return self._half_space.inverse.on_cells(cells, displacement)
+
+    def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
+        """Return the terms on the rows and columns of some cells, and where these cells are."""
+        if self._last is None or self._last[0] is not cells:
+            columns, column = np.unique(cells.column, return_inverse=True)
+            terms = [term.among(cells.rows, columns) for term in self._terms]
+            place = cells.row * len(columns) + column.ravel()
+            self._last = cells, terms, place, (len(cells.rows), len(columns))
+        return self._last[1:]
+
+
+@dataclass(kw_only=True, eq=False)
+class Compliance:
+    """The elastic body of one contact model: its terms, on any grid.
+
+    Half-spaces are cached with their kernels and work arrays, those used last.
+
+    Args:
+        periodic: Whether pressures continue periodically.
+        modulus: Contact modulus E* of the model [MPa].
+        sides: Free sides, if there are any.
+        body: What a finite body adds to the half-space and its sides, if it is finite.
+        slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
+            grids has to take them into account (`micro.complementarity.slope_iteration`).
+    """
+
+    periodic: bool
+    modulus: float = 1.0
+    sides: FreeSides | None = None
+    body: BodyModes | None = None
+    slopes: tuple[FiniteSlopes, ...] = ()
+    _last: tuple[Array, Array] | None = field(default=None, init=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the caches behind when sent to another process."""
+        caches = {"half_space", "_terms_on", "_last"}
+        return {name: value for name, value in vars(self).items() if name not in caches}
+
+    def on_grid(
+        self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0), *, coarse: bool = False
+    ) -> GridCompliance:
+        """Return the compliance of cells of the surface.
+
+        Args:
+            grid: Numbers of cells (nx, ny).
+            spacing: Sides of a cell [mm].
+            corner: Corner of the first cell on the surface [mm].
+            coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+                left out.
+        """
+        terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
+        return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+
+    @cached_property
+    def _terms_on(self) -> Callable[[tuple[int, int], Pair, Pair, bool], list[ComplianceTerm]]:
+        """Function from cells to the terms beside the half-space on them, cached; see `on_grid`."""
+        return lru_cache(maxsize=_MOST_GRIDS)(self._make_terms)
+
+    def _make_terms(
+        self, grid: tuple[int, int], spacing: Pair, corner: Pair, coarse: bool
+    ) -> list[ComplianceTerm]:
+        terms: list[ComplianceTerm] = []
+        if self.sides is not None and not coarse:
+            rows, columns = (
+                round(start / step) + np.arange(n)
+                for start, step, n in zip(corner, spacing, grid, strict=True)
+            )
+            terms.append(side_cells(self.sides, spacing).among(rows, columns))
+        if self.body is not None:
+            terms.append(self.body_on(grid, spacing, corner))
+        return terms
+
+    def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
+        """Return what the finite body, which must be given, adds on cells; see `on_grid`."""
+        assert self.body is not None
+        x, y = (
+            start + step * np.arange(n + 1)
+            for start, step, n in zip(corner, spacing, grid, strict=True)
+        )
+        return self.body.on(x, y, modulus=self.modulus)
+
+    @cached_property
+    def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
+        """Function from numbers of cells and their sides to the half-space on them, cached."""
+        return lru_cache(maxsize=_MOST_GRIDS)(partial(_half_space, periodic=self.periodic))
+
+    def slope_displacement(self, pressure: Array) -> Array:
+        """Return what finite slopes add to the displacements of all cells, shape (nx, ny) [mm].
+
+        The last one is cached: a load step begins where the one before it ended.
+
+        Args:
+            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+        """
+        if self._last is None or not np.array_equal(self._last[0], pressure):
+            self._last = pressure, self._by_slopes(pressure)
+        return self._last[1]
+
+    def slope_rate(self, pressure: Array, rate: Array) -> Array:
+        """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).
+
+        Args:
+            pressure: Pressures / E* of all cells, shape (nx, ny).
+            rate: Their change by whatever the derivative is by, shape (nx, ny).
+        """
+        step = _DIFFERENCE * float(pressure.max()) / float(np.abs(rate).max())
+        moved = self._by_slopes(pressure + step * rate)
+        return np.asarray((moved - self.slope_displacement(pressure)) / step)
+
+    def _by_slopes(self, pressure: Array) -> Array:
+        """Return the sum of what the slopes of all bodies add, by pressures / E*."""
+        return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))

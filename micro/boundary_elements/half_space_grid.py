@@ -1,0 +1,238 @@
+"""The half-space on a grid of cells, by fast Fourier transforms; for E* = 1.
+
+Pressures are uniform on the cells, and displacements are those of the cells' centres: their
+convolution with Love's rectangle. On a periodic grid each wave has its own compliance 2/|q|.
+
+Theory: docs/theory.md, section 4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from micro.closed_forms.love import corner_integral
+from support.arrays import Array, Indices
+from support.cores import BLOCK, blocks, cores, in_threads
+
+Field = NDArray[Any]
+
+_LINES = 128
+"""Bytes of a row that a block of columns holds at least: two lines of the cache."""
+_DENSE = 0.8
+"""Share of the rows between the first and the last cell from which all of them are transformed: a
+range is copied faster than rows here and there."""
+
+
+def love_kernel(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the displacement at cell (i, j) by uniform unit pressure on cell (0, 0).
+
+    Love's rectangle at the cell centres, L((i dx, j dy))/π: differences of one corner integral on
+    the lattice of cell corners. The relative error grows as 1e-16 (distance / cell)².
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Shape (nx, ny) [mm]; even in both distances.
+
+    Source:
+        Love 1929; Johnson 1985, eq. 3.25.
+    """
+    corners = [(np.arange(n + 1) - 0.5) * step for n, step in zip(grid, spacing, strict=True)]
+    terms = corner_integral(corners[0][:, None], corners[1])
+    return np.diff(np.diff(terms, axis=0), axis=1) / np.pi
+
+
+def padded_spectrum(padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the transform of Love's kernel on a padded grid, where convolution is not circular.
+
+    The padding holds the kernel too, though no pressure acts there: the spectrum of a kernel
+    without steps is positive. The kernel is even, so that cosines of a quarter of it are enough.
+
+    Args:
+        padded: Cells (mx, my) of the padded grid, even, at least twice the loaded ones.
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Real quarter spectrum, shape (mx // 2 + 1, my // 2 + 1) [mm].
+    """
+    kernel = love_kernel((padded[0] // 2 + 1, padded[1] // 2 + 1), spacing)
+    return np.asarray(fft.dctn(kernel, type=1, overwrite_x=True, workers=cores()))
+
+
+def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
+    """Return the periodic Green's function 2/|q| at the wave vectors q of a grid.
+
+    The mean displacement of a periodic half-space is not determined. It is set to 0, so that
+    displacements count from the mean of the displaced surface.
+
+    Args:
+        grid: Numbers of cells (nx, ny) of a period.
+        spacing: Sides (dx, dy) of a cell [mm].
+
+    Returns:
+        Real quarter spectrum, shape (nx // 2 + 1, ny // 2 + 1) [mm].
+
+    Source:
+        Johnson 1985, eq. 13.7; Stanley & Kato 1997, doi 10.1115/1.2833523.
+    """
+    qx = 2.0 * np.pi * fft.rfftfreq(grid[0], spacing[0])
+    qy = 2.0 * np.pi * fft.rfftfreq(grid[1], spacing[1])
+    q = np.hypot(qx[:, None], qy)
+    return np.divide(2.0, q, out=np.zeros_like(q), where=q > 0.0)
+
+
+class Cells(NamedTuple):
+    """Some cells of a grid.
+
+    Attributes:
+        flat: Their flat indices, ascending, shape (n,).
+        rows: Ascending indices of the rows that they lie in, shape (r,), with others between.
+        row: Where among these rows each cell lies, shape (n,).
+        column: Its column, shape (n,).
+    """
+
+    flat: Indices
+    rows: Indices
+    row: Indices
+    column: Indices
+
+    @classmethod
+    def of(cls, flat: Indices, grid: tuple[int, ...]) -> Cells:
+        """Return cells of a grid (nx, ny) by their flat indices, ascending."""
+        on_grid, column = np.divmod(flat, grid[1])
+        rows = np.flatnonzero(np.bincount(on_grid, minlength=grid[0]))
+        if rows.size > _DENSE * (np.ptp(rows) + 1 if rows.size else 1):
+            rows = np.arange(rows[0], rows[-1] + 1)
+        order = np.zeros(grid[0], np.intp)
+        order[rows] = np.arange(len(rows))
+        return cls(flat, rows, order[on_grid], column)
+
+
+class Convolution:
+    """Multiplication by a real and even spectrum, in the precision of that spectrum, on all cores.
+
+    Rows are transformed block by block into one complex array. Its columns are then transformed,
+    multiplied and transformed back, a few at a time, so that all that happens to a column happens
+    in the cache. Rows that are empty, or not wanted, and the padding are never stored. The result
+    does not depend on the number of threads.
+
+    Args:
+        spectrum: Real quarter spectrum of the kernel, shape (mx // 2 + 1, my // 2 + 1).
+        grid: Cells (nx, ny) of the fields.
+        padded: Cells (mx, my) of the grid on which the convolution is circular.
+        work: Complex array of nx (my // 2 + 1) numbers at least; overwritten by every call.
+    """
+
+    def __init__(
+        self, spectrum: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
+    ) -> None:
+        self.grid, self.padded = grid, padded
+        self._spectrum = spectrum
+        self._work = work.ravel().view(np.result_type(spectrum.dtype, np.complex64))
+
+    def __call__(self, field: Field, rows: Indices | None = None) -> Field:
+        """Convolve a field in place.
+
+        Args:
+            field: Values on the cells of some rows of the grid, shape (r, ny); overwritten.
+            rows: Indices of these rows, shape (r,), zeros being on all others; all rows of the
+                grid when not given.
+
+        Returns:
+            ``field``, holding the result on the same rows.
+        """
+        (mx, my), count, work = self.padded, len(field), self._rows(len(field))
+        loaded: Any = slice(0, count)
+        if rows is not None:
+            dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
+            loaded = slice(rows[0], rows[-1] + 1) if dense else rows
+
+        def along_rows(here: slice) -> None:
+            work[here] = fft.rfft(field[here], n=my, axis=1)
+
+        def along_columns(here: slice) -> None:
+            column = np.zeros((mx, here.stop - here.start), work.dtype)
+            column[loaded] = work[:, here]
+            column = fft.fft(column, axis=0, overwrite_x=True)
+            part, half = self._spectrum[:, here], mx // 2 + 1
+            column[:half] *= part
+            column[half:] *= part[mx - half : 0 : -1]
+            work[:, here] = fft.ifft(column, axis=0, overwrite_x=True)[loaded]
+
+        def back_along_rows(here: slice) -> None:
+            field[here] = fft.irfft(work[here], n=my, axis=1)[:, : self.grid[1]]
+
+        size = work.itemsize
+        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, _LINES) // size))
+        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        return field
+
+    def on_cells(self, cells: Cells, values: Array) -> Array:
+        """Convolve values on some cells, in single precision; return those of the same cells."""
+        scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
+        # the field takes the place of its own transform, whose rows are at least as long
+        memory = self._rows(len(cells.rows)).view(np.float32)
+        place = cells.row * memory.shape[1] + cells.column
+        field = memory[:, : self.grid[1]]
+        field[:] = 0.0
+        memory.ravel()[place] = values / scale
+        self(field, cells.rows)
+        return memory.ravel()[place].astype(np.float64) * scale
+
+    def _rows(self, count: int) -> Field:
+        """Return the memory of transformed rows, shape (count, my // 2 + 1)."""
+        waves = self._spectrum.shape[1]
+        return self._work[: count * waves].reshape(count, waves)
+
+
+class HalfSpaceGrid:
+    """Compliance of nx × ny cells of a half-space, and its approximate inverse.
+
+    The inverse is that of the kernel on a period as large as the grid. Cut down to the cells in
+    contact it preconditions conjugate gradients, as the inverse by transforms of Zhao, Vollebregt &
+    Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274) smooths their multigrid.
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+        periodic: Whether pressures continue periodically; a half-space that is loaded on the grid
+            alone otherwise.
+
+    Attributes:
+        compliance: Product in double precision.
+        rough_compliance: The same in single precision.
+        inverse: Product with the approximate inverse, in single precision.
+    """
+
+    def __init__(
+        self, grid: tuple[int, int], spacing: tuple[float, float], *, periodic: bool
+    ) -> None:
+        padded = period = grid
+        if periodic:
+            spectrum = periodic_spectrum(grid, spacing)
+            waves = spectrum
+        else:
+            period = _good(grid)
+            padded = 2 * period[0], 2 * period[1]
+            spectrum = padded_spectrum(padded, spacing)
+            waves = periodic_spectrum(period, spacing)
+        # at the mean of a period, where the compliance vanishes, its largest value counts
+        inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
+        work = np.empty(grid[0] * (padded[1] // 2 + 1), complex)  # one for all: they take turns
+        self.compliance = Convolution(spectrum, grid, padded, work)
+        self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
+        self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)
+
+
+def _good(counts: Iterable[int]) -> tuple[int, int]:
+    """Return the next numbers of cells with a fast transform."""
+    x, y = (int(fft.next_fast_len(count, real=True)) for count in counts)
+    return x, y

@@ -1,0 +1,240 @@
+"""What the free sides of a block add on the cells of a grid: displacements, and surface stresses.
+
+Pressures are uniform on the cells, and displacements and stresses are their means over them. Along
+a side, Fourier's transform takes cells to waves, which do not mix. Across it, sparse matrices take
+cells to values at nodes of the distance from the side (`micro.boundary_elements.free_sides`).
+
+Theory: docs/theory.md, section 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.sparse import csr_array, hstack
+
+from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
+from support.arrays import Array, Indices
+from support.cores import in_threads
+
+Waves = NDArray[np.complex128]
+Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
+
+_NEAREST = 1.0 / 16.0
+"""First node of the distance from a side, in cells."""
+_NEAREST_STRESS = 1.0 / 256.0
+"""That for stresses: the mean over the cell in a corner of constant pressure then errs by 0.4 % of
+the largest stress, with 1/16 by 8 %."""
+_FEW_ROWS = 128
+"""Rows of cells up to which products with full matrices are quicker than with sparse ones."""
+_MANY_CELLS = 2**16
+"""Cells from which the sides across x and those across y gain by a thread of their own."""
+_SWAPPED = [1, 0, 2]
+"""Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
+_SHEAR = np.array([-1j, 1j])
+"""Shear ~ sin by loads ~ cos; it changes its sign from a side to the opposite one."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _SidePair:
+    """Two opposite sides, and rows of cells along them, continued by zeros to twice the length.
+
+    Args:
+        means: Means over the rows' cells of values at the nodes of both sides, shape (rows, 2 a).
+        loads: Its transpose.
+        kernels: For each wave what loads at the nodes do at the nodes, (waves, a or 3 a, a).
+        place: Places of the cells in a row, counted from the first of them, shape (cells,).
+    """
+
+    means: Means
+    loads: Means
+    kernels: Array
+    place: Indices
+
+    @classmethod
+    def of(cls, sides: FreeSides, axis: int, grid: tuple[int, int], *, stress: bool) -> Self:
+        """Return two sides with all cells between them.
+
+        Args:
+            sides: The free sides.
+            axis: 0 for the sides across x, 1 across y.
+            grid: Cells (nx, ny) between the sides.
+            stress: Whether the kernels are those of stresses, three below each other, or of
+                displacements.
+        """
+        length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
+        step, period = length / rows, 2 * cells
+        nodes = distance_nodes((_NEAREST_STRESS if stress else _NEAREST) * step, length)
+        lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
+        low, high = (float(there) for there in sides.pair(axis))
+        both = csr_array(hstack([low * lower, high * lower[::-1]]))
+        means = both.toarray() if rows <= _FEW_ROWS else both
+        parts = []
+        # waves on twice the length of a side that cells take for the same, some running backwards
+        for shift in (-period, 0, period):
+            waves = np.arange(cells + 1) + shift
+            if stress:
+                kernels = sides.stresses(axis, nodes, np.abs(waves))
+                kernels[2] *= np.sign(waves)[:, None, None]
+                kernel = np.concatenate(kernels, axis=1)
+            else:
+                kernel = sides.compliance(axis, nodes, np.abs(waves))
+            parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
+        return cls(means, _transposed(means), np.sum(parts, axis=0), np.arange(cells))
+
+    def among(self, rows: Indices, cells: Indices) -> _SidePair:
+        """Return the same sides with some of these rows, and some of the cells of each."""
+        means, place = self.means[rows], self.place[cells]
+        return _SidePair(means, _transposed(means), self.kernels, place - place[0])
+
+    def loaded(self, fields: Array) -> Waves:
+        """Return the waves of loads at the nodes by f fields on cells, shape (waves, f a, 2)."""
+        count, rows, cells = fields.shape
+        lines = self.loads @ fields.transpose(1, 0, 2).reshape(rows, count * cells)
+        placed = np.zeros((len(lines) * count, self.place[-1] + 1))
+        placed[:, self.place] = lines.reshape(-1, cells)
+        waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
+        parts = waves.reshape(2, -1, count, len(self.kernels)).transpose(3, 2, 1, 0)
+        return np.ascontiguousarray(parts.reshape(len(self.kernels), -1, 2))
+
+    def on_cells(self, waves: Waves, count: int) -> Array:
+        """Return f fields of means over the cells by values' waves, shape (f, rows, cells)."""
+        parts = waves.reshape(len(self.kernels), count, -1, 2).transpose(3, 2, 1, 0)
+        by_side = parts.reshape(-1, len(self.kernels))
+        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
+        means = self.means @ lines.reshape(self.means.shape[1], -1)
+        return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return displacements of the cells by pressures on them, shape (rows, cells)."""
+        return self.on_cells(_multiplied(self.kernels, self.loaded(pressure[None])), 1)[0]
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return stresses normal to the sides, along them and in shear, (3, rows, cells)."""
+        waves = _multiplied(self.kernels, self.loaded(pressure[None]))
+        waves[:, -(waves.shape[1] // 3) :] *= _SHEAR
+        return self.on_cells(waves, 3)
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`, shape (rows, cells)."""
+        waves = self.loaded(fields)
+        waves[:, -(waves.shape[1] // 3) :] *= _SHEAR.conj()
+        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves), 1)[0]
+
+
+def _transposed(means: Means) -> Means:
+    """Return the transpose of a full or sparse matrix, of the same kind."""
+    return csr_array(means.T) if isinstance(means, csr_array) else means.T
+
+
+def _multiplied(kernels: Array, waves: Waves) -> Waves:
+    """Multiply waves by real matrices, shapes (waves, b, a) and (waves, a, 2), contiguous."""
+    return np.matmul(kernels, waves.view(np.float64)).view(np.complex128)
+
+
+def _of_both(
+    across_x: Callable[[], Array], across_y: Callable[[], Array], cells: int
+) -> tuple[Array, Array]:
+    """Return what the sides across x and those across y do, of many cells at the same time."""
+    if cells < _MANY_CELLS:
+        return across_x(), across_y()
+    one, other = in_threads(lambda work: work(), [across_x, across_y])
+    return one, other
+
+
+def _pairs(
+    sides: FreeSides, spacing: tuple[float, float], *, stress: bool
+) -> tuple[_SidePair, _SidePair]:
+    """Return the sides across x and those across y, around cells that fill the rectangle."""
+    nx, ny = (round(length / step) for length, step in zip(sides.lengths, spacing, strict=True))
+    across_x, across_y = (_SidePair.of(sides, axis, (nx, ny), stress=stress) for axis in (0, 1))
+    return across_x, across_y
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SideCells:
+    """Compliance that free sides add to the cells where rows and columns cross, for E* = 1.
+
+    Args:
+        across_x: The sides across x, with the rows.
+        across_y: Those across y, with the columns.
+    """
+
+    across_x: _SidePair
+    across_y: _SidePair
+
+    def displacement(self, pressure: Array) -> Array:
+        """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
+        one, other = _of_both(
+            lambda: self.across_x.displacement(pressure),
+            lambda: self.across_y.displacement(pressure.T),
+            pressure.size,
+        )
+        return np.asarray(one + other.T)
+
+    def among(self, rows: Indices, columns: Indices) -> SideCells:
+        """Return some of these rows and columns, by ascending indices among them."""
+        return SideCells(self.across_x.among(rows, columns), self.across_y.among(columns, rows))
+
+
+class SideStresses:
+    """What free sides add to σ_xx, σ_yy and σ_xy in the surface, by pressures on its cells.
+
+    Args:
+        sides: The free sides.
+        spacing: Sides (dx, dy) of a cell [mm]; the cells fill the rectangle between the sides.
+    """
+
+    def __init__(self, sides: FreeSides, spacing: tuple[float, float]) -> None:
+        self._pairs = _pairs(sides, spacing, stress=True)
+
+    def stresses(self, pressure: Array) -> Array:
+        """Return σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny) [MPa].
+
+        Args:
+            pressure: On all cells of the grid, shape (nx, ny) [MPa].
+        """
+        across_x, across_y = self._pairs
+        total, other = _of_both(
+            lambda: across_x.stresses(pressure),
+            lambda: across_y.stresses(pressure.T),
+            pressure.size,
+        )
+        total += other[_SWAPPED].transpose(0, 2, 1)
+        return total
+
+    def adjoint(self, fields: Array) -> Array:
+        """Apply the transpose of `stresses`.
+
+        Args:
+            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny).
+
+        Returns:
+            Weights of the pressures, shape (nx, ny).
+        """
+        across_x, across_y = self._pairs
+        turned = fields[_SWAPPED].transpose(0, 2, 1)
+        one, other = _of_both(
+            lambda: across_x.adjoint(fields), lambda: across_y.adjoint(turned), fields[0].size
+        )
+        return one + other.T
+
+
+@lru_cache(maxsize=8)
+def side_cells(sides: FreeSides, spacing: tuple[float, float]) -> SideCells:
+    """Return all cells between free sides, cached for the next surface between them.
+
+    Args:
+        sides: The free sides.
+        spacing: Sides (dx, dy) of a cell [mm]; the cells fill the rectangle between the sides.
+    """
+    return SideCells(*_pairs(sides, spacing, stress=False))
+
+
+side_stresses = lru_cache(maxsize=8)(SideStresses)

@@ -1,0 +1,11 @@
+"""The contact problem: pressures between bounds, gaps, rigid motions prescribed or free.
+
+    solve_contact                displacements by finite slopes     `slope_iteration`
+      └ solve_on_surface         boxes of cells, coarser grids      `solver`
+          └ solve                which cells touch                  `active_set`
+              └ ContactCells     their pressures                    `conjugate_gradients`
+
+All of them solve a `CellProblem` (`cell_problem`): compliance, interference, bounds, and the
+motions of the body that are free, with their loads (`rigid_motions`). `start` finds pressures to
+start from.
+"""

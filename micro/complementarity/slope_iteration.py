@@ -1,0 +1,119 @@
+"""Finite slopes in a contact problem, by fixed-point iteration.
+
+The displacements that finite slopes add depend on the pressures and are evaluated on the whole
+surface. Each solution takes them from the solution before it. They are a few per cent of all
+displacements, and change by a hundredth of that in the second solution. Solutions need not be more
+accurate than the next change, so the first ones stop early.
+
+Theory: docs/theory.md, section 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
+from micro.complementarity.solver import solve_on_surface
+from support.arrays import Array
+from support.errors import NotConverged
+
+_MOST_SOLUTIONS = 30
+_FIRST = 1e-2
+"""Residual of the first solution, before finite slopes are known."""
+_AHEAD = 2e-2
+"""Residual of a solution over the last change by finite slopes: about what the next change is."""
+_CONVERGED = 3e-9
+"""Change by finite slopes at which the iteration ends, over the largest interference."""
+_MEMORY = 2
+"""Steps that the mixing remembers."""
+_NOISE = 2.0
+"""Change of a residual over the step above which the step was not its cause."""
+_DEPENDENT = 1e-2
+"""Changes that differ less in direction, times their length, are taken for one."""
+
+
+class AndersonMixing:
+    """Fixed-point iteration x ← x + r(x), extrapolated from the last few residuals r.
+
+    Source:
+        Walker & Ni 2011, doi 10.1137/10078356X, eq. 2.1 in the form of differences.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[Array, Array] | None = None
+        self._steps: list[tuple[Array, Array]] = []
+
+    def next(self, point: Array, residual: Array) -> Array:
+        """Return the next point.
+
+        Args:
+            point: Where the iteration is, of any shape.
+            residual: What a plain step would change, of the same shape.
+        """
+        if self._last is not None:
+            step, change = point - self._last[0], residual - self._last[1]
+            size = float(np.linalg.norm(change))
+            if 0.0 < size <= _NOISE * float(np.linalg.norm(step)):
+                pair = step / size, change / size  # they shrink by orders of magnitude
+                self._steps = [*self._steps, pair][-_MEMORY:]
+        self._last = point, residual
+        moved = point + residual
+        if not self._steps:
+            return moved
+        changes = np.stack([change.ravel() for _, change in self._steps])
+        shares = np.linalg.lstsq(changes.T, residual.ravel(), rcond=_DEPENDENT)[0]
+        for share, (step, change) in zip(shares, self._steps, strict=True):
+            moved = moved - share * (step + change)
+        return moved
+
+
+def solve_contact(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
+
+    Args:
+        problem: The contact problem; with the finite slopes of its compliance, if there are any.
+        start: A solution nearby, its motion that of the solution where the approach is free; None
+            starts from coarser grids.
+
+    Raises:
+        NotConverged: When the contact conditions or the loads cannot be met, or displacements by
+            finite slopes do not agree with the pressures.
+    """
+    compliance, interference = problem.compliance, problem.interference
+    tolerance = problem.tolerance
+    if not compliance.slopes:
+        return solve_on_surface(problem, start)
+    mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
+    if start is not None and start.pressure.any():
+        displaced = compliance.slope_displacement(start.pressure)
+    accuracy, iterations, left = max(tolerance, _FIRST), 0, np.inf
+    last = max(_CONVERGED, 10.0 * tolerance)
+    for _ in range(_MOST_SOLUTIONS):
+        lowered = replace(problem, interference=interference - displaced, tolerance=accuracy)
+        solution = start = solve_on_surface(lowered, start)
+        iterations += solution.iterations
+        touching = solution.pressure > 0.0
+        if not touching.any():
+            if not displaced.any():
+                return solution._replace(iterations=iterations)
+            # slopes of a far larger load part the bodies: begin without them
+            mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
+            continue
+        change = compliance.slope_displacement(solution.pressure) - displaced
+        nearer = interference + problem.motions.displacement(solution.motion)
+        changed, largest = (float(field[touching].max()) for field in (np.abs(change), nearer))
+        # bodies without interference do not touch, and their pressures have an energy
+        sound = largest > 0.0 and np.vdot(solution.pressure, nearer) > 0.0
+        left = changed / largest if sound else np.inf
+        if left <= last and accuracy <= tolerance:
+            return solution._replace(residual=max(solution.residual, left), iterations=iterations)
+        displaced = mixing.next(displaced, change)
+        accuracy = tolerance if _AHEAD * left <= last else min(_FIRST, _AHEAD * left)
+    raise NotConverged(
+        "the displacements by finite slopes",
+        reason=f"they still change by {left:.1e} of the displacement",
+        iterations=iterations,
+        remedy="set micro.finite_slopes = false, or smooth the surface",
+    )

@@ -1,0 +1,185 @@
+"""Contact of a rigid body on the cells of a surface: on boxes of them, from coarser grids.
+
+The half-space's displacements by pressures are never negative. Without periodicity a rigid body
+therefore touches only cells with a positive interference, and a box around these is all that enters
+the solution. A finite body may lift other cells into contact: they are searched for at the end.
+
+Pressures to start from come from the solution on a grid half as fine, and so on down to a small
+one. The set of cells in contact is then found on the coarse grids, where that costs little, and
+only its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
+doi 10.3846/13926292.2014.909899).
+
+Theory: docs/theory.md, section 3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from micro.complementarity.active_set import solve
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
+from micro.complementarity.rigid_motions import Box
+from support.arrays import Array, Flags
+from support.errors import NotConverged
+
+_FEW_CELLS = 32
+"""Cells per side on which a solution from nothing costs nothing."""
+_ROUGH = 2e-2
+"""Residual on the coarse grids; their discretisation errs by more."""
+_MARGIN = 1.1
+"""Factor on an estimated approach, so that the box of cells that it overlaps holds the contact."""
+_ESTIMATE = 1e-2
+"""Residual of the solution on a coarse grid that the approach is estimated from."""
+
+
+def solve_on_surface(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve one contact without finite slopes.
+
+    Args:
+        problem: The contact problem of all cells of a surface.
+        start: A solution nearby, its motion that of the solution where the approach is free.
+
+    Raises:
+        NotConverged: When the contact conditions or the loads cannot be met.
+    """
+    interference, motions = problem.interference, problem.motions
+    pressure = None if start is None else start.pressure
+    if motions.turns:
+        return _solve_on(problem, _whole(interference), pressure)
+    if motions.count:
+        return _solve_under_force(problem, start)
+    if interference.max() <= 0.0:
+        return ContactPressures(np.zeros(interference.shape))
+    return _solve_growing(problem, _box(problem, 0.0), pressure)
+
+
+def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve with a free approach; the box follows from an estimate of it."""
+    interference = problem.interference
+    top = float(interference.max())  # the approach that counts is that from first touch of a cell
+    first, most, used = None, np.inf, 0
+    if start is not None and start.pressure.any():
+        first, most = start.pressure, _MARGIN * (float(start.motion[0]) + top)
+    elif not problem.compliance.periodic:
+        # summits of a coarse grid are lower: the estimate errs upwards
+        bits = _FEW_CELLS.bit_length() - 1
+        factors = [1 << max(0, (n - 1).bit_length() - bits) for n in interference.shape]
+        solution = _solve_nested(problem.coarsened(factors, _ESTIMATE))
+        most = _MARGIN * (float(solution.motion[0]) + top)
+    while True:
+        box = _box(problem, min(top - most, np.nextafter(top, -np.inf)))
+        solution = _solve_growing(problem, box, first)
+        approach, used = float(solution.motion[0]) + top, used + solution.iterations
+        if approach <= most or box == _whole(interference):
+            return solution._replace(iterations=used)
+        first, most = solution.pressure, _MARGIN * approach
+
+
+def _box(problem: CellProblem, least: float) -> Box:
+    """Return the box that a body can touch on a half-space: the cells of more interference."""
+    interference = problem.interference
+    if problem.compliance.periodic:
+        return _whole(interference)
+    return box_around(interference > least)
+
+
+def _solve_growing(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
+    """Solve on a box, and on a larger one while cells outside are lifted into contact."""
+    solution = _solve_on(problem, box, start)
+    while problem.compliance.body is not None and box != _whole(problem.interference):
+        nearer = problem.interference + problem.motions.displacement(solution.motion)
+        larger = _lifted(problem, box, nearer, solution.pressure)
+        if not larger.any():
+            break
+        larger[box] = True  # what touched once may touch again
+        box = box_around(larger)
+        again = _solve_on(problem, box, solution.pressure)
+        solution = again._replace(iterations=solution.iterations + again.iterations)
+    return solution
+
+
+def _lifted(problem: CellProblem, box: Box, interference: Array, pressure: Array) -> Flags:
+    """Return which cells outside a box penetrate the rigid body.
+
+    The half-space only lowers cells. All displacements are therefore evaluated only where those by
+    the finite body alone do not clear every cell outside.
+    """
+    outside = np.ones(interference.shape, bool)
+    outside[box] = False
+    body = problem.compliance.body_on(pressure.shape, problem.spacing).displacement(pressure)
+    if not np.any(outside & (body < interference)):
+        return np.zeros(interference.shape, bool)
+    return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
+
+
+def _solve_on(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
+    """Solve on the cells of a box, from coarser grids where there is no start."""
+    part = problem.on(box)
+    known = None if start is None else start[box].copy()  # the search overwrites it
+    solution = solve(part, nested_start(part) if known is None or not known.any() else known)
+    if box == _whole(problem.interference):
+        return solution
+    pressure = np.zeros(problem.interference.shape)
+    pressure[box] = solution.pressure
+    return solution._replace(pressure=pressure)
+
+
+def _solve_nested(problem: CellProblem) -> ContactPressures:
+    """Solve on the cells of a problem from nothing, by way of coarser grids."""
+    return solve(problem, nested_start(problem))
+
+
+def nested_start(problem: CellProblem) -> Array:
+    """Return pressures / E* to start from, shape (nx, ny).
+
+    They come from a grid half as fine. On a small grid they are uniform and meet the loads.
+
+    Args:
+        problem: The contact problem.
+    """
+    shape = problem.interference.shape
+    factors = [1 + (n > _FEW_CELLS) for n in shape]
+    if max(factors) > 1:
+        try:
+            coarse = _solve_nested(problem.coarsened(factors, _ROUGH))
+            fine = refined(coarse.pressure, factors)[: shape[0], : shape[1]]
+            return np.ascontiguousarray(fine)
+        except NotConverged:  # a bad start only costs time
+            pass
+    total = float(np.abs(problem.motions.loads).max(initial=0.0))
+    return np.full(shape, total / problem.interference.size)
+
+
+def refined(field: Array, factors: Sequence[int]) -> Array:
+    """Return the value of every coarse cell on each of the finer cells that it covers."""
+    return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
+
+
+def _whole(field: Array) -> Box:
+    """Return the box of all cells."""
+    return slice(0, field.shape[0]), slice(0, field.shape[1])
+
+
+def box_around(cells: Flags) -> Box:
+    """Return a box around some cells, at least one.
+
+    Its sides are rounded up to 2^k or 3 · 2^(k−1) cells, as far as the grid has them. Few sizes
+    then occur along a load path, and their kernels and work arrays are used again.
+
+    Args:
+        cells: Which cells, shape (nx, ny).
+    """
+    rows, columns = (np.logical_or.reduce(cells, axis=axis) for axis in (1, 0))
+    return _span(rows), _span(columns)
+
+
+def _span(used: Flags) -> slice:
+    first, last = (int(at) for at in np.flatnonzero(used)[[0, -1]])
+    count = last - first + 1
+    power = 1 << max(count - 1, 7).bit_length()
+    rounded = 3 * power // 4 if count <= 3 * power // 4 else power
+    size = min(rounded, used.size)
+    start = min(first, used.size - size)
+    return slice(start, start + size)
