@@ -40,10 +40,10 @@ from macro.mesh.from_file import read_mesh
 from macro.mesh.planar_face import PlanarFace, planar_face
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
-from macro.mesh.supports import check_supports
+from macro.mesh.supports import Support, Traction, check_supports
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.to_file import write_mesh
-from macro.meshed_body import MeshedBody, Support, Traction
+from macro.meshed_body import MeshedBody
 
 __all__ = [
     "BOTTOM",

@@ -200,6 +200,31 @@ def scalar_space(
     return (fem.TensorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
 
 
+def cell_constant(mesh: Any, values: Any, name: str | None = None) -> Any:
+    """Return a function that is constant on every cell.
+
+    Args:
+        mesh: dolfinx mesh.
+        values: The values of this rank's cells, ghosts included, shape (cells, …).
+        name: Name of the function in files.
+    """
+    space = scalar_space(mesh, 0, "DG", shape=np.shape(values)[1:])
+    function = fem.Function(space, name=name)
+    rows = cell_nodes(space)[:, 0]
+    function.x.array.reshape(len(rows), -1)[rows] = np.reshape(values, (len(rows), -1))
+    return function
+
+
+def is_hexahedral(mesh: Any) -> bool:
+    """Tell whether the cells of a mesh are hexahedra; else they are tetrahedra."""
+    return bool(mesh.topology.cell_name() == "hexahedron")
+
+
+def geometry_degree(mesh: Any) -> int:
+    """Return the degree of the shape of a mesh's cells: 2 where edges can be curved."""
+    return 2 if cell_vertices(mesh).shape[1] in (10, 27) else 1
+
+
 def cell_nodes(space: Any) -> NDArray[np.int32]:
     """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
     table = space.dofmap.list

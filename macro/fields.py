@@ -97,7 +97,7 @@ def write_rough_fields(
     block, mesh = problem.body, problem.body.mesh.mesh
 
     def functions() -> Iterator[tuple[int, list[Any]]]:
-        space = compat.scalar_space(mesh, _file_degree(mesh))
+        space = compat.scalar_space(mesh, compat.geometry_degree(mesh))
         for number, state in steps:
             pressures = _interpolated(space, _vertex_pressures(problem, state), "pressure")
             yield number, [*_of_body(block, block.function(state.displacement)), pressures]
@@ -124,7 +124,7 @@ def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
 
     moved = displacement.x.array.reshape(-1, 3)
     strain = gradient(moved, compat.cell_nodes(body.space), body.degree) @ np.linalg.inv(
-        gradient(mesh.geometry.x, geometry, _file_degree(mesh))
+        gradient(mesh.geometry.x, geometry, compat.geometry_degree(mesh))
     )
     strain = 0.5 * (strain + np.swapaxes(strain, 1, 2))
     first, shear = (np.asarray(constant)[..., None, None] for constant in body.cell_lame)
@@ -135,16 +135,11 @@ def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
 def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
     """Return displacement, stress and von Mises' stress, as XDMF files can hold them."""
     mesh = body.mesh.mesh
-    shown = _interpolated(
-        compat.vector_space(mesh, _file_degree(mesh)), displacement, "displacement"
-    )
-    stress = fem.Function(compat.scalar_space(mesh, 0, "DG", shape=(3, 3)), name="stress")
-    equivalent = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="von_Mises")
+    space = compat.vector_space(mesh, compat.geometry_degree(mesh))  # all that files can hold
+    shown = _interpolated(space, displacement, "displacement")
     values = cell_stresses(body, displacement)
-    rows = compat.cell_nodes(equivalent.function_space)[:, 0]
-    stress.x.array.reshape(-1, 9)[rows] = values.reshape(-1, 9)
-    equivalent.x.array[rows] = von_mises(values)
-    return [shown, stress, equivalent]
+    equivalent = compat.cell_constant(mesh, von_mises(values), "von_Mises")
+    return [shown, compat.cell_constant(mesh, values, "stress"), equivalent]
 
 
 def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
@@ -159,11 +154,6 @@ def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
     pressures.x.array[loaded] = total[loaded] / facets.area
     pressures.x.scatter_forward()
     return pressures
-
-
-def _file_degree(mesh: Any) -> int:
-    """Return the degree of the mesh's cells, the only one of functions that XDMF files hold."""
-    return 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
 
 
 def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:

@@ -23,8 +23,6 @@ from macro.mesh.contact_face import ContactFacets
 
 Array = NDArray[np.float64]
 
-_SHAPES = {4: 1, 10: 2, 8: 1, 27: 2}
-"""Degree of a cell's shape by the number of its nodes."""
 _MORE = 4
 """Degree of the quadrature beyond that of products of two basis functions."""
 
@@ -117,7 +115,7 @@ class FaceMoments:
         if not len(points.x):
             return np.empty((*points.values.shape, 2))
         rows = compat.cell_vertices(mesh)[points.cell]
-        shape = compat.lagrange_gradients(name, _SHAPES[rows.shape[1]], points.reference)
+        shape = compat.lagrange_gradients(name, compat.geometry_degree(mesh), points.reference)
         maps = np.einsum("nak,naj->nkj", shape, mesh.geometry.x[rows])  # ∂x_j/∂X_k
         basis = compat.lagrange_gradients(name, degree, points.reference)
         gradients = np.linalg.solve(maps, basis.transpose(0, 2, 1))

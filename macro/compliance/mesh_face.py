@@ -324,15 +324,9 @@ class _Corrections(_Loads):
         other = np.abs(differences[0]) + np.abs(differences[1]) > _SAME * size
         if not body.comm.allreduce(bool(other.any())):
             return None
-        constant = compat.scalar_space(body.mesh.mesh, 0, "DG")
-        rows = compat.cell_nodes(constant)[:, 0]
-        lame = []
-        for values in differences:
-            function = fem.Function(constant)
-            function.x.array[rows] = np.where(other, values, 0.0)
-            lame.append(function)
+        cells = [np.where(other, values, 0.0) for values in differences]
         displacement = fem.Function(body.space)
-        form = stiffness_form(body.space, (lame[0], lame[1]), body.quadrature_degree)
+        form = stiffness_form(body.space, (cells[0], cells[1]), body.quadrature_degree)
         nodes = np.unique(compat.cell_nodes(body.space)[np.flatnonzero(other)])
         action = compat.compile_form(ufl.action(form, displacement))
         return action, displacement, nodes, self._displacement(nodes)

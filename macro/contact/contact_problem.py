@@ -17,7 +17,6 @@ from macro.contact.contact_tangent import ContactTangent
 from macro.contact.interface import Interface
 from macro.contact.newton import NONLINEAR_DEFAULTS, NewtonReport, newton_tolerance
 from macro.contact.user_equations import UserEquations
-from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     KRYLOV_DEFAULTS,
@@ -28,6 +27,7 @@ from macro.linear_solvers.options import (
     reason_name,
     weakly,
 )
+from macro.linear_solvers.selection import algebraic_options
 from support.errors import InputError, NotConverged
 
 Array = NDArray[np.float64]
@@ -266,4 +266,4 @@ def _multigrid(space: Any) -> Mapping[str, object]:
     """Return PETSc's options of algebraic multigrid for a space of displacements."""
     if compat.lagrange_degree(space) == 2:
         return ALGEBRAIC_DEFAULTS
-    return algebraic_options(hexahedral=space.mesh.topology.cell_name() == "hexahedron")
+    return algebraic_options(space.mesh)

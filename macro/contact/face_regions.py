@@ -73,7 +73,7 @@ class FaceRegions(LoadedFace):
     @cached_property
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank, sorted by region."""
-        hexahedral = self.space.mesh.topology.cell_name() == "hexahedron"
+        hexahedral = compat.is_hexahedral(self.space.mesh)
         degree = self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
         assert self.region is not None
         parts = [_part(self.facets, self.region == k) for k in range(self.patches.count)]

@@ -242,7 +242,7 @@ class LoadedFace:
     @property
     def quadrature_degree(self) -> int:
         """Polynomial degree that the quadrature is exact for."""
-        hexahedral = self.space.mesh.topology.cell_name() == "hexahedron"
+        hexahedral = compat.is_hexahedral(self.space.mesh)
         return self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
 
     @cached_property

@@ -11,9 +11,7 @@ Theory: section 11 of ``demos/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import combinations
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +19,6 @@ from petsc4py import PETSc
 from scipy import sparse
 
 from macro import compat
-from macro.linear_solvers.algebraic import algebraic_options
 from macro.linear_solvers.node_matrices import for_displacements
 from macro.linear_solvers.options import CoarserGrid
 
@@ -29,81 +26,18 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 
-class Linear(Protocol):
-    """A body with linear displacements."""
-
-    @property
-    def space(self) -> Any:
-        """Vector space of the displacements."""
-        ...
-
-    @property
-    def stiffness(self) -> PETSc.Mat:
-        """Stiffness with unit rows for constrained unknowns, of type ``aij``."""
-        ...
-
-
-_SMOOTHING: Mapping[str, object] = {
-    "pc_mg_galerkin": "none",
-    "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.1",
-    "mg_levels_esteig_ksp_max_it": 30,
-    "mg_levels_pc_type": "pbjacobi",
-    "mg_coarse_ksp_type": "preonly",
-}
-"""Chebyshev smoothing with the nodes' blocks on all nodes. A third step saved one or two iterations
-and Gauss–Seidel three, but both took more time. PETSc's 10 iterations missed 12 % of the largest
-eigenvalue of a brake pad, so that the smoother was not definite; 20 found it."""
-
-_FLAT = 4.0
-"""Longest over shortest distance of a cell's vertices beyond which it counts as flat or slender."""
-
-_SMOOTHING_FLAT: Mapping[str, object] = {
-    "mg_levels_ksp_max_it": 6,
-    "mg_levels_ksp_chebyshev_esteig": "0,0.02,0,1.1",
-}
-"""Smoothing where most cells are flat: 31 iterations instead of 54 to 58 where they are eight times
-as long as high. The vertices do not see bending within a cell, which is soft there."""
-
-
-def quadratic_options(mesh: Any) -> Mapping[str, object]:
-    """Return PETSc's options of the two grids of `vertex_grid`.
-
-    Args:
-        mesh: dolfinx mesh of tetrahedra or hexahedra.
-
-    Note:
-        Collective.
-    """
-    algebraic = algebraic_options(hexahedral=mesh.topology.cell_name() == "hexahedron")
-    flat = _SMOOTHING_FLAT if _mostly_flat(mesh) else {}
-    return {**_SMOOTHING, **flat, **{f"mg_coarse_{key}": algebraic[key] for key in algebraic}}
-
-
-def _mostly_flat(mesh: Any) -> bool:
-    """Return whether most cells are flat or slender."""
-    vertices = len(compat.lagrange_points(mesh.topology.cell_name(), 1))
-    cells = compat.cell_vertices(mesh)[: mesh.topology.index_map(3).size_local, :vertices]
-    least, most = np.full(len(cells), np.inf), np.zeros(len(cells))
-    for one, other in combinations(range(vertices), 2):
-        edge = mesh.geometry.x[cells[:, one]] - mesh.geometry.x[cells[:, other]]
-        square = np.einsum("ck,ck->c", edge, edge)
-        least, most = np.minimum(least, square), np.maximum(most, square)
-    flat = int(np.sum(most > _FLAT**2 * least))
-    return bool(2 * mesh.comm.allreduce(flat) > mesh.comm.allreduce(len(cells)))
-
-
 _ROUNDING = 1e-12
 """Rounding of the linear basis' values."""
 
 
 def vertex_grid(
-    space: Any, linear: Linear, free: PETSc.Vec, springs: PETSc.Mat | None = None
+    space: Any, linear: Any, free: PETSc.Vec, springs: PETSc.Mat | None = None
 ) -> list[CoarserGrid]:
     """Return the one coarser grid of displacements of degree 2: that of the vertices.
 
     Args:
         space: Vector space of degree 2.
-        linear: The same body with linear displacements.
+        linear: The same body with linear displacements, its stiffness of type ``aij``.
         free: 1 for unknowns that are free, 0 for constrained ones.
         springs: Stiffness besides that of the body, such as that of contact laws.
 

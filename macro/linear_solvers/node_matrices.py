@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
@@ -57,6 +60,20 @@ def coupled_nodes(matrix: PETSc.Mat) -> Indices:
     local.mult(part, alone)
     differs = (whole.array_r != alone.array_r).reshape(-1, 3)
     return np.flatnonzero(differs.any(axis=1))
+
+
+def free_unknowns(conditions: Sequence[Any], like: PETSc.Vec) -> PETSc.Vec:
+    """Return 1 for free degrees of freedom and 0 for those that Dirichlet conditions constrain.
+
+    Args:
+        conditions: The conditions.
+        like: A vector of these degrees of freedom, which becomes the result.
+    """
+    like.set(1.0)
+    for condition in conditions:
+        dofs, _ = condition.dof_indices()
+        like.array[dofs[dofs < like.local_size]] = 0.0
+    return like
 
 
 def dofs_of(nodes: Indices) -> Indices:

@@ -17,9 +17,6 @@ from macro.mesh.neighbours import outer_sides
 
 Array = NDArray[np.float64]
 
-_SHAPES = {4: 1, 10: 2, 8: 1, 27: 2}
-"""Degree of a cell's shape by the number of its nodes."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OuterFacets:
@@ -76,7 +73,7 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     vertices, corners = compat.reference_facets(name)
     cell, side = outer_sides(mesh)
     shape_nodes = compat.cell_vertices(mesh)[cell]
-    shape = _SHAPES[shape_nodes.shape[1]]
+    shape = compat.geometry_degree(mesh)
     rule, weights = _facet_rule(corners.shape[1], exact)
     first = vertices[corners[:, 0]]
     tangents = vertices[corners[:, 1:3]] - first[:, None]  # (sides, 2, 3)

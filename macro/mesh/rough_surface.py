@@ -36,9 +36,6 @@ _LEAST_BENT = 0.3
 _FLAT = 1e-9
 """Distance from a face, relative to the body, that is rounding."""
 
-_NODES_OF_CURVED = 10
-"""Nodes of a quadratic tetrahedron."""
-
 _EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 """Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
 
@@ -115,7 +112,7 @@ def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
     rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
     moved = points.copy()
     moved[:, 2] += rise * np.maximum(1.0 + points[:, 2] / depth, 0.0) ** _DECAY
-    if compat.cell_vertices(mesh).shape[1] == _NODES_OF_CURVED:
+    if compat.geometry_degree(mesh) == 2:
         _straighten(mesh, moved)
     quality = MeshQuality(
         thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), op=MPI.MIN)),
@@ -205,7 +202,7 @@ def _volumes(mesh: Any, moved: Array) -> Array:
     cells, points = compat.cell_vertices(mesh), mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     smallest = np.full(len(cells), np.inf)
-    degree = 2 if cells.shape[1] == _NODES_OF_CURVED else 1
+    degree = compat.geometry_degree(mesh)
     for slopes in compat.lagrange_gradients(mesh.topology.cell_name(), degree):
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))

@@ -23,7 +23,7 @@ def dirichlet_solution(block, boundary_values, load=None):
     dofs = fem.locate_dofs_topological(space, 2, facets)
     fixed = fem.dirichletbc(np.zeros(3), dofs, space)
     degree = 2 * block.degree if block.mesh.shape.hexahedral else 2 * block.degree - 2
-    form = compat.compile_form(stiffness_form(space, MATERIAL, degree))
+    form = compat.compile_form(stiffness_form(space, MATERIAL.lame, degree))
     whole, constrained = compat.assemble_matrix(form, []), compat.assemble_matrix(form, [fixed])
     given = fem.Function(space)
     given.interpolate(boundary_values)
