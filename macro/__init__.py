@@ -1,7 +1,7 @@
 """Elastic bodies in dolfinx, in contact with a rigid plane or with each other.
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → ContactState for every load step.
 A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block;
 TaggedMesh → write_mesh → a file that ranks read in parts.
 
@@ -16,11 +16,11 @@ from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
+from macro.contact.contact_state import ContactState
 from macro.contact.face_pair import FacePair
-from macro.contact.face_regions import FaceRegions
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
-from macro.contact.law_problem import LawContactProblem, LawContactState
+from macro.contact.law_problem import LawContactProblem
 from macro.contact.loaded_face import (
     LoadedFace,
     displacements_under,
@@ -29,7 +29,6 @@ from macro.contact.loaded_face import (
 from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
-    UnilateralContactState,
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
@@ -56,13 +55,12 @@ __all__ = [
     "ContactFacets",
     "ContactLaw",
     "ContactProblem",
+    "ContactState",
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
-    "FaceRegions",
     "Interface",
     "LawContactProblem",
-    "LawContactState",
     "LawOperator",
     "LawsAtPoints",
     "LoadedFace",
@@ -75,7 +73,6 @@ __all__ = [
     "TaggedMesh",
     "Traction",
     "UnilateralContactProblem",
-    "UnilateralContactState",
     "block_mesh",
     "check_supports",
     "contact_facets",

@@ -17,8 +17,9 @@ from petsc4py import PETSc
 
 from geometry.materials import von_mises
 from macro import compat
+from macro.contact.contact_state import ContactState
 from macro.contact.loaded_face import LoadedFace
-from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
+from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
 from support.collective import on_root
 
@@ -78,7 +79,7 @@ def write_fields(
 def write_rough_fields(
     path: Path | str,
     problem: UnilateralContactProblem,
-    steps: Iterable[tuple[int, UnilateralContactState]],
+    steps: Iterable[tuple[int, ContactState]],
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of a rough block as XDMF.
 
@@ -156,12 +157,13 @@ def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
     return pressures
 
 
-def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:
+def _vertex_pressures(problem: UnilateralContactProblem, state: ContactState) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
     Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no
     tributary area, and one of a square far less than the middle node.
     """
+    assert state.nodal is not None
     block, top = problem.body, problem.top
     pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
     vertices, cells = compat.cell_nodes(pressures.function_space), compat.cell_nodes(block.space)
@@ -178,7 +180,7 @@ def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContac
     force, area = (
         PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
     )
-    for vector, values in ((force, state.nodal_force), (area, top.area)):
+    for vector, values in ((force, state.nodal.force), (area, top.area)):
         vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
         vector.assemble()
     loaded = area.array_r > 0.0

@@ -23,14 +23,8 @@ from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNe
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.node_contact import (
-    ContactSolution,
-    Extrapolation,
-    Guess,
-    PlaneOverNodes,
-    largest,
-    not_found,
-)
+from macro.contact.initial_guess import Guess
+from macro.contact.node_contact import ContactSolution, PlaneOverNodes, largest, not_found
 from macro.contact.rough_face import RoughFace
 from macro.linear_solvers.constrained import contact_tolerance
 
@@ -68,6 +62,7 @@ class AugmentedLagrangian:
     Attributes:
         law: Law of the quadrature points.
         equilibrium: Equations of the body with this law.
+        points: Number of pressures in a guess: this rank's quadrature points.
 
     Note:
         Everything here is collective.
@@ -88,18 +83,20 @@ class AugmentedLagrangian:
         self._forces = ContactForces(loaded, sampling, [self.law], none)
         self.equilibrium = Equilibrium(body, self._forces)
         self._newton = FacetNewton(self.equilibrium, self.law, loaded, top, plane)
-        self._history = Extrapolation(body.owned_dofs, len(points.x))
+        self.points = len(points.x)
 
-    def solve(self, control: Control) -> ContactSolution:
-        """Find the contact of a load step, with an initial guess from the steps before.
+    def solve(self, control: Control, guess: Guess) -> ContactSolution:
+        """Find the contact of a load step.
+
+        Args:
+            control: What the load step prescribes.
+            guess: Where to start: the plane with its prescribed motions, and pressures at points.
 
         Raises:
-            NotConverged: When an iteration fails or nothing can hold the plane; earlier solutions
-                stay what they were.
+            NotConverged: When an iteration fails or nothing can hold the plane.
         """
-        guess = self._history.guess(control)
         forces, law = self._forces, self.law
-        forces.control, forces.plane = control, self._plane.placed(control, guess.plane)
+        forces.control, forces.plane = control, guess.plane
         law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
@@ -141,16 +138,11 @@ class AugmentedLagrangian:
         touching = nodal_force > _NO_FORCE * pressed
         if pressed:
             touching |= gap < self._penetration * largest(displacement.array_r, comm)
-        values = displacement.array_r.copy()
-        self._history.add(
-            Guess(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
-        )
         return ContactSolution(
-            plane=plane,
-            displacement=values,
+            end=Guess(plane, displacement.array_r.copy(), pressure),
             nodal_force=nodal_force,
             touching=touching,
-            active_sets=steps,
+            iterations=steps,
             linear_iterations=spent,
             reason="CONVERGED_MULTIPLIERS" if pressed else "CONVERGED_NO_CONTACT",
         )

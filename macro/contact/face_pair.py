@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.body_pair import BodyPair
-from macro.contact.loaded_face import LoadedFace, Mode, Sampling, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, Sampling, normal_rows
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
 from support.errors import InputError
@@ -38,14 +38,13 @@ _UNLIKE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class FacePair:
+class FacePair(ContactFace):
     """Patches on the contact faces of a body and its counter-body.
 
     Args:
         first: The face of the body with its patches.
         second: The face of the counter-body with the same patches, its facets in the frame of the
-            first (``opposed``).
-        bodies: Both bodies.
+            first (``opposed``), on the same communicator.
 
     Note:
         Everything here is collective.
@@ -53,12 +52,11 @@ class FacePair:
 
     first: LoadedFace
     second: LoadedFace
-    bodies: BodyPair
 
-    @property
+    @cached_property
     def body(self) -> BodyPair:
         """Both bodies."""
-        return self.bodies
+        return BodyPair(self.first.body, self.second.body)
 
     @property
     def comm(self) -> Any:
@@ -66,7 +64,7 @@ class FacePair:
         return self.first.comm
 
     @property
-    def patches(self) -> PatchGrid:
+    def patches(self) -> PatchGrid | Outline:  # type: ignore[override]
         """Patches on both faces."""
         return self.first.patches
 
@@ -75,19 +73,11 @@ class FacePair:
         """Areas of the patches on the first face, shape (N,) [mm²]."""
         return self.first.areas
 
-    def sampling(self, mode: Mode) -> Sampling:
-        """Return the samples of a mode, see `LoadedFace.sampling`.
-
-        Raises:
-            InputError: When the faces do not cover the patches alike, or there is no such mode.
-        """
-        return self.pointwise if mode == "pointwise" else self.patchwise
-
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        one, other = self.first.sampling("patchwise"), self.second.patchwise
-        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.patches.areas):
+        one, other = self.first.patchwise, self.second.patchwise
+        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.areas):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),
@@ -130,14 +120,9 @@ class FacePair:
             pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
         """
         parts = [face.load(pressures).array_r for face in (self.first, self.second)]
-        load = self.bodies.stiffness.createVecRight()
+        load = self.body.stiffness.createVecRight()
         load.array[:] = np.concatenate(parts)
         return load
-
-    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the sums of the displacements of the patches into both bodies, (N,) [mm]."""
-        sampling = self.patchwise
-        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
 
     def _both(self, one: Sampling, own: csr_matrix, other: csr_matrix, depth: Array) -> Sampling:
         """Return samples of both faces, from the rows of both bodies in their operators."""

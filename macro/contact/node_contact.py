@@ -1,6 +1,4 @@
-"""What methods of contact on a rough top share: the plane over its nodes, solutions and guesses.
-
-A rough top has no smooth energy in a basis of earlier solutions; guesses are extrapolated.
+"""What methods of contact on a rough top share: the plane over its nodes, and their solutions.
 
 Theory: section 12 of ``demos/theory.md``.
 """
@@ -15,14 +13,11 @@ from numpy.typing import NDArray
 
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers
+from macro.contact.initial_guess import Guess
 from support.errors import NotConverged
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-
-
-_LARGEST_STEP = 1.0
-"""Largest extrapolation, forwards or backwards, in steps between the last two solutions."""
 
 
 class PlaneOverNodes:
@@ -85,8 +80,8 @@ class PlaneOverNodes:
         """
         levers = self.levers.scaled(free)[at]
         values, vectors = np.linalg.eigh(self.levers.summed(levers.T @ levers))
-        found = values > UNSUPPORTED * max(values.max(initial=0.0), 1.0)
-        scaled: Array = vectors[:, found] / np.sqrt(values[found])
+        supported = values > UNSUPPORTED * max(values.max(initial=0.0), 1.0)
+        scaled: Array = vectors[:, supported] / np.sqrt(values[supported])
         return scaled
 
     def on_springs(
@@ -135,75 +130,20 @@ class ContactSolution(NamedTuple):
     """Contact of a rough top with a rigid plane; arrays hold this rank's part.
 
     Attributes:
-        plane: Approach at the middle [mm] and slopes, shape (3,).
-        displacement: Owned degrees of freedom [mm].
+        end: Plane, displacement, and what the method starts from in further load steps.
         nodal_force: Contact forces of the nodes of the top, shape (n,) [N].
         touching: Whether these nodes are in contact, shape (n,).
-        active_sets: Active sets that were solved for.
+        iterations: Active sets that were solved for, or Newton steps.
         linear_iterations: Iterations of the linear solver.
         reason: Name of the reason to stop.
     """
 
-    plane: Array
-    displacement: Array
+    end: Guess
     nodal_force: Array
     touching: NDArray[np.bool_]
-    active_sets: int
+    iterations: int
     linear_iterations: int
     reason: str
-
-
-class Guess(NamedTuple):
-    """Where an iteration starts.
-
-    Attributes:
-        plane: Approach [mm] and slopes of the plane, shape (3,).
-        displacement: This rank's owned degrees of freedom [mm].
-        contact: Contact forces of its nodes, or pressures of its quadrature points, shape (n,).
-    """
-
-    plane: Array
-    displacement: Array
-    contact: Array
-
-
-class Extrapolation:
-    """Extrapolates the last two solutions along the approach or the force.
-
-    Args:
-        dofs: Number of this rank's degrees of freedom.
-        points: Number of its nodes or quadrature points on the top.
-    """
-
-    def __init__(self, dofs: int, points: int) -> None:
-        self._at_rest = Guess(np.zeros(3), np.zeros(dofs), np.zeros(points))
-        self._last: list[tuple[Guess, float]] = []
-
-    def add(self, solution: Guess, force: float) -> None:
-        """Add a solution.
-
-        Args:
-            solution: The solution.
-            force: Its force [N].
-        """
-        self._last = [*self._last[-1:], (solution, force)]
-
-    def guess(self, control: Control) -> Guess:
-        """Return the line through the last two solutions at the prescribed approach or force.
-
-        Args:
-            control: What the load step prescribes.
-        """
-        if not self._last:
-            return self._at_rest
-        (before, force_before), (last, force) = self._last[0], self._last[-1]
-        if control.approach is not None:
-            run, ahead = last.plane[0] - before.plane[0], control.approach - last.plane[0]
-        else:
-            run, ahead = force - force_before, (control.force or 0.0) - force
-        share = float(np.clip(ahead / run, -_LARGEST_STEP, _LARGEST_STEP)) if run else 0.0
-        pairs = zip(last, before, strict=True)
-        return Guess(*(new + share * (new - old) for new, old in pairs))
 
 
 def largest(values: Array, comm: Any) -> float:

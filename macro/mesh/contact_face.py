@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -78,6 +79,14 @@ class ContactFacets:
         areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
         return np.asarray(areas, dtype=np.float64)
 
+    def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
+        """Return these facets and others of the same face."""
+        arrays = [each.name for each in fields(self) if each.name not in ("frame", "outward")]
+        parts = (self, *others)
+        return replace(
+            self, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
+        )
+
     def local(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
@@ -116,7 +125,7 @@ class ContactFacets:
 
 
 def facet_quadrature(
-    facets: ContactFacets, space: Any, patches: PatchGrid, *, degree: int
+    facets: ContactFacets, space: Any, parts: PatchGrid | NDArray[np.intp], *, degree: int
 ) -> FacetQuadrature:
     """Place quadrature points on the part of a contact face that the patches cover.
 
@@ -126,11 +135,15 @@ def facet_quadrature(
     Args:
         facets: Facets of the face.
         space: Displacements on their mesh.
-        patches: Patches on the face, in its frame.
+        parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
-    triangles, facet = _cut_into_patches(*_triangles(facets.corners), patches)
-    patch = patches.index_of(*triangles.mean(axis=1).T)
+    triangles, facet = _triangles(facets.corners)
+    if isinstance(parts, PatchGrid):
+        triangles, facet = _cut_into_patches(triangles, facet, parts)
+        patch = parts.index_of(*triangles.mean(axis=1).T)
+    else:
+        patch = parts[facet]
     order = np.argsort(patch, kind="stable")
     triangles, facet, patch = triangles[order], facet[order], patch[order]
 

@@ -197,5 +197,5 @@ def _half(face: LoadedFace | FacePair, displacement: Array, counter: bool) -> Ar
     from macro import FacePair
 
     if isinstance(face, FacePair):
-        return face.bodies.split(displacement)[counter]
+        return face.body.split(displacement)[counter]
     return displacement

@@ -22,7 +22,7 @@ from multiscale.storage import packed, unpacked
 from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
+    from macro import ContactState, FacePair, LawContactProblem, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class EmbeddedCoupling:
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
         self._problem, self.table, self.face = problem, table, face
-        self._last: LawContactState | None = None
+        self._last: ContactState | None = None
 
     @property
     def blocks(self) -> list[Any]:
@@ -73,7 +73,9 @@ class EmbeddedCoupling:
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        pressure, face = self._problem.pressures, self.face
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        pressure, face = self._last.pressure, self.face
         if not hasattr(face, "on_both"):
             return pressure
         whole = np.zeros(len(face.on_both))
@@ -110,7 +112,7 @@ class EmbeddedCoupling:
     def state(self) -> Arrays:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return {} if last is None else packed((last.approach, last.tilt, last.pressure))
+        return {} if last is None else packed((last.approach, last.tilt, last.patch_pressure))
 
     def restore(self, state: Arrays) -> None:
         """Find the equilibrium under a plane again, from the pressures; see `Restorable`.
@@ -123,7 +125,7 @@ class EmbeddedCoupling:
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, state: LawContactState) -> LoadStep:
+    def _step(self, control: Control, state: ContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
         laws = self.table.laws
 
@@ -141,19 +143,19 @@ class EmbeddedCoupling:
             self.table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
-            closure=state.closure,
-            pressure=state.pressure,
+            closure=state.patch_closure,
+            pressure=state.patch_pressure,
             area_fraction=area_fraction,
             separation=separation,
             stiffness=stiffness,
             **self._of_contacts(state),
-            newton_iterations=state.newton_iterations,
+            newton_iterations=state.iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_contacts(self, state: LawContactState) -> dict[str, Any]:
+    def _of_contacts(self, state: ContactState) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.
 
         Where laws are those of samples, contacts are counted on the area of the samples, and the
@@ -161,7 +163,7 @@ class EmbeddedCoupling:
         """
         laws = self.table.laws
         if isinstance(self.table.patches, PatchGrid):
-            mean_closures = zip(laws, state.closure, strict=True)
+            mean_closures = zip(laws, state.patch_closure, strict=True)
             return {"contacts": [law.at(c, extend=True).contacts for law, c in mean_closures]}
         areas = self.face.areas
         density = [

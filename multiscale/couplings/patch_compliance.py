@@ -112,22 +112,22 @@ def embedding(setup: ProblemSetup, comm: Any) -> LoadedFace | FacePair:
     Note:
         Collective.
     """
-    from macro import BodyPair, FacePair, FaceRegions, LoadedFace
+    from macro import FacePair, LoadedFace
 
     first, counter = _first_face(setup, comm), setup.bodies.counter
     if counter is None:
         return first
     second = LoadedFace(counter.body, counter.facets[0], setup.patches)
     if setup.samples and setup.face is not None:
-        second = FaceRegions.covering(counter.body, counter.facets, setup.face.lengths)
-    return FacePair(first, second, BodyPair(first.body, counter.body))
+        second = LoadedFace.of_regions(counter.body, counter.facets, setup.face.lengths)
+    return FacePair(first, second)
 
 
 def _first_face(setup: ProblemSetup, comm: Any) -> LoadedFace:
     """Return the patches, or regions under laws of samples, on the first body."""
     from mpi4py import MPI
 
-    from macro import Block, FaceRegions, LoadedFace, block_mesh
+    from macro import Block, LoadedFace, block_mesh
     from macro.mesh.contact_face import top_facets
 
     body: Any
@@ -141,5 +141,5 @@ def _first_face(setup: ProblemSetup, comm: Any) -> LoadedFace:
             return LoadedFace.of_block(body, setup.patches)
         facets = (top_facets(mesh),)
     if setup.samples and setup.face is not None:
-        return FaceRegions.covering(body, facets, setup.face.lengths)
+        return LoadedFace.of_regions(body, facets, setup.face.lengths)
     return LoadedFace(body, facets[0], setup.patches)

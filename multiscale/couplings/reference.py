@@ -21,7 +21,7 @@ from multiscale.storage import packed, unpacked
 from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, MeshQuality, UnilateralContactProblem, UnilateralContactState
+    from macro import ContactState, ElasticBody, MeshQuality, UnilateralContactProblem
 
 Array = NDArray[np.float64]
 
@@ -53,7 +53,7 @@ class ReferenceCoupling:
         assert setup.meshes is not None
         self._surface, self._patches, self._meshes = setup.surface, setup.patches, setup.meshes
         self._problems, self.qualities = tuple(problems), tuple(qualities)
-        self._last: tuple[UnilateralContactState, ...] = ()
+        self._last: tuple[ContactState, ...] = ()
 
     @property
     def finest(self) -> UnilateralContactProblem:
@@ -66,7 +66,7 @@ class ReferenceCoupling:
         return [problem.body for problem in self._problems]
 
     @property
-    def latest(self) -> UnilateralContactState:
+    def latest(self) -> ContactState:
         """The finest block at the latest load step.
 
         Raises:
@@ -81,27 +81,28 @@ class ReferenceCoupling:
         self._last = states = tuple(problem.solve(control) for problem in self._problems)
         finest, nominal = states[-1], self._patches.area * self._patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
-        share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
+        share = (finest.contact_area or 0.0) / finest.nodal_area if finest.nodal_area else 0.0
         return LoadStep.of_patches(
             self._patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
             closure=finest.patch_closure,
-            pressure=finest.patch_force / self._patches.area,
+            pressure=finest.patch_pressure,
             area_fraction=share * finest.patch_area / self._patches.area,
             separation=finest.mean_separation,
             contacts=finest.contacts,
-            newton_iterations=sum(state.active_sets for state in states),
+            newton_iterations=sum(state.iterations for state in states),
             linear_iterations=sum(state.linear_iterations for state in states),
             reason=finest.reason,
             imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
             peak_pressure_MPa=finest.peak_pressure,
             meshes=tuple(
-                (state.approach, state.force, state.contact_area_fine / nominal) for state in states
+                (state.approach, state.force, (state.contact_area or 0.0) / nominal)
+                for state in states
             ),
         )
 
-    def detail(self, latest: UnilateralContactState) -> ContactDetail:
+    def detail(self, latest: ContactState) -> ContactDetail:
         """Return the contact of a load step in detail; see `HasContact`.
 
         The area of a spot is that of its nodes times the area with its border in the facets over
@@ -112,7 +113,7 @@ class ReferenceCoupling:
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)
         region, count = nodes.region[touching], latest.contacts
-        share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
+        share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > _NO_AREA * nodes.area.max()
         return ContactDetail(

@@ -42,9 +42,9 @@ FLOORS = {
         "by_name",
     ],
     "macro": [
-        "elasticity form_cache",
+        "form_cache",
         "compat",
-        "mesh",
+        "elasticity mesh",
         "linear_solvers",
         "elastic_body",
         "block body_pair meshed_body",
