@@ -1,4 +1,4 @@
-"""How Sphinx makes the site: of the pages in ``docs`` and ``demos``, the README and the changelog.
+"""How Sphinx makes the site: of the pages in ``docs``, the README and the changelog.
 
 The project's folder is the source, so that all pages keep their places and their links. What the
 project itself says (keys, columns, pictures, names) is written to ``docs/_generated`` first:
@@ -30,7 +30,7 @@ extensions = [
 ]
 root_doc = "docs/index"
 include_patterns = [
-    "README.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md", "demos/*.md", "demos/*/*.md",
+    "README.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md",
 ]  # fmt: skip
 exclude_patterns = [".*", "results", "tests", "docs/_build", "docs/_generated"]
 needs_sphinx = "8.2"

@@ -14,7 +14,7 @@ from multiscale.results.history import COLUMNS
 from multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry", "support")
+PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry")
 """Packages with public names, from the top down; a name is described in the first that has it."""
 
 
@@ -115,9 +115,9 @@ _SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
 
 
 def pictures() -> list[Picture]:
-    """Return the pictures of README and demos, each once: those of the demos' index first."""
-    index = ROOT / "demos" / "README.md"
-    others = [ROOT / "README.md", *sorted({*index.parent.rglob("*.md")} - {index})]
+    """Return the pictures of all pages, each once: those of the demos' index first."""
+    index = ROOT / "docs" / "demos.md"
+    others = [ROOT / "README.md", *sorted({*index.parent.glob("*.md")} - {index})]
     found: dict[Path, Picture] = {}
     for page in (index, *others):
         for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):

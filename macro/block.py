@@ -1,6 +1,6 @@
 """The elastic block: its supports, and the lattice that its nodes form.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

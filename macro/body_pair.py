@@ -1,6 +1,6 @@
 """Two elastic bodies whose displacements are the unknowns of one contact problem.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A linear elastic body in dolfinx: displacement space, supports, assembled stiffness and solver.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Linear isotropic elasticity: stiffness form and rigid body modes.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Writes displacements, stresses and contact pressures of a body for ParaView.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

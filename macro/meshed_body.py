@@ -1,6 +1,6 @@
 """An elastic body on any mesh, with materials by volume, and supports and tractions by surface.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

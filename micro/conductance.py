@@ -13,7 +13,7 @@ drops out of the sum. A circular spot of radius a on an isothermal plane, dF/dδ
 Source:
     Barber 2003, Proc. R. Soc. A 459, 53-66, doi 10.1098/rspa.2002.1038.
 
-Theory: demos/theory.md, section 14.
+Theory: docs/theory.md, section 14.
 """
 
 from __future__ import annotations

@@ -81,7 +81,7 @@ def cache(comm: Any, folder: Path | None = None) -> CheckResult:
         remedy = "every host compiles for itself; run patchlaw warm on each, or share the folder"
     elif slowest > _SLOW_FILE:
         problem = f"{1e3 * slowest:.0f} ms for a small file"
-        remedy = "copy it to a local disk of each node and set XDG_CACHE_HOME (demos/hpc/README.md)"
+        remedy = "copy it to a local disk of each node and set XDG_CACHE_HOME (docs/hpc.md)"
     else:
         return CheckResult("ok", text)
     return CheckResult("warning", f"{text}; {problem}", remedy)

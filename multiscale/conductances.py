@@ -1,6 +1,6 @@
 """Conductance of load steps and of laws, where a scene asks for it.
 
-Theory: demos/theory.md, section 14.
+Theory: docs/theory.md, section 14.
 """
 
 from __future__ import annotations

@@ -170,7 +170,7 @@ def launcher(comm: Any) -> CheckResult:
     library = MPI.Get_library_version().strip().partition(",")[0].splitlines()[0]
     if detached := detached_processes():
         text = f"started as one of {detached[1]} processes, but each stands alone ({library})"
-        remedy = f"start with the mpirun of {library}, or srun --mpi=pmix; see demos/hpc/README.md"
+        remedy = f"start with the mpirun of {library}, or srun --mpi=pmix; see docs/hpc.md"
         return CheckResult("fail", text, remedy)
     if comm is not None and comm.rank > 0:  # rank 0 alone looks for the command
         return CheckResult("ok", library)

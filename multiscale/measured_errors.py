@@ -18,7 +18,7 @@ was within the measured one on 95 %, which was 3.4 × the true one.
 What finite slopes leave out is estimated by `FiniteSlopes.error`. Where a side cuts a cap in half
 the force was off by another 1.4 % against three meshes of the block.
 
-Theory: demos/theory.md, section 13.
+Theory: docs/theory.md, section 13.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ On an element, t from −1 to 1, the shape functions are (1 ∓ t)/2 and
 are orthogonal, so that all matrices are nearly diagonal. Across the top there is one element, with
 1 and t in place of the first two: its functions are even and odd in turn, as the modes are.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Compliance of a block's top, and the stresses in it, in Legendre modes.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Legendre modes on a rectangle of a meshed contact face: loads, and moments of displacements.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

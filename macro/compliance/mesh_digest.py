@@ -2,7 +2,7 @@
 
 It is the same for every number of ranks: numbers of cells and supported nodes are mixed and summed.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ count with the difference. The correction is smooth, so that the user's mesh res
 body rises above the plane of its face the half-space ends there; then the modes load the mesh
 itself, and their displacements are as good as the mesh under them.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ The two vertical planes of symmetry decouple them. Under a pressure that is even
 displacement component along that axis is odd along it, and the other components are even; under an
 odd pressure it is the other way round.
 
-Theory: section 6 of ``demos/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """What is around a rectangle on the contact face of a body: free sides, thickness, the plane.
 
-Theory: sections 5 and 6 of ``demos/theory.md``.
+Theory: sections 5 and 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ end. Free motions of the plane are unknowns of the same linear solves, in which 
 move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
 contact, corrected near the active nodes.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

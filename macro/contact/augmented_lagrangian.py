@@ -8,7 +8,7 @@ The pressures of one solve are the multipliers p₀ of the next, until no point 
 (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
 with line search finds the equilibrium.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

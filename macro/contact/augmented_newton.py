@@ -1,6 +1,6 @@
 """Equilibrium of a block whose top stands on unilateral springs, by generalised Newton's method.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

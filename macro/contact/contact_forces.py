@@ -1,6 +1,6 @@
 """Forces of contact laws on a face under a rigid plane, and their exact derivative.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

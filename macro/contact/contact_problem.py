@@ -1,6 +1,6 @@
 """A user's own variational problem with rough interfaces, solved by Newton's method.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

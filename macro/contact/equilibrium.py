@@ -1,6 +1,6 @@
 """Equilibrium of a body with contact laws under a rigid plane: residual and exact tangent.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

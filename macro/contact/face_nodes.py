@@ -1,6 +1,6 @@
 """The nodes of a rough face, the triangles between them, and their shares of the patches.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

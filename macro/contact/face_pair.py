@@ -4,7 +4,7 @@ Meshes need not match. Laws at points are evaluated at the quadrature points of 
 face; the basis functions of the counter-body are evaluated where these points lie on its face.
 What lies on one face alone carries no pressure.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

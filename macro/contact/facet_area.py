@@ -1,6 +1,6 @@
 """Contact area within the facets of a block's top, from pressures and gaps of its nodes.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

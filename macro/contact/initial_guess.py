@@ -5,7 +5,7 @@ With laws, guesses minimise the energy in the space of earlier solutions. Extrap
 and 3 to 24 % more with 16 and 64 patches or laws at points. Meshed roughness has no smooth energy
 in such a basis; its solutions are extrapolated.
 
-Theory: sections 11 and 12 of ``demos/theory.md``.
+Theory: sections 11 and 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

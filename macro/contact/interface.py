@@ -1,6 +1,6 @@
 """A rough interface in a user's own dolfinx problem: residual and tangent of contact laws.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Laws of an interface as an external operator of UFL, by the package dolfinx-external-operator.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

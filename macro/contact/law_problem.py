@@ -1,6 +1,6 @@
 """A body with contact laws on a face, under a rigid plane: one load step at a time.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

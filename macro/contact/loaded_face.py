@@ -1,6 +1,6 @@
 """Patches on the contact face of a body: loads by pressures, and mean displacements.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Newton's method by PETSc's SNES for equations with contact.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

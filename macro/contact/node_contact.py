@@ -1,6 +1,6 @@
 """What methods of contact on a rough top share: the plane over its nodes, and their solutions.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

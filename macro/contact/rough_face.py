@@ -1,6 +1,6 @@
 """The rough face of a body, which a rigid plane is pressed on.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ grow to ten times as many and more. Laws at points couple no other nodes than th
 that their stiffness fits into the matrix, and multigrid is set up with it. On quadratic elements
 that takes no second matrix: only the coarser grid has the sum's entries.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

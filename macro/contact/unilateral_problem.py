@@ -1,6 +1,6 @@
 """A body whose rough face is meshed, under a rigid plane: one load step at a time.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

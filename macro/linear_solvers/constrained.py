@@ -1,6 +1,6 @@
 """Conjugate gradients for displacements some of which are constrained, without a new matrix.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ interpolated trilinearly in the flat lattice, also on rough blocks, and the coar
 Galerkin's products of the true matrix. A coarse node is one of the finer grid's nodes, and lives on
 the same rank.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ is the stiffness of linear elements on the same mesh, which on straight cells is
 without its time and memory. It is seven times smaller, and algebraic multigrid suits linear
 elements: on all nodes it took twice the time and four times the memory.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

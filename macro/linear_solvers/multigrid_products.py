@@ -3,7 +3,7 @@
 petsc4py only hands out copies of a matrix's entries, so the blocks are read in place through
 PETSc's C interface.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ Smoothed aggregation (PETSc's GAMG) takes 11 to 20 iterations on cells of even l
 has tens of entries in a row. With a threshold, flat cells coarsen so slowly that set-up takes
 minutes. It is used on request (``-patchlaw_pc_type gamg``). The figures are of PETSc 3.18.
 
-Theory: section 11 of ``demos/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Meshes of bodies whose contact face is the rough surface itself.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Meshes of blocks that stand on boxes, flat or with their roughness, with marked surfaces.
 
-Theory: section 12 of ``demos/theory.md``.
+Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

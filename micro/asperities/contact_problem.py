@@ -17,7 +17,7 @@ together are the one equation
 Every U_ki starts with the slope 0 at t_i = 0, so G is continuously differentiable. Its Jacobian
 I + ∂U/∂t has columns for the active set {z_i > 0} alone.
 
-Theory: demos/theory.md, section 9, eq. 9.1.
+Theory: docs/theory.md, section 9, eq. 9.1.
 
 Source:
     Waddad et al. 2016, eqs. 10–12 and 23, doi 10.1016/j.triboint.2015.12.023;

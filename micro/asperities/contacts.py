@@ -4,7 +4,7 @@ A rigid plane that has approached by Î´ interferes with every summit by d_k = <Î
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
 displacements by all contacts add up to w_k (`micro.asperities.contact_problem`).
 
-Theory: demos/theory.md, sections 8 and 9.
+Theory: docs/theory.md, sections 8 and 9.
 """
 
 from __future__ import annotations

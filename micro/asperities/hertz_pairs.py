@@ -17,7 +17,7 @@ A finite body adds smooth displacements, in modes. Contacts are small against th
 So forces act and displacements are taken at the centres of the contacts, and a contact's own force
 counts as well.
 
-Theory: demos/theory.md, section 9, eq. 6.1.
+Theory: docs/theory.md, section 9, eq. 6.1.
 """
 
 from __future__ import annotations

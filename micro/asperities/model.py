@@ -1,6 +1,6 @@
 """The four asperity models: elliptic or circular contacts, with or without interaction.
 
-Theory: demos/theory.md, sections 8 and 9.
+Theory: docs/theory.md, sections 8 and 9.
 """
 
 from __future__ import annotations

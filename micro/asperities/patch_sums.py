@@ -18,7 +18,7 @@ that patch's displacement between the two sides (a point force 0.17). The mean o
 good to 1e-9 for contacts away from the outer border, and to 0.005 a/s, s now the side of the whole,
 for one that reaches across it.
 
-Theory: demos/theory.md, section 8.
+Theory: docs/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ conjugate gradients, and only to the accuracy that the step needs; `scipy.sparse
 the stable form of that. Then summits with t_k < 0 leave A and summits with w_k < d_k enter it,
 until there are none of either.
 
-Theory: demos/theory.md, section 9.
+Theory: docs/theory.md, section 9.
 """
 
 from __future__ import annotations

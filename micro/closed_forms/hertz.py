@@ -1,6 +1,6 @@
 """Hertz contact of one asperity with a rigid plane: shape, force, area, pressure, displacement.
 
-Theory: demos/theory.md, section 8.
+Theory: docs/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ Source:
     Waddad et al. 2016, eqs. 10, 17, 18, doi 10.1016/j.triboint.2015.12.023; Carlson's integrals
     (DLMF 19.16) in place of the paper's eqs. 20–22.
 
-Theory: demos/theory.md, section 8.
+Theory: docs/theory.md, section 8.
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ rectangle i by Λ_ij p/(π E*) in the mean, where Λ_ij is the mean of L over re
 is a closed form, second differences of the fourfold antiderivative of 1/ρ. These cancel far away,
 where Gauss' rule takes their place.
 
-Theory: demos/theory.md, section 4.
+Theory: docs/theory.md, section 4.
 """
 
 from __future__ import annotations

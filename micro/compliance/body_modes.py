@@ -4,7 +4,7 @@ Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n. They displ
 and add the stresses Σ φ_m S_mn b_n in the surface. Modes are products of Legendre modes along x and
 y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes.
 
-Theory: demos/theory.md, section 6.
+Theory: docs/theory.md, section 6.
 """
 
 from __future__ import annotations

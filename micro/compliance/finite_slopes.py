@@ -28,7 +28,7 @@ the compliance from the series to sixth order; two orders alone are within 0.5 %
 
 Sources: Johnson 1985, ch. 3; Eshelby 1975, doi 10.1007/BF00126994.
 
-Theory: demos/theory.md, section 7.
+Theory: docs/theory.md, section 7.
 """
 
 from __future__ import annotations

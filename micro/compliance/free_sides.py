@@ -5,7 +5,7 @@ decay length λ: waves along it longer than 2π λ count as waves of that length
 smooth up to the very side. So is what the block does beyond its four quarter-spaces, except in its
 corners. Both are left to the body's term (`micro.compliance.body_modes`).
 
-Theory: demos/theory.md, section 5.
+Theory: docs/theory.md, section 5.
 """
 
 from __future__ import annotations

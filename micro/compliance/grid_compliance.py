@@ -5,7 +5,7 @@
 `Compliance` holds the terms of one body and makes them for any grid. `GridCompliance` is their sum
 on one grid. A new term needs the two methods of `ComplianceTerm` and a line in `Compliance`.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Pressures are uniform on the cells, and displacements are those of the cells' centres: their
 convolution with Love's rectangle. On a periodic grid each wave has its own compliance 2/|q|.
 
-Theory: demos/theory.md, section 4.
+Theory: docs/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ Pressure q on the side at depths z, and its image, makes at distance x from the 
 What is left after the half-space's own part is without singularity, and cancels its σ_xx and σ_xy
 at the side.
 
-Theory: demos/theory.md, section 5.
+Theory: docs/theory.md, section 5.
 """
 
 from __future__ import annotations

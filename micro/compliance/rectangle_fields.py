@@ -20,7 +20,7 @@ distance s from the side, over a length ℓ on which they vanish likewise,
 Source:
     Johnson 1985, Contact Mechanics, section 3.2.
 
-Theory: demos/theory.md, section 6.
+Theory: docs/theory.md, section 6.
 """
 
 from __future__ import annotations

@@ -11,7 +11,7 @@ with ln ρ/2π. Integrated by parts once, the moments of ∂_α ∂_β φ are �
 What free sides add is a sum of waves along them, whose means with the modes are Bessel functions,
 and across them of values at nodes of the distance from the side.
 
-Theory: demos/theory.md, sections 4 and 5.
+Theory: docs/theory.md, sections 4 and 5.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ Pressures are uniform on the cells, and displacements and stresses are their mea
 a side, Fourier's transform takes cells to waves, which do not mix. Across it, sparse matrices take
 cells to values at nodes of the distance from the side (`micro.compliance.free_sides`).
 
-Theory: demos/theory.md, section 5.
+Theory: docs/theory.md, section 5.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Finite slopes of two rough bodies in contact: each adds its own to the compliance.
 
-Theory: demos/theory.md, section 7.
+Theory: docs/theory.md, section 7.
 """
 
 from __future__ import annotations

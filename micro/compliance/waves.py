@@ -5,7 +5,7 @@ Shorter products alias to longer waves, which makes the powers of heights in an 
 Waves shorter than about three of the coarse cells are therefore left out on the way in and on the
 way out, so that the map as a whole stays symmetric.
 
-Theory: demos/theory.md, section 7.
+Theory: docs/theory.md, section 7.
 """
 
 from __future__ import annotations

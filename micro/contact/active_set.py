@@ -8,7 +8,7 @@ therefore enter only when the largest gap left in the contact is less than half 
 Where a plane that may turn rests on few cells, each of them is needed to hold it. There, cells are
 dropped one at a time (primal active set), so that no step leaves the plane without support.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

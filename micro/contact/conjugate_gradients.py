@@ -4,7 +4,7 @@ With the set fixed the contact is a linear system. The pressures p on the cells 
 the gap vanish there, (C p)_A = d_A. Where motions of the rigid body are free, they make the gap a
 rigid motion, while the loads of that motion stay as they are.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ between 0 and H that meet the loads f_i. Pressures and H are over E*, so that C 
 
 Source: Almqvist, Sahlin, Larsson & Glavatskih 2007, Tribol. Int. 40, 574-579, for the bound H.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ surface. Each solution takes them from the solution before it. They are a few pe
 displacements, and change by a hundredth of that in the second solution. Solutions need not be more
 accurate than the next change, so the first ones stop early.
 
-Theory: demos/theory.md, section 7.
+Theory: docs/theory.md, section 7.
 """
 
 from __future__ import annotations

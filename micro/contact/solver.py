@@ -9,7 +9,7 @@ one. The set of cells in contact is then found on the coarse grids, where that c
 only its edge is left to the fine one (full multigrid: Zhao, Vollebregt & Oosterlee 2014,
 doi 10.3846/13926292.2014.909899).
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

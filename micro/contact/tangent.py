@@ -9,7 +9,7 @@ The sum of p' over the cells is the interfacial stiffness dF/dδ over E* and the
 cells the force is a piecewise linear function of the approach, and this is its derivative. From
 pressures q that leave r = 1 − C q the sum is Σ q + Σ q r to second order in r, as C is symmetric.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The half-space model: a rough surface cell by cell, without assumptions on its asperities.
 
-Theory: demos/theory.md, section 4.
+Theory: docs/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A rigid plane on the cells of a surface: the contact problem, and the contact that solves it.
 
-Theory: demos/theory.md, section 3.
+Theory: docs/theory.md, section 3.
 """
 
 from __future__ import annotations

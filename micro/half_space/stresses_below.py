@@ -11,7 +11,7 @@ is harmonic, as it must be without body forces.
 Source:
     Johnson 1985, Contact Mechanics, section 3.2, in waves as in section 13.2.
 
-Theory: demos/theory.md, section 4.
+Theory: docs/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The body of a scene under a contact: a block, or a mesh.
 
-Theory: demos/theory.md, sections 5, 6 and 11.
+Theory: docs/theory.md, sections 5, 6 and 11.
 """
 
 from __future__ import annotations

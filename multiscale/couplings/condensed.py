@@ -1,6 +1,6 @@
 """Patch laws on the compliance of a block's patches, without its mesh, by Newton's method.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

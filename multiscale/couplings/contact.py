@@ -1,6 +1,6 @@
 """The contact problem on the body of a scene, and the coupling that solves it at every load step.
 
-Theory: demos/theory.md, sections 3 and 7.
+Theory: docs/theory.md, sections 3 and 7.
 """
 
 from __future__ import annotations

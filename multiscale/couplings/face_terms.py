@@ -4,7 +4,7 @@ The body correction is what the body adds to the compliance of a half-space. In 
 its face it is the compliance of the body, less that of the half-space, and less the effect of free
 sides where they are a term of their own.
 
-Theory: demos/theory.md, sections 5, 6 and 11.
+Theory: docs/theory.md, sections 5, 6 and 11.
 """
 
 from __future__ import annotations

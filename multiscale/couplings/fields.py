@@ -4,7 +4,7 @@ Where the block was pressed as a mesh, its displacements are kept. Elsewhere a b
 is meshed after the load, and loaded by the contact pressures: by those of the cells or asperities,
 summed over the facets of the mesh, or with laws by the mean pressures of the patches.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Couplings of patch laws with the mesh of a block, and with a plane that turns as in their rows.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The equations of patch laws on the compliance of a block, under one load of the plane.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A meshed body under a contact: its terms in the contact problem.
 
-Theory: demos/theory.md, sections 5 and 6.
+Theory: docs/theory.md, sections 5 and 6.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ One rule holds for a counter-body that is a half-space. A compliance of the patc
 that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain what the half-space gives way.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

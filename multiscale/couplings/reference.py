@@ -1,6 +1,6 @@
 """The reference among the couplings: the rough surface itself is meshed and pressed.
 
-Theory: demos/theory.md, section 12.
+Theory: docs/theory.md, section 12.
 """
 
 from __future__ import annotations

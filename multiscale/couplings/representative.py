@@ -1,6 +1,6 @@
 """Laws of periodic samples on the contact face of a scene's body.
 
-Theory: demos/theory.md, sections 10 and 11.
+Theory: docs/theory.md, sections 10 and 11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Makes the consistent patch laws: all of them from one solution of the whole surface.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

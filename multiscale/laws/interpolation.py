@@ -1,6 +1,6 @@
 """Cubic interpolants of patch laws over the local approach, for one law or for many at once.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

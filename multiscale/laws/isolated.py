@@ -1,6 +1,6 @@
 """Makes the isolated patch laws: each patch's asperities alone, as Waddad et al. 2016 do.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

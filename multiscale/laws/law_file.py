@@ -1,6 +1,6 @@
 """The file of laws: columns of rows, with units, behind a checksum.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The laws of all patches or regions of an interface, and what they say of themselves.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The mean law of periodic samples of a rough face, at equal separations of their mean planes.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

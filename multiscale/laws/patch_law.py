@@ -1,6 +1,6 @@
 """Patch laws: closure and mean pressure of a patch, tabulated over its local rigid approach.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """One periodic sample of a rough face under planes at prescribed mean separations.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ join, and half of it is recorded. Elsewhere between rows it may be more: on rand
 cells, in 1 to 256 patches, the force erred by up to 1.7 times and a patch's pressure by up to 3
 times the largest recorded.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Makes representative laws: pressure over closure of periodic samples of a large face.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Rows of patch laws: their columns, declared once, first touch and repair; the path of the plane.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

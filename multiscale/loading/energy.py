@@ -5,7 +5,7 @@ gradient. From one load step to the next it therefore rises by no less than the 
 no more than the last ones, times the motion between them. Under a hardness the same holds of
 elastic energy and plastic work together where the plane comes nearer.
 
-Theory: demos/theory.md, section 14.
+Theory: docs/theory.md, section 14.
 """
 
 from __future__ import annotations

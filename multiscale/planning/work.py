@@ -22,7 +22,7 @@ from multiscale.setup.reference_meshes import mesh_unknowns
 
 CELL_PRODUCTS = 3e7
 """Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
-66 and 260 ms (demos/speed.md, 2026-11-22), with some 30 products each."""
+66 and 260 ms (docs/speed.md, 2026-11-22), with some 30 products each."""
 UNKNOWN_CYCLES = 1e6
 """Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
 2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""

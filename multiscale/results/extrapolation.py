@@ -1,6 +1,6 @@
 """Extrapolates results of two or three meshes to mesh size zero, with an error bar.
 
-Theory: demos/theory.md, section 12.
+Theory: docs/theory.md, section 12.
 """
 
 from __future__ import annotations

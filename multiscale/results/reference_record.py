@@ -1,6 +1,6 @@
 """Results of all meshes of a reference: values at mesh size zero, with error bars.
 
-Theory: demos/theory.md, sections 12 and 13.
+Theory: docs/theory.md, sections 12 and 13.
 """
 
 from __future__ import annotations

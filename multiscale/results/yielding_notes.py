@@ -1,6 +1,6 @@
 """What a report says of yielding, of the pressures of elastic contacts, and of energies.
 
-Theory: demos/theory.md, section 14.
+Theory: docs/theory.md, section 14.
 """
 
 from __future__ import annotations

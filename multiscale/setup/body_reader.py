@@ -1,6 +1,6 @@
 """Reads the bodies of a scene that come from meshes, and checks them.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

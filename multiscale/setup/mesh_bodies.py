@@ -1,6 +1,6 @@
 """The bodies of a scene that come from meshes, and what is known of them without the meshes.
 
-Theory: demos/theory.md, section 11.
+Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """The periodic samples that representative laws are made from, region by region.
 
-Theory: demos/theory.md, section 10.
+Theory: docs/theory.md, section 10.
 """
 
 from __future__ import annotations

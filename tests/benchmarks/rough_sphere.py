@@ -1,6 +1,6 @@
 """The rough sphere of Greenwood & Tripp 1967 on finite elements, over roughness and mesh.
 
-`.venv/bin/python tests/benchmarks/rough_sphere.py` prints the table of `demos/accuracy.md`; it
+`.venv/bin/python tests/benchmarks/rough_sphere.py` prints the table of `docs/accuracy.md`; it
 takes two minutes.
 """
 

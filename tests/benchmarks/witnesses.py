@@ -1,4 +1,4 @@
-"""What others say and what we find: the numbers of demos/witnesses.md, a line each.
+"""What others say and what we find: the numbers of docs/witnesses.md, a line each.
 
 `.venv/bin/python tests/benchmarks/witnesses.py` takes two minutes; the words `closed-forms`,
 `waves`, `other-codes`, `finite-elements` and `other-programs` choose parts of it. GetFEM and

@@ -8,7 +8,7 @@ and the stresses follow from second derivatives of both (Love 1929). For rectang
 a second difference over the four corners of a function in closed form. Loads that form a grid
 share their corners: each is evaluated once for all loads around it.
 
-Theory: demos/theory.md, section 4.
+Theory: docs/theory.md, section 4.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import pytest
 from multiscale import Scene, run
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "demos" / "engineering.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "engineering.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.long

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGE = (ROOT / "demos" / "my_surface.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "my_surface.md").read_text(encoding="utf-8")
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 COMMANDS = re.findall(r"^ *\.venv/bin/patchlaw (.*)$", PAGE, re.MULTILINE)
 

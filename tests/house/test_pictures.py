@@ -7,29 +7,29 @@ import pytest
 from PIL import Image
 
 ROOT = Path(__file__).parents[2]
-DEMOS = ROOT / "demos"
+DEMOS, DOCS = ROOT / "demos", ROOT / "docs"
 ENTRY = re.compile(
     r"^### (?P<title>.+)\n\n!\[(?P<alt>.+)\]\((?P<picture>.+)\)\n\n\*(?P<caption>.+)\*\n\n"
     r"\[`(?P<name>.+)`\]\((?P<script>.+)\) · \[more on it\]\((?P<page>[^)#]+)(?P<part>#.+)?\) · ",
     re.MULTILINE,
 )
-ENTRIES = [entry.groupdict() for entry in ENTRY.finditer((DEMOS / "README.md").read_text("utf-8"))]
+ENTRIES = [entry.groupdict() for entry in ENTRY.finditer((DOCS / "demos.md").read_text("utf-8"))]
 PICTURES = sorted({*DEMOS.glob("pictures/*.png"), *DEMOS.glob("bodies/*.png")})
 LARGEST = 350_000
 """Bytes of a picture."""
 
 
 def test_gallery_has_every_picture_once():
-    shown = [(DEMOS / entry["picture"]).resolve() for entry in ENTRIES]
+    shown = [(DOCS / entry["picture"]).resolve() for entry in ENTRIES]
     assert sorted(shown) == PICTURES
     for entry in ENTRIES:
-        assert (DEMOS / entry["script"]).is_file()
-        assert (DEMOS / entry["page"]).is_file()
+        assert (DOCS / entry["script"]).is_file()
+        assert (DOCS / entry["page"]).is_file()
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DEMOS.rglob("*.md"))], ids=str)
+@pytest.mark.parametrize("page", [ROOT / "README.md", *sorted(DOCS.glob("*.md"))], ids=str)
 def test_a_picture_says_the_same_on_every_page(page):
-    captions = {(DEMOS / entry["picture"]).resolve(): entry["caption"] for entry in ENTRIES}
+    captions = {(DOCS / entry["picture"]).resolve(): entry["caption"] for entry in ENTRIES}
     text = page.read_text(encoding="utf-8")
     for alt, path in re.findall(r"!\[([^\]]*)\]\(([^)]+)\)", text):
         assert alt == captions[(page.parent / path).resolve()]
