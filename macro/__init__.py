@@ -10,7 +10,7 @@ TaggedMesh → write_mesh → a file that ranks read in parts.
 """
 
 from geometry.materials import Material
-from macro.block import Block
+from macro.bodies import Block, MeshedBody
 from macro.body_pair import BodyPair
 from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
@@ -41,8 +41,7 @@ from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 from macro.mesh.supports import Support, Traction, check_supports
 from macro.mesh.tagged import TaggedMesh
-from macro.mesh.to_file import write_mesh
-from macro.meshed_body import MeshedBody
+from macro.mesh.xdmf import write_mesh
 
 __all__ = [
     "BOTTOM",

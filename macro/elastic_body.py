@@ -19,10 +19,9 @@ from petsc4py import PETSc
 from macro import compat
 from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice
-from macro.linear_solvers.node_matrices import free_unknowns
+from macro.linear_solvers.node_matrices import Stiffened, free_unknowns
 from macro.linear_solvers.options import PREFIX, solve_linear
 from macro.linear_solvers.selection import body_solver
-from macro.linear_solvers.stiffened import Stiffened
 from macro.mesh.supports import Traction
 
 Array = NDArray[np.float64]

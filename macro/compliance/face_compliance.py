@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.materials import Material
-from macro.block import Sides
+from macro.bodies import Sides
 from macro.compliance.cache import cached
 from macro.compliance.elements import block_lines
 from macro.compliance.parity_block import Parity, ParityBlock, Response

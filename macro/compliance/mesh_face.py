@@ -28,6 +28,7 @@ from geometry.face_frame import FaceFrame
 from geometry.materials import Material
 from geometry.patches import PatchGrid
 from macro import compat
+from macro.bodies import MeshedBody
 from macro.compliance.face_compliance import FaceCompliance
 from macro.compliance.face_moments import FaceMoments
 from macro.elastic_body import ElasticBody
@@ -36,7 +37,6 @@ from macro.linear_solvers.node_matrices import distributed
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver, solve_linear
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.outer_facets import OuterFacets, outer_facets
-from macro.meshed_body import MeshedBody
 from support.errors import InputError
 
 Array = NDArray[np.float64]

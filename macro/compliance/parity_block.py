@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
 from geometry.materials import Material
-from macro.block import Sides
+from macro.bodies import Sides
 from macro.compliance.elements import Line
 from macro.linear_solvers.options import set_up
 

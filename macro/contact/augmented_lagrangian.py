@@ -24,8 +24,7 @@ from macro.contact.contact_forces import ContactForces
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import Guess
-from macro.contact.node_contact import ContactSolution, PlaneOverNodes, largest, not_found
-from macro.contact.rough_face import RoughFace
+from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
 from macro.linear_solvers.constrained import contact_tolerance
 
 Array = NDArray[np.float64]

@@ -19,11 +19,10 @@ from macro import compat
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.loaded_face import LoadedFace
-from macro.contact.node_contact import PlaneOverNodes, not_found
+from macro.contact.rough_face import PlaneOverNodes, not_found
 from macro.linear_solvers.constrained import ConstrainedPreconditioner
-from macro.linear_solvers.node_matrices import node_submatrix
+from macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from macro.linear_solvers.options import WeakContext, reason_name
-from macro.linear_solvers.stiffened import springs_at
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from geometry.face_frame import FaceFrame
 from macro import compat
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.facet_nodes import facet_indices
+from macro.mesh.facets import facet_indices
 from macro.mesh.planar_face import planar_face
 from macro.mesh.tagged import TaggedMesh
 from support.collective import together

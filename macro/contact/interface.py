@@ -24,8 +24,7 @@ from macro.contact.contact_state import ContactState
 from macro.contact.equilibrium import ContactTangent
 from macro.contact.interface_laws import InterfaceLaws, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
-from macro.linear_solvers.node_matrices import free_unknowns
-from macro.linear_solvers.stiffened import springs_at
+from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from support.collective import together
 from support.errors import InputError
 

@@ -16,7 +16,7 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from macro.contact.interface import Interface
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facets import facet_nodes
 from support.errors import InputError
 
 Array = NDArray[np.float64]

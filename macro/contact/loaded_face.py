@@ -20,7 +20,7 @@ from scipy.sparse import csr_matrix
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.block import Block
+from macro.bodies import Block
 from macro.linear_solvers.node_matrices import distributed
 from macro.linear_solvers.options import solve_linear
 from macro.mesh.contact_face import (

@@ -14,14 +14,13 @@ from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
-from macro.block import Block
+from macro.bodies import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.contact_state import ContactState, NodalContact
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import Extrapolation
-from macro.contact.node_contact import ContactSolution, PlaneOverNodes
-from macro.contact.rough_face import RoughFace
+from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace
 from support.errors import InputError
 
 Method = Literal["active-set", "augmented-lagrangian"]

@@ -45,8 +45,8 @@ from petsc4py import PETSc
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
 from macro.linear_solvers.multigrid_degrees import vertex_grid
+from macro.linear_solvers.node_matrices import Stiffened
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
-from macro.linear_solvers.stiffened import Stiffened
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from macro import compat
-from macro.mesh.neighbours import facets_between_ranks, inner_facets, parts
+from macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 

@@ -13,7 +13,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facet_nodes import facet_indices, facet_nodes
+from macro.mesh.facets import facet_indices, facet_nodes
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from macro import compat
-from macro.mesh.neighbours import outer_sides
+from macro.mesh.facets import outer_sides
 
 Array = NDArray[np.float64]
 

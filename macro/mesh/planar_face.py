@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from geometry.face_frame import FaceFrame
 from macro import compat
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facets import facet_nodes
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 

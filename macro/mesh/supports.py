@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facets import facet_nodes
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 

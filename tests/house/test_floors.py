@@ -47,7 +47,7 @@ FLOORS = {
         "elasticity mesh",
         "linear_solvers",
         "elastic_body",
-        "block body_pair meshed_body",
+        "bodies body_pair",
         "contact",
         "compliance fields",
     ],

@@ -21,7 +21,7 @@ from macro import (
     contact_facets,
     face_compliance,
 )
-from macro.compliance.mesh_digest import body_digest
+from macro.compliance.cache import body_digest
 from macro.compliance.mesh_face import from_outside, mesh_face_compliance, raised, turned
 from macro.compliance.surroundings import surroundings
 from micro import RectangleFields
