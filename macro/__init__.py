@@ -11,7 +11,6 @@ TaggedMesh → write_mesh → a file that ranks read in parts.
 
 from geometry.materials import Material
 from macro.bodies import Block, MeshedBody
-from macro.body_pair import BodyPair
 from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
@@ -33,10 +32,10 @@ from macro.contact.unilateral_problem import (
 )
 from macro.elastic_body import ElasticBody
 from macro.fields import AtPoints, write_fields, write_rough_fields
-from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.mesh.block import BOTTOM, SIDES, TOP, block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import PlanarFace, planar_face
+from macro.mesh.planar_face import planar_face
 from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 from macro.mesh.supports import Support, Traction, check_supports
@@ -49,8 +48,6 @@ __all__ = [
     "TOP",
     "AtPoints",
     "Block",
-    "BlockMesh",
-    "BodyPair",
     "ContactFacets",
     "ContactLaw",
     "ContactProblem",
@@ -66,7 +63,6 @@ __all__ = [
     "Material",
     "MeshQuality",
     "MeshedBody",
-    "PlanarFace",
     "RoughFace",
     "Support",
     "TaggedMesh",

@@ -16,7 +16,6 @@ from scipy.sparse import csr_matrix
 from geometry.legendre_modes import mode_values
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.compliance.surroundings import whole
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets
@@ -49,7 +48,7 @@ class FaceMoments:
     Args:
         body: The body.
         facets: Facets of its contact face, in its frame.
-        rectangle: Patches that fill the rectangle, in that frame.
+        rectangle: The rectangle as one patch, in that frame.
         count: Modes K along a side.
 
     Note:
@@ -61,15 +60,14 @@ class FaceMoments:
     ) -> None:
         self._body, self._frame = body, facets.frame
         self._area = float(np.prod(rectangle.lengths))
-        one = whole(rectangle)
         degree = (4 if body.hexahedral else 2) * body.degree + _MORE
         number = max(body.comm.allreduce(len(facets.cell)), 1)
         degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much
-        self.points = LoadedFace(body, facets, one, degree=degree).quadrature
+        self.points = LoadedFace(body, facets, rectangle, degree=degree).quadrature
         x, y = (
             mode_values(at - start, length, count)
             for at, start, length in zip(
-                (self.points.x, self.points.y), one.origin, one.lengths, strict=True
+                (self.points.x, self.points.y), rectangle.origin, rectangle.lengths, strict=True
             )
         )
         self._modes = (x[:, None] * y).reshape(count**2, -1) * self.points.weight
@@ -86,8 +84,8 @@ class FaceMoments:
         return Moments(*total)
 
     def load(self, mode: int) -> Array:
-        """Return the nodal forces of a mode of pressure, this rank's share, (local dofs,) [N]."""
-        return np.asarray(self._operators[0].T @ self._modes[mode])
+        """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
+        return self._body.summed(self._operators[0].T @ self._modes[mode])
 
     @cached_property
     def _operators(self) -> tuple[csr_matrix, ...]:

@@ -64,7 +64,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     Args:
         body: The body.
         facets: Facets of the face, in its frame.
-        rectangle: Patches that fill the rectangle, in that frame.
+        rectangle: The rectangle as one patch, in that frame.
 
     Raises:
         InputError: When the rectangle reaches beyond the face, or lies on several materials.
@@ -73,7 +73,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
         Collective.
     """
     comm, area = body.comm, float(np.prod(rectangle.lengths))
-    covered = _area_in(body, facets, rectangle.origin, rectangle.lengths)
+    covered = _area_in(body, facets, rectangle)
     if covered < (1.0 - _COVERED) * area:
         raise InputError(
             "the surface's rectangle reaches beyond the contact face",
@@ -98,20 +98,9 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     )
 
 
-def whole(rectangle: PatchGrid) -> PatchGrid:
-    """Return a rectangle of patches as one patch."""
-    return PatchGrid(grid=(1, 1), lengths=rectangle.lengths, origin=rectangle.origin)
-
-
-def _area_in(
-    body: ElasticBody,
-    facets: ContactFacets,
-    origin: tuple[float, float],
-    lengths: tuple[float, float],
-) -> float:
+def _area_in(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> float:
     """Return the area of facets within a rectangle in their plane, of all ranks [mm²]."""
-    one = PatchGrid(grid=(1, 1), lengths=lengths, origin=origin)
-    quadrature = LoadedFace(body, facets, one, degree=1).quadrature
+    quadrature = LoadedFace(body, facets, rectangle, degree=1).quadrature
     return float(body.comm.allreduce(float(quadrature.weight.sum())))
 
 
@@ -161,7 +150,7 @@ def _free_plane(
     )
     chosen = contact_sides(body, free.among(flat), plane)
     length = rectangle.lengths[1 - axis]
-    area = _area_in(body, chosen, (0.0, 0.0), (length, strip))
+    area = _area_in(body, chosen, PatchGrid(grid=(1, 1), lengths=(length, strip)))
     return area > (1.0 - _COVERED) * length * strip
 
 
@@ -176,7 +165,7 @@ def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> Co
 
 def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> Material:
     """Return the one material of the cells under the rectangle."""
-    cells = np.unique(LoadedFace(body, facets, whole(rectangle), degree=1).quadrature.cell)
+    cells = np.unique(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
     own = _pairs(body, cells)
     found = set().union(*body.comm.allgather(own))
     if len(found) != 1:

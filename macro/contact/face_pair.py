@@ -9,7 +9,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,6 +35,9 @@ _SLACK = 1e-8
 """Distance beyond a facet, in its own coordinates, at which a point still counts as on it."""
 _UNLIKE = 1e-6
 """Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
+
+
+_SAMPLED = ("weight", "x", "y", "depth", "patch")
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,24 +92,16 @@ class FacePair(ContactFace):
     def pointwise(self) -> Sampling:
         """Laws at the quadrature points of the first face that lie on the second."""
         one = self.first.pointwise
-        rows, depth, found = self._counter_rows
-        own = _local_rows(self.first.points_by_dofs)[found]
-        kept = Sampling(
-            operator=one.operator,
-            weight=one.weight[found],
-            x=one.x[found],
-            y=one.y[found],
-            depth=one.depth[found],
-            patch=one.patch[found],
-            count=one.count,
-        )
+        rows, depth, kept = self._counter_rows
+        own = _local_rows(self.first.points_by_dofs)[kept]
         both = []
-        for points_by_dofs, face in ((own, self.first), (rows[found], self.second)):
+        for points_by_dofs, face in ((own, self.first), (rows[kept], self.second)):
             unknowns = 3 * face.space.dofmap.index_map.size_local
             matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
             matrix.transpose(transposed)
             both.append(_local_rows(transposed))
-        return self._both(kept, both[0], both[1], depth[found])
+        samples = {name: getattr(one, name)[kept] for name in _SAMPLED}
+        return self._both(replace(one, **samples), both[0], both[1], depth[kept])
 
     @property
     def on_both(self) -> NDArray[np.bool_]:
@@ -127,66 +122,37 @@ class FacePair(ContactFace):
     def _both(self, one: Sampling, own: csr_matrix, other: csr_matrix, depth: Array) -> Sampling:
         """Return samples of both faces, from the rows of both bodies in their operators."""
         rows = vstack([own, other]).tocsr()
-        return Sampling(
-            operator=distributed(rows, len(one.weight), self.comm),
-            weight=one.weight,
-            x=one.x,
-            y=one.y,
-            depth=one.depth + depth,
-            patch=one.patch,
-            count=one.count,
-        )
+        operator = distributed(rows, len(one.weight), self.comm)
+        return replace(one, operator=operator, depth=one.depth + depth)
 
     @cached_property
     def _counter_rows(self) -> tuple[csr_matrix, Array, NDArray[np.bool_]]:
         """The counter-body's −w φ n at this rank's points, its depths, and which points it has."""
         points, space = self.first.quadrature, self.second.space
-        whole = _gathered(self.second.facets, space, self.comm)
-        facet, local = _located(whole.facets, np.column_stack([points.x, points.y]))
-        found = facet >= 0
-        facet, local = np.where(found, facet, 0), np.where(found[:, None], local, 0.0)
-        if not len(whole.nodes):
+        own, index_map = self.second.facets, space.dofmap.index_map
+        cells = compat.cell_nodes(space)[own.cell]
+        numbers = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
+        nodes = np.concatenate(self.comm.allgather(numbers))
+        first, *others = self.comm.allgather(own)
+        whole = first.joined(others)
+        if not len(nodes):
             raise InputError("the counter-body has no contact face")
+        facet, local = _located(whole, np.column_stack([points.x, points.y]))
+        on_both = facet >= 0
+        facet, local = np.where(on_both, facet, 0), np.where(on_both[:, None], local, 0.0)
         values = compat.lagrange_values(
             space.mesh.topology.cell_name(),
             compat.lagrange_degree(space),
-            whole.facets.pull_back(facet, local),
+            whole.pull_back(facet, local),
         )
         rows = normal_rows(
             points.weight[:, None] * values,
-            whole.nodes[facet],
+            nodes[facet],
             np.abs(values) > 1e-12,
-            self.second.facets.outward,
-            space.dofmap.index_map.size_global,
+            own.outward,
+            index_map.size_global,
         )
-        return rows, whole.facets.depths(facet, local), found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _WholeFace:
-    """Facets of all ranks, and the global numbers of their cells' nodes, shape (facets, m)."""
-
-    facets: ContactFacets
-    nodes: NDArray[np.int64]
-
-
-def _gathered(facets: ContactFacets, space: Any, comm: Any) -> _WholeFace:
-    """Return the facets of all ranks on every rank."""
-    cells, index_map = compat.cell_nodes(space)[facets.cell], space.dofmap.index_map
-    nodes = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
-    parts = (facets.cell, facets.side, facets.reference, facets.corners, facets.depth, nodes)
-    shared = zip(*comm.allgather(parts), strict=True)
-    cell, side, reference, corners, depth, numbers = (np.concatenate(part) for part in shared)
-    whole = ContactFacets(
-        frame=facets.frame,
-        outward=facets.outward,
-        cell=cell,
-        side=side,
-        reference=reference,
-        corners=corners,
-        depth=depth,
-    )
-    return _WholeFace(whole, numbers)
+        return rows, whole.depths(facet, local), on_both
 
 
 def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Array]:

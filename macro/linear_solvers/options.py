@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.compat import call
@@ -238,6 +240,35 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
             remedy=f"see PETSc's options -{PREFIX}ksp_* and -{PREFIX}pc_*",
         )
     return int(solver.its)
+
+
+def solved_at_once(matrix: PETSc.Mat, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solve for many right-hand sides with one factorisation by MUMPS.
+
+    Args:
+        matrix: Symmetric positive definite.
+        right: This rank's rows of the right-hand sides, shape (n, m).
+
+    Returns:
+        The solutions, shape (n, m).
+
+    Note:
+        Collective.
+    """
+    solver, factorised = PETSc.KSP().create(matrix.comm), _pointwise(matrix)
+    solver.setOperators(factorised)
+    solver.setType("preonly")
+    solver.pc.setType("cholesky")
+    solver.pc.setFactorSolverType("mumps")
+    set_up(solver)
+    arrays = np.asfortranarray(right), np.zeros(right.shape, order="F")
+    size = (matrix.getLocalSize()[0], matrix.getSize()[0]), (None, right.shape[1])
+    dense = [PETSc.Mat().createDense(size, array=a, comm=matrix.comm) for a in arrays]
+    solver.pc.getFactorMatrix().matSolve(*dense)
+    own = () if factorised is matrix else (factorised,)
+    for part in (*dense, solver.pc, solver, *own):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return arrays[1]
 
 
 def reason_name(reasons: type, code: int) -> str:
