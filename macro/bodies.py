@@ -16,16 +16,13 @@ from dolfinx import fem
 from geometry.materials import Material
 from macro.elastic_body import ElasticBody, Held
 from macro.linear_solvers.multigrid import Lattice, lattice_of
-from macro.mesh.block import BlockMesh
+from macro.mesh.block import FLAT, BlockMesh
 from macro.mesh.supports import Support, Traction
 from macro.mesh.tagged import TaggedMesh
 from support.collective import together
 from support.errors import InputError
 
 Sides = Literal["free", "roller"]
-
-_FLAT = 1e-9
-"""Distance from a face, relative to the size of the block, that is rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +72,11 @@ class Block(ElasticBody):
         """The clamped bottom, which the roughness does not move, and the rollers on request."""
         shape, points = self.mesh.shape, self.space.tabulate_dof_coordinates()
         above = points[:, 2] + shape.height
-        bottom = np.flatnonzero(above < _FLAT * shape.height).astype(np.int32)
+        bottom = np.flatnonzero(above < FLAT * shape.height).astype(np.int32)
         held = [Held(axis, bottom) for axis in range(3)]
         for axis in (0, 1) if self.sides == "roller" else ():
             low, high = -shape.margin, shape.interface[axis] + shape.margin
-            slack, place = _FLAT * (high - low), points[:, axis]
+            slack, place = FLAT * (high - low), points[:, axis]
             across = np.flatnonzero((place < low + slack) | (place > high - slack))
             held.append(Held(axis, across.astype(np.int32)))
         return held

@@ -32,6 +32,9 @@ _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compi
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
+_ROUNDING = 1e-12
+"""Value of a basis function that is rounding."""
+
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -274,6 +277,8 @@ def cell_vertices(mesh: Any) -> NDArray[np.int32]:
 def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:
     """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes).
 
+    Nodes that are not on the facet of a point have exact zeros there.
+
     Args:
         cell_name: Name of the cell, such as ``hexahedron``.
         degree: Polynomial degree.
@@ -282,7 +287,8 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     element = _lagrange(cell_name, degree)
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
-    return element.tabulate(0, points)[0].reshape(len(points), -1)
+    values = element.tabulate(0, points)[0].reshape(len(points), -1)
+    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
 
 
 def lagrange_gradients(
@@ -367,6 +373,20 @@ def assemble_vector(form: Any) -> PETSc.Vec:
 def petsc_vector(function: Any) -> PETSc.Vec:
     """Return PETSc's view of a function, ghosts included."""
     return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
+
+
+def sum_of_ranks(space: Any, values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the sums of all ranks' values at this rank's degrees of freedom of a space.
+
+    Args:
+        space: The space.
+        values: This rank's values, those of ghosts included.
+    """
+    function = fem.Function(space)
+    function.x.array[:] = values
+    vector = petsc_vector(function)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return np.array(vector.array_r[: vector.local_size])
 
 
 def assemble_matrix_into(matrix: PETSc.Mat, form: Any, conditions: Sequence[Any]) -> None:

@@ -199,18 +199,6 @@ class ElasticBody(ABC):
         function.x.scatter_forward()
         return function
 
-    def summed(self, values: Array) -> Array:
-        """Return the sums of all ranks' values at this rank's degrees of freedom, (owned_dofs,).
-
-        Args:
-            values: This rank's values, those of ghosts included.
-        """
-        function = fem.Function(self.space)
-        function.x.array[:] = values
-        vector = compat.petsc_vector(function)
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return np.array(vector.array_r[: self.owned_dofs])
-
     @property
     def free(self) -> PETSc.Vec:
         """1 for free degrees of freedom, 0 for those that the supports constrain."""

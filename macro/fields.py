@@ -13,7 +13,6 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import fem, io
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from geometry.materials import von_mises
 from macro import compat
@@ -27,9 +26,6 @@ Array = NDArray[np.float64]
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""
-
-_ZERO = 1e-9
-"""Value below which a basis function counts as zero at a node."""
 
 
 class AtPoints(NamedTuple):
@@ -171,20 +167,18 @@ def _vertex_pressures(problem: UnilateralContactProblem, state: ContactState) ->
     shares = compat.lagrange_values(
         cell_name, 1, compat.lagrange_points(cell_name, block.degree)
     )  # weights of the vertices in the nodes of a cell
-    shares[shares < _ZERO] = 0.0
     place = np.empty(cells.max(initial=-1) + 1, dtype=np.intp)
     place[cells.ravel()] = np.arange(cells.size)  # one of the cells of each node
     cell, node = np.divmod(place[top.dofs // 3], cells.shape[1])
-    numbers = pressures.function_space.dofmap.index_map
-    rows = numbers.local_to_global(vertices[cell].ravel()).astype(PETSc.IntType)
+    space, size = pressures.function_space, len(pressures.x.array)
     force, area = (
-        PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
+        compat.sum_of_ranks(
+            space, np.bincount(vertices[cell].ravel(), (shares[node] * each[:, None]).ravel(), size)
+        )
+        for each in (state.nodal.force, top.area)
     )
-    for vector, values in ((force, state.nodal.force), (area, top.area)):
-        vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
-        vector.assemble()
-    loaded = area.array_r > 0.0
-    pressures.x.array[: numbers.size_local][loaded] = force.array_r[loaded] / area.array_r[loaded]
+    own = pressures.x.array[: len(area)]
+    np.divide(force, area, out=own, where=area > 0.0)
     pressures.x.scatter_forward()
     return pressures
 

@@ -85,7 +85,7 @@ class FaceMoments:
 
     def load(self, mode: int) -> Array:
         """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
-        return self._body.summed(self._operators[0].T @ self._modes[mode])
+        return compat.sum_of_ranks(self._body.space, self._operators[0].T @ self._modes[mode])
 
     @cached_property
     def _operators(self) -> tuple[csr_matrix, ...]:

@@ -34,8 +34,9 @@ from macro.compliance.face_moments import FaceMoments
 from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
 from macro.linear_solvers.options import PREFIX, solve_linear, solved_at_once
+from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
-from macro.mesh.outer_facets import OuterFacets, outer_facets
+from macro.mesh.facets import OuterFacets, outer_facets
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -44,8 +45,6 @@ MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
 _FACTORISED = 100_000
 """Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
-_FLAT = 1e-9
-"""Height below the plane, relative to the rectangle, that is rounding."""
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
 _MORE = 4
@@ -199,7 +198,7 @@ class _Corrections:
         frame = facets.frame.moved(*rectangle.origin)
         outer = outer_facets(body.space, 2 * body.degree + _MORE)
         level = np.abs(frame.height(outer.points.reshape(-1, 3))).reshape(outer.weights.shape)
-        off = level.max(axis=1, initial=0.0) > _FLAT * max(rectangle.lengths)
+        off = level.max(axis=1, initial=0.0) > FLAT * max(rectangle.lengths)
         outer = outer.among(off)
         self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
         self._frame, self._fields, self._material = frame, fields, material
@@ -215,7 +214,7 @@ class _Corrections:
         """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
         local = np.zeros((len(self._held.x.array) // 3, 3))
         local[self._nodes] = self._tractions[..., mode]
-        forces = self._body.summed(local.ravel())
+        forces = compat.sum_of_ranks(self._body.space, local.ravel())
         self._held.x.array[:] = self.prescribed(mode)
         forces -= compat.assemble_vector(self._product).array_r
         if self._elsewhere is not None:

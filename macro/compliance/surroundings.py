@@ -18,7 +18,7 @@ from geometry.patches import PatchGrid
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.outer_facets import OuterFacets, outer_facets
+from macro.mesh.facets import OuterFacets, outer_facets
 from support.errors import InputError
 
 Array = NDArray[np.float64]

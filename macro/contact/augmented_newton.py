@@ -35,9 +35,6 @@ SPARE = 0.3
 _MOST_STEPS, _MOST_ITERATIONS = 60, 1000
 """Newton steps of an equilibrium, and linear iterations of a step."""
 
-_ON = 1e-12
-"""Value of a basis function below which its node does not lie on the facet."""
-
 
 class AugmentedLaw:
     """The law p = ⟨p₀ + k d⟩ of this rank's quadrature points; a `ContactLaw`.
@@ -140,7 +137,7 @@ class FacetNewton:
         self._equilibrium.update_tangent(displacement)
         slope = self._law.stiffness(self._equilibrium.forces.closure(displacement))
         points = self._face.quadrature
-        rows, columns = np.nonzero((np.abs(points.values) > _ON) & (slope > 0.0)[:, None])
+        rows, columns = np.nonzero((points.values != 0.0) & (slope > 0.0)[:, None])
         loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
         free = self._equilibrium.forces.control.free
         motions = self._plane.levers.scaled(free)[loaded]

@@ -12,7 +12,6 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -221,11 +220,11 @@ class TopNodes:
             nodes: Rank-local nodes of the top, any shape.
             values: Values for them, of the same shape.
         """
-        vector = self._body.stiffness.createVecRight()
-        rows = (3 * self._numbers(nodes).astype(np.int64) + 2).astype(PETSc.IntType)
-        vector.setValues(rows.ravel(), values.ravel(), addv=True)
-        vector.assemble()
-        return vector.array_r[self.dofs].copy()
+        space = self._body.space
+        index_map = space.dofmap.index_map
+        size = 3 * (index_map.size_local + index_map.num_ghosts)
+        local = np.bincount(3 * nodes.ravel() + 2, values.ravel(), minlength=size)
+        return compat.sum_of_ranks(space, local)[self.dofs]
 
     def _numbers(self, nodes: Index) -> Index:
         """Return the global numbers of rank-local nodes."""

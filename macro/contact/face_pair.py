@@ -148,7 +148,7 @@ class FacePair(ContactFace):
         rows = normal_rows(
             points.weight[:, None] * values,
             nodes[facet],
-            np.abs(values) > 1e-12,
+            values != 0.0,
             own.outward,
             index_map.size_global,
         )

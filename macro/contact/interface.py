@@ -6,8 +6,8 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,24 +18,16 @@ from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
-from macro.contact.chosen_face import ChosenFace, chosen_face
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.contact_state import ContactState
 from macro.contact.equilibrium import ContactTangent
-from macro.contact.interface_laws import InterfaceLaws, laws_on_face
+from macro.contact.interface_parts import ChosenFace, InterfaceLaws, chosen_face, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class _Displacements:
-    """What `LoadedFace` needs of a body: the space of its displacements."""
-
-    space: Any
 
 
 def _result(name: str, meaning: str) -> Any:
@@ -131,7 +123,7 @@ class Interface:
     def _make(self, face: ChosenFace, chosen: InterfaceLaws, crown: Any) -> None:
         self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
+        self._face = LoadedFace(SimpleNamespace(space=self.space), face.facets, chosen.patches)
         sampling = self._face.sampling(chosen.mode)
         self.sampling, self.marked, self._crown = sampling, face.marked, crown
         gap = together(self.comm, lambda: sampling.below(crown))

@@ -377,7 +377,7 @@ class LoadedFace(ContactFace):
     def points_by_dofs(self) -> PETSc.Mat:
         """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
         points, nodes = self.quadrature, self.space.dofmap.index_map
-        used = np.abs(points.values) > 1e-12  # excludes nodes that are not on the facet
+        used = points.values != 0.0  # excludes nodes that are not on the facet
         numbers = np.zeros(used.shape, dtype=np.int64)
         numbers[used] = nodes.local_to_global(points.nodes[used])
         rows = normal_rows(

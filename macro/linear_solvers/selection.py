@@ -40,13 +40,14 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
-from macro.linear_solvers.multigrid_degrees import vertex_grid
-from macro.linear_solvers.node_matrices import Stiffened
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
+from macro.linear_solvers.node_matrices import Stiffened, for_displacements
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, CoarserGrid, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -200,3 +201,74 @@ def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]
         "mg_levels_esteig_ksp_max_it": _ESTIMATES,
         "mg_levels_ksp_chebyshev_esteig": f"0,{smallest:g},0,1.05",
     }
+
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+def vertex_grid(
+    space: Any, linear: Any, free: PETSc.Vec, springs: PETSc.Mat | None = None
+) -> list[CoarserGrid]:
+    """Return the one coarser grid of displacements of degree 2: that of the vertices.
+
+    Args:
+        space: Vector space of degree 2.
+        linear: The same body with linear displacements, its stiffness of type ``aij``.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+        springs: Stiffness besides that of the body, such as that of contact laws.
+
+    Note:
+        Collective.
+    """
+    transfer, matrix = vertex_transfer(space, linear.space, free), linear.stiffness
+    if springs is not None:
+        matrix, modes = matrix.copy(), matrix.getNearNullSpace()
+        there = springs.ptap(transfer)
+        matrix.axpy(1.0, there, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix.setNearNullSpace(modes)
+        there.destroy()
+    return [CoarserGrid(transfer, matrix)]
+
+
+def vertex_transfer(space: Any, linear: Any, free: PETSc.Vec) -> PETSc.Mat:
+    """Return the interpolation from the vertices to all nodes, constrained unknowns apart.
+
+    Args:
+        space: Vector space of degree 2.
+        linear: That of degree 1 on the same mesh, whose nodes the vertices are.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+
+    Note:
+        Collective.
+    """
+    owned, vertices = (of.dofmap.index_map.size_local for of in (space, linear))
+    near, shares = (part[:owned] for part in _vertices_near(space, linear))
+    used = shares > 0.0
+    starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    numbers = linear.dofmap.index_map.local_to_global(near[used].astype(np.int32))
+    total = linear.dofmap.index_map.size_global
+    weights = sparse.csr_matrix((shares[used], numbers, starts), (owned, total))
+    weights.sort_indices()
+    own = np.flatnonzero(shares.max(axis=1) == 1.0)  # both spaces own a vertex on the same rank
+    stay = np.empty(vertices, dtype=np.intp)
+    stay[near[own, shares[own].argmax(axis=1)]] = own
+    matrix, _ = for_displacements(weights, stay, free, blocks=True)
+    return matrix
+
+
+def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
+    """Return the vertices of a cell of every node, and their shares in the node.
+
+    Returns:
+        Nodes of the linear space that are the vertices, and the values there of its basis, shape
+        (n, vertices of a cell), for the nodes of this rank's cells.
+    """
+    cell, nodes = space.mesh.topology.cell_name(), space.dofmap.index_map
+    values = compat.lagrange_values(cell, 1, compat.lagrange_points(cell, 2))
+    corner = np.count_nonzero(values, axis=1) == 1
+    values[corner] = np.rint(values[corner])
+    cells = compat.cell_nodes(space)
+    found = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
+    found[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node, and its place
+    return compat.cell_nodes(linear)[found[0]], values[found[1]]

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from macro import compat
 from support.errors import InputError
+
+Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,9 +78,6 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     return FacetNodes(cell=cell, side=side, corners=corners)
 
 
-Ints = NDArray[np.int64]
-
-
 def parts(mesh: Any) -> list[int]:
     """Return the numbers of cells of the parts of a mesh that share no facets, largest first.
 
@@ -133,16 +133,8 @@ def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
     Note:
         Collective.
     """
-    facet, cell, side = _sides(mesh)
-    single = np.ones(len(facet), dtype=bool)
-    single[1:] &= facet[1:] != facet[:-1]
-    single[:-1] &= facet[:-1] != facet[1:]
-    facet, cell, side = facet[single], cell[single], side[single]
-    numbers = mesh.topology.index_map(2)
-    known = np.asarray(numbers.local_to_global(facet.astype(np.int32)), dtype=np.int64)
-    foreign = known[facet >= numbers.size_local]
-    common = np.isin(known, np.concatenate(mesh.comm.allgather(foreign)))
-    return known[common], cell[common], side[common]
+    facet, cell, side, common = _single(mesh)
+    return facet[common], cell[common], side[common]
 
 
 def outer_sides(mesh: Any) -> tuple[Ints, Ints]:
@@ -157,14 +149,22 @@ def outer_sides(mesh: Any) -> tuple[Ints, Ints]:
     Note:
         Collective.
     """
+    _, cell, side, common = _single(mesh)
+    return cell[~common], side[~common]
+
+
+def _single(mesh: Any) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
+    """Return the facets of one owned cell: numbers, cells, places, and if another rank has them."""
     facet, cell, side = _sides(mesh)
     single = np.ones(len(facet), dtype=bool)
     single[1:] &= facet[1:] != facet[:-1]
     single[:-1] &= facet[:-1] != facet[1:]
-    _, others, places = facets_between_ranks(mesh)
-    sides = len(compat.reference_facets(mesh.topology.cell_name())[1])
-    single &= ~np.isin(sides * cell + side, sides * others + places)
-    return cell[single], side[single]
+    facet, cell, side = facet[single], cell[single], side[single]
+    numbers = mesh.topology.index_map(2)
+    known = np.asarray(numbers.local_to_global(facet.astype(np.int32)), dtype=np.int64)
+    foreign = known[facet >= numbers.size_local]
+    common = np.isin(known, np.concatenate(mesh.comm.allgather(foreign)))
+    return known, cell, side, common
 
 
 def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
@@ -177,3 +177,101 @@ def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
     sides = len(compat.reference_facets(topology.cell_name())[1])
     order = np.argsort(facet, kind="stable")
     return facet[order].astype(np.int64), order // sides, order % sides
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OuterFacets:
+    """Outer facets of the cells that this rank owns, and q quadrature points on each.
+
+    Args:
+        cell: Rank-local cell of every facet, shape (f,).
+        side: Index of the facet in its cell, shape (f,).
+        points: Places, shape (f, q, 3) [mm].
+        normals: Outward unit normals, shape (f, q, 3).
+        weights: Weights, whose sum over all ranks is the area of the body, shape (f, q) [mm²].
+        nodes: Rank-local nodes of the cells, shape (f, m).
+        values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
+    """
+
+    cell: NDArray[np.int64]
+    side: NDArray[np.int64]
+    points: Array
+    normals: Array
+    weights: Array
+    nodes: NDArray[np.int32]
+    values: Array
+
+    @property
+    def on_facet(self) -> NDArray[np.bool_]:
+        """Which of the nodes lie on the facet, shape (f, m)."""
+        return self.values.any(axis=1)[self.side]
+
+    def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
+        """Return some of the facets, shape of the choice (f,)."""
+        return OuterFacets(
+            cell=self.cell[chosen],
+            side=self.side[chosen],
+            points=self.points[chosen],
+            normals=self.normals[chosen],
+            weights=self.weights[chosen],
+            nodes=self.nodes[chosen],
+            values=self.values,
+        )
+
+
+def outer_facets(space: Any, exact: int) -> OuterFacets:
+    """Place quadrature points on the outer facets of this rank's cells; there may be none.
+
+    Args:
+        space: Lagrange space of the displacements.
+        exact: Polynomial degree on the reference facet that is integrated exactly.
+
+    Note:
+        Collective.
+    """
+    mesh = space.mesh
+    name, degree = mesh.topology.cell_name(), compat.lagrange_degree(space)
+    vertices, corners = compat.reference_facets(name)
+    cell, side = outer_sides(mesh)
+    shape_nodes = compat.cell_vertices(mesh)[cell]
+    shape = compat.geometry_degree(mesh)
+    rule, weights = _facet_rule(corners.shape[1], exact)
+    first = vertices[corners[:, 0]]
+    tangents = vertices[corners[:, 1:3]] - first[:, None]  # (sides, 2, 3)
+    reference = first[:, None] + rule @ tangents
+    flat = reference.reshape(-1, 3)
+    by_side = (len(corners), len(rule))
+    values, basis = (
+        compat.lagrange_values(name, of, flat).reshape(*by_side, -1) for of in (shape, degree)
+    )
+    slopes = compat.lagrange_gradients(name, shape, flat).reshape(*by_side, -1, 3)
+    outwards = np.cross(*tangents.transpose(1, 0, 2))
+    outwards = np.sign(np.einsum("si,si->s", outwards, first - vertices.mean(axis=0)))
+    places = mesh.geometry.x[shape_nodes]
+    maps = np.einsum("fqak,faj->fqkj", slopes[side], places)  # ∂x_j/∂X_k
+    along = np.einsum("ftk,fqkj->fqtj", tangents[side], maps)
+    areas = np.cross(along[:, :, 0], along[:, :, 1]) * np.sign(np.linalg.det(maps))[..., None]
+    areas *= outwards[side, None, None]
+    sizes = np.linalg.norm(areas, axis=2)
+    return OuterFacets(
+        cell=cell,
+        side=side,
+        points=np.einsum("fqa,faj->fqj", values[side], places),
+        normals=areas / sizes[..., None],
+        weights=sizes * weights,
+        nodes=compat.cell_nodes(space)[cell],
+        values=basis,
+    )
+
+
+def _facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
+    """Return points (q, 2) and weights of the unit triangle or square."""
+    if corners == 3:
+        return compat.triangle_rule(exact)
+    nodes, weights = legendre.leggauss(exact // 2 + 1)
+    nodes, weights = 0.5 * (1.0 + nodes), 0.5 * weights
+    x, y = np.meshgrid(nodes, nodes, indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel()]), np.outer(weights, weights).ravel()

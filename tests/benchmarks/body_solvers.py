@@ -34,7 +34,7 @@ from macro import LawContactProblem, LoadedFace, Material, compat
 from macro.linear_solvers.options import PREFIX
 from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import planar_face
+from macro.mesh.tagged import planar_face
 
 COMM = MPI.COMM_WORLD
 LINING, SOFT, RUBBERY = (

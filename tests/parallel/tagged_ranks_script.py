@@ -19,9 +19,8 @@ from macro import compat
 from macro.mesh.checks import check_cells
 from macro.mesh.facets import parts
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import planar_face
 from macro.mesh.supports import free_motions
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.tagged import TaggedMesh, planar_face
 from macro.mesh.xdmf import write_mesh
 from support.collective import on_root
 from support.errors import InputError
