@@ -97,12 +97,12 @@ class ByteNumbers:
             raise _too_short()
         if len(set(kinds)) == 1:
             flat = np.frombuffer(self._data, self._types[kinds[0]], rows * len(kinds), self.at)
-            found = flat.reshape(rows, len(kinds)).astype(np.float64)
+            numbers = flat.reshape(rows, len(kinds)).astype(np.float64)
         else:
             parts = np.frombuffer(self._data, row, rows, self.at)
-            found = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
+            numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
         self.at += rows * row.itemsize
-        return found
+        return numbers
 
     def line(self) -> int:
         """Return the number on the next line."""

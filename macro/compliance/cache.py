@@ -86,9 +86,9 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     words, place = _place(kind, key)  # on every rank, so that a wrong key raises on all of them
     path = place if comm.rank == 0 else None
     large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
-    found: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)
-    if found is not None:
-        return found
+    arrays: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)
+    if arrays is not None:
+        return arrays
     made = compute()
     if path:
         with suppress(OSError, NotWritten):
@@ -110,11 +110,11 @@ def sources_digest(top: Path = _TOP) -> str:
     Args:
         top: Folder of the packages.
     """
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for package in _SOURCES:
         for path in sorted((top / package).rglob("*.py")):
-            found.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())
-    return found.hexdigest()
+            digest.update(path.relative_to(top).as_posix().encode() + b"\0" + path.read_bytes())
+    return digest.hexdigest()
 
 
 def _place(kind: str, key: tuple[object, ...]) -> tuple[str, Path | None]:
@@ -142,10 +142,10 @@ def _read(path: Path, words: str) -> Arrays | None:
             return None
         if facts.st_uid not in (os.geteuid(), _ROOT):
             return None
-        found = read_record(file.read())
-        if found.facts == words:
+        record = read_record(file.read())
+        if record.facts == words:
             os.utime(path)  # marks it as recently used
-            return found.arrays
+            return record.arrays
     return None
 
 
@@ -202,9 +202,9 @@ def body_digest(body: ElasticBody) -> str:
         dofs = dofs[dofs < body.owned_dofs]
         held = np.column_stack([places[dofs // 3], (dofs % 3).astype(np.uint64)])
         total = total + _sum(_mixed(held))
-    found = np.zeros_like(total)
-    body.comm.Allreduce(total, found, op=MPI.SUM)
-    return f"{int(found[0]):016x}-{body.hexahedral}-{body.degree}-{body.dofs}"
+    whole = np.zeros_like(total)
+    body.comm.Allreduce(total, whole, op=MPI.SUM)
+    return f"{int(whole[0]):016x}-{body.hexahedral}-{body.degree}-{body.dofs}"
 
 
 def _sum(words: Words) -> Words:
@@ -219,10 +219,10 @@ def _mixed(rows: ArrayLike) -> Words:
     """
     rows = np.ascontiguousarray(rows)
     words = (rows + 0.0).view(np.uint64) if rows.dtype == np.float64 else rows  # no −0
-    found = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
+    mixed = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
     for column in range(words.shape[1]):
-        found = found * np.uint64(0xD1342543DE82EF95) + words[:, column]
-        found = (found ^ (found >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        found = (found ^ (found >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        found = found ^ (found >> np.uint64(31))
-    return found
+        mixed = mixed * np.uint64(0xD1342543DE82EF95) + words[:, column]
+        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        mixed = mixed ^ (mixed >> np.uint64(31))
+    return mixed

@@ -251,11 +251,11 @@ class _Corrections:
     def _displacement(self, nodes: NDArray[np.intp]) -> Array:
         """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""
         places = self._body.space.tabulate_dof_coordinates()[nodes]
-        found = np.empty((len(nodes), 3, self._fields.count**2))
+        displacements = np.empty((len(nodes), 3, self._fields.count**2))
         for part in np.array_split(np.arange(len(nodes)), -(-len(nodes) // _BATCH) or 1):
             local = self._fields(self._local_places(places[part]))[0]
-            found[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
-        return found
+            displacements[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
+        return displacements
 
     def _local_places(self, points: Array) -> Array:
         """Return points in the coordinates of the rectangle."""

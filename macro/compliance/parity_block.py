@@ -111,11 +111,11 @@ class ParityBlock:
         forces = np.zeros((len(free), len(loads)))
         forces[splits[1] :].reshape(-1, sizes[2][2], len(loads))[:, end] = -loads.T
         solved = _solution(self._stiffness()[free][:, free], forces[free])
-        found = np.zeros_like(forces)  # also where a roller constrains
-        found[free] = solved
+        displacements = np.zeros_like(forces)  # also where a roller constrains
+        displacements[free] = solved
         tops = [
             part.reshape(-1, size[2], len(loads))[:, end]
-            for part, size in zip(np.split(found, splits[:2]), sizes, strict=True)
+            for part, size in zip(np.split(displacements, splits[:2]), sizes, strict=True)
         ]
         # derivative of the inverse stiffness when all elements grow in proportion
         change = self._stiffness(by_height=True)[free][:, free]
@@ -133,11 +133,11 @@ class ParityBlock:
     @cached_property
     def _free(self) -> list[NDArray[np.bool_]]:
         """Which unknowns (ix, iy, iz) no roller constrains, by component."""
-        found = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
+        free = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
         if self.sides == "roller":
             for axis in (0, 1):
-                np.moveaxis(found[axis], axis, 0)[self._lines[axis][axis].end] = False
-        return found
+                np.moveaxis(free[axis], axis, 0)[self._lines[axis][axis].end] = False
+        return free
 
     def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
         """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].

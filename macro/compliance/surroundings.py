@@ -167,14 +167,14 @@ def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGr
     """Return the one material of the cells under the rectangle."""
     cells = np.unique(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
     own = _pairs(body, cells)
-    found = set().union(*body.comm.allgather(own))
-    if len(found) != 1:
+    pairs = set().union(*body.comm.allgather(own))
+    if len(pairs) != 1:
         raise InputError(
             "the surface's rectangle lies on several materials",
-            value=len(found),
+            value=len(pairs),
             allowed="one material under the rectangle",
         )
-    first, shear = found.pop()
+    first, shear = pairs.pop()
     return Material(
         young_modulus=shear * (3.0 * first + 2.0 * shear) / (first + shear),
         poisson_ratio=0.5 * first / (first + shear),

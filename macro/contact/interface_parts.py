@@ -109,15 +109,15 @@ def chosen_face(
         given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
     facets = _on_all_ranks(mesh, given)
     marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
-    found = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+    plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
-        placed = contact_facets(mesh, facets, found.frame)
-        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=found.lengths)
-    if np.abs(frame.normal - found.frame.normal).max() > _PARALLEL:
+        placed = contact_facets(mesh, facets, plane.frame)
+        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
+    if np.abs(frame.normal - plane.frame.normal).max() > _PARALLEL:
         raise InputError(
             "the frame's normal is not that of the face",
             value=frame.normal.tolist(),
-            allowed=f"{found.frame.normal.tolist()}, out of the body",
+            allowed=f"{plane.frame.normal.tolist()}, out of the body",
         )
     placed = contact_facets(mesh, facets, frame)
     corner, other = bounding_box(placed.corners.reshape(-1, 2), mesh.comm)

@@ -92,9 +92,9 @@ def _weights_of(rows: BlockRows, weights: PETSc.Mat) -> tuple[sparse.csr_matrix,
     wanted = np.sort(seen).astype(PETSc.IntType)
     at = PETSc.IS().createGeneral(wanted, comm=PETSc.COMM_SELF)
     every = PETSc.IS().createStride(weights.getSize()[1], 0, 1, comm=PETSc.COMM_SELF)
-    found = weights.createSubMatrices(at, every)[0]
-    starts, columns, values = found.getValuesCSR()
-    found.destroy()
+    part = weights.createSubMatrices(at, every)[0]
+    starts, columns, values = part.getValuesCSR()
+    part.destroy()
     coarse, places = np.unique(columns, return_inverse=True)
     table = sparse.csr_matrix((values, places, starts), shape=(len(wanted), len(coarse)))
     return table[np.searchsorted(wanted, seen)], coarse

@@ -70,8 +70,8 @@ _OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers w
 
 def users_options() -> tuple[tuple[str, str], ...]:
     """Return the user's PETSc options under `PREFIX`, sorted by name; results depend on them."""
-    found = PETSc.Options(PREFIX).getAll()
-    return tuple(sorted((name, str(value)) for name, value in found.items()))
+    given = PETSc.Options(PREFIX).getAll()
+    return tuple(sorted((name, str(value)) for name, value in given.items()))
 
 
 @contextmanager
@@ -110,11 +110,11 @@ def options_read(prefix: str, names: Iterable[str]) -> set[str]:
         prefix: Prefix of the options.
         names: Their names without it.
     """
-    found, read = set(), ctypes.c_int(0)
+    asked, read = set(), ctypes.c_int(0)
     for name in names:
         call("PetscOptionsUsed", None, f"{prefix}{name}".encode(), ctypes.byref(read))
-        found |= {name} if read.value else set()
-    return found
+        asked |= {name} if read.value else set()
+    return asked
 
 
 def iterating(solver: PETSc.KSP, method: str = "cg") -> None:

@@ -269,6 +269,6 @@ def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
     corner = np.count_nonzero(values, axis=1) == 1
     values[corner] = np.rint(values[corner])
     cells = compat.cell_nodes(space)
-    found = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
-    found[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node, and its place
-    return compat.cell_nodes(linear)[found[0]], values[found[1]]
+    place = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
+    place[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node
+    return compat.cell_nodes(linear)[place[0]], values[place[1]]

@@ -185,15 +185,15 @@ def contact_facets(
     """
     mesh.topology.create_connectivity(2, 3)
     side_of_body = -1.0 if opposed else 1.0
-    found = facet_nodes(mesh, facet_indices(mesh, facets))
-    owned = found.cell < mesh.topology.index_map(3).size_local
+    nodes = facet_nodes(mesh, facet_indices(mesh, facets))
+    owned = nodes.cell < mesh.topology.index_map(3).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
-    side = found.side[owned]
-    corners = mesh.geometry.x[found.corners[owned]]
+    side = nodes.side[owned]
+    corners = mesh.geometry.x[nodes.corners[owned]]
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
-        cell=found.cell[owned],
+        cell=nodes.cell[owned],
         side=side,
         reference=vertices[shapes[side]],
         corners=frame.in_plane(corners),

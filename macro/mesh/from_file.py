@@ -126,9 +126,9 @@ def facet_tags(
     name_of = {tag: name for name, tag in (names or {}).items()}
     wanted, tags = _distinct(facets, tags, name_of)
     cell, side, row = _facets_found(mesh, wanted)
-    found = np.zeros(len(wanted), dtype=np.int64)
-    found[row] = 1
-    _check_groups(mesh.comm.allreduce(found) > 0, tags, name_of)
+    of_cells = np.zeros(len(wanted), dtype=np.int64)
+    of_cells[row] = 1
+    _check_groups(mesh.comm.allreduce(of_cells) > 0, tags, name_of)
     topology = mesh.topology
     topology.create_connectivity(3, 2)
     topology.create_connectivity(2, 3)
@@ -174,11 +174,11 @@ def _facets_found(
 
 
 def _check_groups(
-    found: NDArray[np.bool_], tags: NDArray[np.int32], name_of: dict[int, str]
+    of_cells: NDArray[np.bool_], tags: NDArray[np.int32], name_of: dict[int, str]
 ) -> None:
     """Refuse tags of which some facets belong to cells and some do not."""
     for tag in np.unique(tags):
-        of_tag = found[tags == tag]
+        of_tag = of_cells[tags == tag]
         if of_tag.any() and not of_tag.all():
             name = name_of.get(int(tag), str(tag))
             raise InputError(

@@ -206,8 +206,8 @@ def _straighten(mesh: Any, moved: Array) -> None:
     done: Array = np.empty(0, dtype=np.int64)
     while True:
         middles = cells[:, 4:]
-        found = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < _LEAST_BENT]])
-        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(found)))
+        bent = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < _LEAST_BENT]])
+        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(bent)))
         if len(straight) == len(done):
             return
         done = straight

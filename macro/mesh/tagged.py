@@ -239,10 +239,10 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     facets = np.asarray(tagged.facet_tags.find(tag))
     outer = np.isin(facets, dmesh.exterior_facet_indices(topology))
     own = facets < topology.index_map(2).size_local
-    found = facet_nodes(mesh, facets[outer])
-    owned = found.cell < topology.index_map(3).size_local
-    corners = mesh.geometry.x[found.corners[owned]]
-    middle = mesh.geometry.x[compat.cell_vertices(mesh)[found.cell[owned]]].mean(axis=1)
+    nodes = facet_nodes(mesh, facets[outer])
+    owned = nodes.cell < topology.index_map(3).size_local
+    corners = mesh.geometry.x[nodes.corners[owned]]
+    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell[owned]]].mean(axis=1)
     # half the product of the diagonals of a quadrilateral
     ends = (1, 0, 2, 0) if corners.shape[1] == 3 else (3, 0, 2, 1)
     u, v = (corners[:, ends[k]] - corners[:, ends[k + 1]] for k in (0, 2))

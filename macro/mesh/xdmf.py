@@ -121,8 +121,8 @@ def _names(root: ElementTree.Element) -> dict[str, dict[str, int]]:
     for entry in root.iter("Information"):
         if entry.get("Name") == NAMES:
             try:
-                found = json.loads(entry.get("Value", ""))
-                return {kind: {str(k): int(found[kind][k]) for k in found[kind]} for kind in found}
+                named = json.loads(entry.get("Value", ""))
+                return {kind: {str(k): int(named[kind][k]) for k in named[kind]} for kind in named}
             except (ValueError, TypeError, AttributeError) as error:
                 raise InputError(f"its names of tags cannot be read: {error}") from error
     return {}
@@ -147,8 +147,8 @@ def _check_nodes(file: Any, name: str, comm: Any) -> None:
     """Refuse cells with nodes that are not in the file; dolfinx would wait for them for ever."""
     count, cells = comm.allreduce(len(file.read_geometry_data(name))), file.read_topology_data(name)
     absent = cells[(cells < 0) | (cells >= count)]
-    if found := [node for part in comm.allgather(absent[:1].tolist()) for node in part]:
-        raise InputError(f"cells have the node {found[0]} of {count} nodes")
+    if missing := [node for part in comm.allgather(absent[:1].tolist()) for node in part]:
+        raise InputError(f"cells have the node {missing[0]} of {count} nodes")
 
 
 def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
