@@ -19,15 +19,27 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
-from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
+from geometry.slope_search import slope_search
+from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equilibrium import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import Guess
 from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
+from macro.contact.unilateral_springs import AugmentedLaw, StiffPreconditioner
 from macro.linear_solvers.constrained import contact_tolerance
+from macro.linear_solvers.options import reason_name
 
 Array = NDArray[np.float64]
+
+_LOOSEST = 0.03
+"""Largest relative residual of linear solves, and tolerance of the first equilibrium."""
+
+_SPARE = 0.3
+"""Share of a tolerance that an inner solve aims at."""
+
+_MOST_STEPS, _MOST_ITERATIONS = 60, 1000
+"""Newton steps of an equilibrium, and linear iterations of a step."""
 
 PENETRATION = {1: 1e-8, 2: 1e-5}
 """Largest penetration of quadrature points, and largest gap of those under pressure, relative to
@@ -72,7 +84,7 @@ class AugmentedLagrangian:
         body, loaded = face.body, face.loaded(2 * face.body.degree)
         self._sampling = sampling = loaded.pointwise
         (distance,) = top.with_ghosts(plane.distance)
-        points = loaded.quadrature
+        self._points = points = loaded.quadrature
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
         self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
@@ -81,7 +93,14 @@ class AugmentedLagrangian:
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
         self._forces = ContactForces(loaded, sampling, [self.law], none)
         self.equilibrium = Equilibrium(body, self._forces)
-        self._newton = FacetNewton(self.equilibrium, self.law, loaded, top, plane)
+        self._preconditioner = StiffPreconditioner(
+            body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree
+        )
+        self._ksp = PETSc.KSP().create(body.stiffness.comm)
+        self._ksp.setPC(self._preconditioner.pc)
+        self._ksp.setOperators(self.equilibrium.tangent, body.stiffness)
+        self._ksp.setType("cg")
+        self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
         self.points = len(points.x)
 
     def solve(self, control: Control, guess: Guess) -> ContactSolution:
@@ -100,10 +119,10 @@ class AugmentedLagrangian:
         displacement = self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
         comm = self._body.comm
-        steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
+        steps, spent, tolerance, before = 0, 0, _LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
-            more, cycles = self._newton.solve(displacement, tolerance, control)
+            more, cycles = self._balance(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = forces.closure(displacement)
             # penetration of points without pressure, penetration or gap of points under pressure
@@ -120,9 +139,71 @@ class AugmentedLagrangian:
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             if hard:
-                near = min(0.1 * tolerance, SPARE * self._penetration * ratio)
+                near = min(0.1 * tolerance, _SPARE * self._penetration * ratio)
                 tolerance = max(self._tolerance, near)
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
+
+    def _balance(
+        self, displacement: PETSc.Vec, tolerance: float, control: Control
+    ) -> tuple[int, int]:
+        """Find the equilibrium under fixed multipliers, by generalised Newton's method.
+
+        Args:
+            displacement: Initial guess; receives the solution [mm].
+            tolerance: Norm of the residual relative to that of the contact forces.
+            control: What is prescribed, for an error.
+
+        Returns:
+            Newton steps and linear iterations.
+
+        Raises:
+            NotConverged: When Newton's method, its line search or a linear solve fails.
+        """
+        equilibrium, spent = self.equilibrium, 0
+        residual, step = displacement.duplicate(), displacement.duplicate()
+        for steps in range(_MOST_STEPS):
+            equilibrium.residual(displacement, residual)
+            norm, scale = residual.norm(), equilibrium.scale
+            if norm <= tolerance * scale:
+                return steps, spent
+            if not scale:  # no contact
+                displacement.set(0.0)
+                continue
+            self._linearise(displacement)
+            rtol = max(min(_LOOSEST, norm / scale), _SPARE * tolerance * scale / norm)
+            self._ksp.setTolerances(rtol=rtol, max_it=_MOST_ITERATIONS)
+            self._ksp.solve(residual, step)
+            spent += int(self._ksp.its)
+            if self._ksp.reason < 0:
+                name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
+                raise not_found(control, name, spent)
+            if not self._advance(displacement, residual, step):
+                raise not_found(control, "LINE_SEARCH", steps)
+            compat.collect_garbage(displacement.comm)  # every step leaves a field
+        raise not_found(control, "NEWTON", _MOST_STEPS)
+
+    def _linearise(self, displacement: PETSc.Vec) -> None:
+        """Move the tangent and its preconditioner to a displacement."""
+        self.equilibrium.update_tangent(displacement)
+        slope = self.law.stiffness(self.equilibrium.forces.closure(displacement))
+        points = self._points
+        rows, columns = np.nonzero((points.values != 0.0) & (slope > 0.0)[:, None])
+        loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
+        free = self.equilibrium.forces.control.free
+        motions = self._plane.levers.scaled(free)[loaded]
+        motions = motions @ self._plane.supported_motions(free, loaded)
+        self._preconditioner.update(slope / points.weight, self._top.dofs[loaded], motions)
+
+    def _advance(self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Subtract a share of a step after which the slope of the energy along it has fallen."""
+        start = displacement.copy()
+
+        def slope_after(share: float) -> float:
+            displacement.waxpy(-share, step, start)
+            self.equilibrium.residual(displacement, residual)
+            return -float(residual.dot(step))
+
+        return slope_search(slope_after, -float(residual.dot(step)), 1.0) is not None
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
         closure, plane = self._forces.closure(displacement), self._forces.plane.copy()
