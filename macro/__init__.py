@@ -20,11 +20,7 @@ from macro.contact.face_pair import FacePair
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem
-from macro.contact.loaded_face import (
-    LoadedFace,
-    displacements_under,
-    patch_compliance_matrix,
-)
+from macro.contact.loaded_face import LoadedFace, displacements_under, patch_compliance_matrix
 from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,

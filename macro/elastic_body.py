@@ -20,8 +20,9 @@ from macro import compat
 from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice
 from macro.linear_solvers.node_matrices import Stiffened, free_unknowns
-from macro.linear_solvers.options import PREFIX, solve_linear
+from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
+from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.supports import Traction
 
 Array = NDArray[np.float64]

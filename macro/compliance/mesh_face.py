@@ -33,7 +33,8 @@ from macro.compliance.face_compliance import FaceCompliance
 from macro.compliance.face_moments import FaceMoments
 from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
-from macro.linear_solvers.options import PREFIX, solve_linear, solved_at_once
+from macro.linear_solvers.options import PREFIX
+from macro.linear_solvers.solvers import solve_linear, solved_at_once
 from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.facets import OuterFacets, outer_facets

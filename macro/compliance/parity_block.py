@@ -21,7 +21,7 @@ from scipy.sparse import bmat, csr_matrix, kron
 from geometry.materials import Material
 from macro.bodies import Sides
 from macro.compliance.elements import Line
-from macro.linear_solvers.options import solved_at_once
+from macro.linear_solvers.solvers import solved_at_once
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]

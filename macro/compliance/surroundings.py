@@ -40,14 +40,12 @@ class Surroundings:
 
     Args:
         free_sides: Whether a free plane across the face bounds the rectangle, by side.
-        covers: Whether the rectangle is all of the face.
         thickness: Least distance under the rectangle to the other side of the body [mm].
         above: Largest height of the body above the plane of the face, at least 0 [mm].
         material: Elastic constants under the rectangle.
     """
 
     free_sides: Sides
-    covers: bool
     thickness: float
     above: float
     material: Material
@@ -88,10 +86,8 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     strip = _STRIP * min(*rectangle.lengths, thickness)
     free = outer.among(~_held(body, outer))
     sides = [_free_plane(body, free, frame, rectangle, side, strip, slack) for side in range(4)]
-    covers = comm.allreduce(float(facets.area.sum())) < (1.0 + _COVERED) * area
     return Surroundings(
         free_sides=(sides[0], sides[1], sides[2], sides[3]),
-        covers=covers,
         thickness=thickness,
         above=above if above > slack else 0.0,
         material=_material_under(body, facets, rectangle),

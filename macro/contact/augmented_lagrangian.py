@@ -22,7 +22,7 @@ from geometry.rigid_plane import Control
 from geometry.slope_search import slope_search
 from macro import compat
 from macro.contact.contact_forces import ContactForces
-from macro.contact.equilibrium import Equilibrium
+from macro.contact.equations import Equilibrium
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import Guess
 from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found

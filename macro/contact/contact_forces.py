@@ -5,6 +5,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
@@ -15,13 +16,17 @@ from petsc4py import PETSc
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
 from macro.contact.contact_state import ContactState
-from macro.contact.loaded_face import ContactFace, Sampling
+from macro.contact.loaded_face import ContactFace
+from macro.contact.sampling import Sampling
 from support.collective import together
 
 Array = NDArray[np.float64]
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
+
+
+_MATRIX = "patchlaw matrix"
 
 
 class ContactLaw(Protocol):
@@ -255,3 +260,50 @@ def first_touch(touched: Callable[[float], bool], control: Control, half: float)
         width, middle = above - below, 0.5 * (below + above)
         below, above = (below, middle) if touched(middle) else (middle, above)
     return below
+
+
+class AddsProduct(Protocol):
+    """Contact whose derivative is applied without being assembled."""
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative with a vector x to y."""
+        ...
+
+
+class ContactTangent:
+    """What PETSc holds of a matrix plus the derivatives of contacts, which their owners keep.
+
+    The references to them are weak, and PETSc itself counts the matrix: an object that Python lets
+    go of while PETSc frees the shell would never be freed.
+
+    Args:
+        contacts: The contacts.
+    """
+
+    def __init__(self, contacts: Sequence[AddsProduct]) -> None:
+        self.follow(contacts)
+
+    def follow(self, contacts: Sequence[AddsProduct]) -> None:
+        """Take the derivatives of other contacts from now on."""
+        self._contacts = [weakref.proxy(contact) for contact in contacts]
+
+    def shell(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Return the sum with a matrix, as a PETSc matrix without entries."""
+        shell = PETSc.Mat().createPython(matrix.getSizes(), self, comm=matrix.comm)
+        shell.compose(_MATRIX, matrix)
+        shell.setUp()
+        return shell
+
+    def mult(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product with x; PETSc calls this."""
+        shell.query(_MATRIX).mult(x, y)
+        self._add_contacts(x, y)
+
+    def multTranspose(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product of the transpose with x; the part of contact is symmetric."""
+        shell.query(_MATRIX).multTranspose(x, y)
+        self._add_contacts(x, y)
+
+    def _add_contacts(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        for contact in self._contacts:
+            contact.add_product(x, y)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from macro import compat
+from macro.contact.equations import UserEquations
 from macro.contact.interface import Interface
 from macro.contact.newton import Newton, NewtonReport
-from macro.contact.user_equations import UserEquations
 from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS
 from macro.linear_solvers.selection import algebraic_options
 from support.errors import InputError, NotConverged

@@ -22,7 +22,8 @@ from scipy.spatial import cKDTree
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.body_pair import BodyPair
-from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, Sampling, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, normal_rows
+from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
 from support.errors import InputError

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
-from macro.contact.equilibrium import Equilibrium
-from macro.contact.loaded_face import Sampling
+from macro.contact.equations import Equilibrium
+from macro.contact.sampling import Sampling
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,11 @@ from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
-from macro.contact.contact_forces import ContactForces, ContactLaw
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTangent
 from macro.contact.contact_state import ContactState
-from macro.contact.equilibrium import ContactTangent
 from macro.contact.interface_parts import ChosenFace, InterfaceLaws, chosen_face, laws_on_face
-from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
+from macro.contact.loaded_face import LoadedFace, Mode
+from macro.contact.sampling import crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from support.collective import together
 from support.errors import InputError

@@ -18,12 +18,12 @@ from macro import compat
 from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.contact_state import ContactState
-from macro.contact.equilibrium import Equilibrium
+from macro.contact.equations import Equilibrium
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
 from macro.contact.newton import Newton
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
-from macro.linear_solvers.options import solve_linear
+from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
 from support.errors import InputError
 

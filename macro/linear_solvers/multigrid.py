@@ -23,7 +23,7 @@ from geometry.meshes.block import BlockShape
 from macro import compat
 from macro.linear_solvers.multigrid_products import galerkin
 from macro.linear_solvers.node_matrices import distributed, for_displacements
-from macro.linear_solvers.options import CoarserGrid
+from macro.linear_solvers.solvers import CoarserGrid
 from macro.mesh.block import BlockMesh
 
 Array = NDArray[np.float64]

@@ -47,7 +47,8 @@ from scipy import sparse
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
 from macro.linear_solvers.node_matrices import Stiffened, for_displacements
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, CoarserGrid, linear_solver
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
+from macro.linear_solvers.solvers import CoarserGrid, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""

@@ -9,7 +9,7 @@ from helpers.block_cases import block_of, interface_of
 
 from macro import Material, compat
 from macro.elasticity import stiffness_form, stress
-from macro.linear_solvers.options import linear_solver, solve_linear
+from macro.linear_solvers.solvers import linear_solver, solve_linear
 
 MATERIAL = Material(young_modulus=2.0, poisson_ratio=0.3)
 ELEMENTS = ["Q1", "Q2", "P1", "P2"]

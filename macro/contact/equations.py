@@ -1,4 +1,7 @@
-"""The equations of a user's variational problem with contact, under Dirichlet conditions."""
+"""Equations that Newton's method solves: equilibrium of a body with laws, or of a user's problem.
+
+Theory: section 11 of ``docs/theory.md``.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro import compat
-from macro.contact.equilibrium import ContactTangent
+from macro.contact.contact_forces import ContactForces, ContactTangent
 from macro.contact.interface import Interface
 from macro.elasticity import rigid_body_modes
 from macro.linear_solvers.node_matrices import free_unknowns
@@ -22,6 +25,53 @@ Array = NDArray[np.float64]
 _INNER = 1e-3
 """Share of the inner forces J u that residuals are compared with where contact forces are less: of
 the largest so far, because a body without any load has none at its solution."""
+
+
+class Equilibrium:
+    """The equations K u = B p(c(u)) of a body in contact with a rigid plane.
+
+    The plane is eliminated by its own nonlinear equilibrium, so that displacements are the only
+    unknowns of Newton's method. The residual K u − B p is the gradient of a convex energy if no law
+    softens. Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled; it lies
+    between K and the derivative under a fixed plane.
+
+    Args:
+        body: The `ElasticBody`, or a `BodyPair`.
+        forces: Forces of the laws on its contact face.
+
+    Attributes:
+        body: The elastic body.
+        forces: Forces of the laws on its contact face.
+        matrix: K.
+        tangent: The derivative at the displacement last given to ``update_tangent``, a PETSc
+            matrix without entries.
+        scale: Norm of the contact face's load at the displacement last given to ``residual`` [N].
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(self, body: Any, forces: ContactForces) -> None:
+        self.body, self.forces, self.matrix = body, forces, body.stiffness
+        self.scale = 0.0
+        self._load = self.matrix.createVecLeft()
+        self.tangent = ContactTangent([forces]).shell(self.matrix)
+
+    def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write the residual K u − B p(closure(u)) at a displacement u.
+
+        Args:
+            displacement: u [mm].
+            residual: Receives the residual [N].
+        """
+        self.forces.write(displacement, self._load)
+        self.scale = self._load.norm()
+        self.matrix.mult(displacement, residual)
+        residual.axpy(-1.0, self._load)
+
+    def update_tangent(self, displacement: PETSc.Vec) -> None:
+        """Move the tangent to a displacement."""
+        self.forces.update(displacement)
 
 
 class UserEquations:
