@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from macro import compat
 from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice
-from macro.linear_solvers.node_matrices import Stiffened, free_unknowns
+from macro.linear_solvers.node_matrices import Stiffened
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.solvers import solve_linear
@@ -203,7 +203,17 @@ class ElasticBody(ABC):
     @property
     def free(self) -> PETSc.Vec:
         """1 for free degrees of freedom, 0 for those that the supports constrain."""
-        return free_unknowns(self.conditions, self.stiffness.createVecRight())
+        free = self.stiffness.createVecRight()
+        free.array[:] = ~self.supported[: self.owned_dofs]
+        return free
+
+    @cached_property
+    def supported(self) -> NDArray[np.bool_]:
+        """Which of this rank's degrees of freedom supports constrain, those of ghosts included."""
+        supported = np.zeros(3 * len(self.space.tabulate_dof_coordinates()), dtype=bool)
+        for part in self.held:
+            supported[part.dofs] = True
+        return supported
 
     @cached_property
     def preload(self) -> Array | None:

@@ -205,8 +205,7 @@ class _Corrections:
         self._frame, self._fields, self._material = frame, fields, material
         self._tractions = self._integrated(outer)
         self._held = fem.Function(body.space)
-        dofs = [condition.dof_indices()[0] for condition in body.conditions]
-        self._supported = np.unique(np.concatenate([np.empty(0, np.int32), *dofs]))
+        self._supported = np.flatnonzero(body.supported)
         self._support_nodes, self._row = np.unique(self._supported // 3, return_inverse=True)
         self._displacements = self._displacement(self._support_nodes)
         self._product = compat.compile_form(ufl.action(body.form, self._held))

@@ -114,10 +114,7 @@ def _thickness(
 
 def _held(body: ElasticBody, outer: OuterFacets) -> NDArray[np.bool_]:
     """Return which facets are supported: all their nodes are, in one component at least."""
-    held = np.zeros(len(body.space.tabulate_dof_coordinates()) * 3, dtype=bool)
-    for condition in body.conditions:
-        held[condition.dof_indices()[0]] = True
-    nodes = held.reshape(-1, 3)[outer.nodes] | ~outer.on_facet[..., None]
+    nodes = body.supported.reshape(-1, 3)[outer.nodes] | ~outer.on_facet[..., None]
     return np.asarray(nodes.all(axis=1).any(axis=1))
 
 

@@ -28,7 +28,7 @@ from macro.contact.initial_guess import Guess
 from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
 from macro.contact.unilateral_springs import AugmentedLaw, StiffPreconditioner
 from macro.linear_solvers.constrained import contact_tolerance
-from macro.linear_solvers.options import reason_name
+from macro.linear_solvers.options import conjugate_gradients, reason_name
 
 Array = NDArray[np.float64]
 
@@ -38,8 +38,8 @@ _LOOSEST = 0.03
 _SPARE = 0.3
 """Share of a tolerance that an inner solve aims at."""
 
-_MOST_STEPS, _MOST_ITERATIONS = 60, 1000
-"""Newton steps of an equilibrium, and linear iterations of a step."""
+_MOST_STEPS = 60
+"""Newton steps of an equilibrium."""
 
 PENETRATION = {1: 1e-8, 2: 1e-5}
 """Largest penetration of quadrature points, and largest gap of those under pressure, relative to
@@ -96,11 +96,9 @@ class AugmentedLagrangian:
         self._preconditioner = StiffPreconditioner(
             body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree
         )
-        self._ksp = PETSc.KSP().create(body.stiffness.comm)
-        self._ksp.setPC(self._preconditioner.pc)
-        self._ksp.setOperators(self.equilibrium.tangent, body.stiffness)
-        self._ksp.setType("cg")
-        self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+        self._ksp = conjugate_gradients(
+            self.equilibrium.tangent, body.stiffness, self._preconditioner
+        )
         self.points = len(points.x)
 
     def solve(self, control: Control, guess: Guess) -> ContactSolution:
@@ -171,7 +169,7 @@ class AugmentedLagrangian:
                 continue
             self._linearise(displacement)
             rtol = max(min(_LOOSEST, norm / scale), _SPARE * tolerance * scale / norm)
-            self._ksp.setTolerances(rtol=rtol, max_it=_MOST_ITERATIONS)
+            self._ksp.setTolerances(rtol=rtol)
             self._ksp.solve(residual, step)
             spent += int(self._ksp.its)
             if self._ksp.reason < 0:

@@ -15,7 +15,6 @@ from scipy.sparse.linalg import splu
 
 from macro.linear_solvers.constrained import ConstrainedPreconditioner
 from macro.linear_solvers.node_matrices import node_submatrix, springs_at
-from macro.linear_solvers.options import WeakContext
 
 Array = NDArray[np.float64]
 
@@ -60,9 +59,6 @@ class StiffPreconditioner:
         points_by_dofs: −w φ of every quadrature point, shape (points, dofs) [mm²].
         layers: Layers of nodes near which P B P is corrected.
 
-    Attributes:
-        pc: The preconditioner for PETSc.
-
     Note:
         Everything here is collective.
     """
@@ -76,10 +72,6 @@ class StiffPreconditioner:
         self._projection = self._constrained.projection
         self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
         self._factors: Any = None
-        self.pc = PETSc.PC().create(matrix.comm)
-        self.pc.setOperators(matrix)
-        self.pc.setType("python")
-        self.pc.setPythonContext(WeakContext(self))
 
     def update(self, stiffness: Array, dofs: NDArray[np.intp], motions: Array) -> None:
         """Move to other springs.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from macro.linear_solvers.options import WeakContext
+from macro.linear_solvers.options import shell
 
 Indices = NDArray[np.intp]
 
@@ -180,10 +180,7 @@ class Stiffened:
 
     def __init__(self, stiffness: PETSc.Mat, springs: PETSc.Mat) -> None:
         self._stiffness, self.springs = stiffness, springs
-        self.product = PETSc.Mat().createPython(
-            stiffness.getSizes(), WeakContext(self), comm=stiffness.comm
-        )
-        self.product.setUp()
+        self.product = shell(stiffness, self)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write the product y with x; PETSc calls this."""

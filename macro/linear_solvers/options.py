@@ -57,6 +57,9 @@ DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 """A factorisation by MUMPS, distributed over the ranks."""
 
 
+_MOST_ITERATIONS = 1000
+
+
 def users_options() -> tuple[tuple[str, str], ...]:
     """Return the user's PETSc options under `PREFIX`, sorted by name; results depend on them."""
     given = PETSc.Options(PREFIX).getAll()
@@ -194,3 +197,33 @@ class WeakContext:
         if context is None:
             raise ReferenceError("the owner of a PETSc context is gone")
         return context
+
+
+def shell(like: PETSc.Mat, context: Any) -> PETSc.Mat:
+    """Return a PETSc matrix without entries whose products an object writes.
+
+    Args:
+        like: A matrix of the same sizes.
+        context: Has ``mult``; keep it as long as the matrix.
+    """
+    matrix = PETSc.Mat().createPython(like.getSizes(), WeakContext(context), comm=like.comm)
+    matrix.setUp()
+    return matrix
+
+
+def conjugate_gradients(operator: PETSc.Mat, matrix: PETSc.Mat, preconditioner: Any) -> PETSc.KSP:
+    """Return conjugate gradients with a preconditioner of ours, whatever the user's options.
+
+    Args:
+        operator: The operator.
+        matrix: The matrix that the preconditioner is made of.
+        preconditioner: Has ``apply``; keep it as long as the solver.
+    """
+    solver = PETSc.KSP().create(operator.comm)
+    solver.setOperators(operator, matrix)
+    solver.setType("cg")
+    solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+    solver.setTolerances(max_it=_MOST_ITERATIONS)
+    solver.pc.setType("python")
+    solver.pc.setPythonContext(WeakContext(preconditioner))
+    return solver
