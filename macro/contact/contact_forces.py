@@ -215,8 +215,8 @@ class ContactForces:
             patch_force=patch_force,
             patch_pressure=patch_force / areas,
             patch_closure=self._sampling.patch_sums(closure) / areas,
-            closure=closure,
-            pressure=pressure,
+            sample_closure=closure,
+            sample_pressure=pressure,
             **known,
         )
 

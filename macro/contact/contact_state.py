@@ -64,8 +64,8 @@ class ContactState:
         residuals: Norms of the residual before each Newton step and at the end, relative to that of
             the contact forces.
         reason: Name of the reason to stop.
-        closure: Closures of this rank's samples of laws, patches or points, shape (n,) [mm].
-        pressure: Pressures of these samples, shape (n,) [MPa].
+        sample_closure: Closures of this rank's samples of laws, patches or points, (n,) [mm].
+        sample_pressure: Pressures of these samples, shape (n,) [MPa].
         patch_area: Contact areas of the patches of meshed roughness, shape (N,) [mm²]; by nodes,
             each with its tributary area, as in ``nodal_area``.
         nodal_area: Tributary area of the nodes in contact [mm²].
@@ -89,8 +89,8 @@ class ContactState:
     linear_iterations: int = 0
     residuals: Array = field(default_factory=_no_numbers)
     reason: str = ""
-    closure: Array = field(default_factory=_no_numbers)
-    pressure: Array = field(default_factory=_no_numbers)
+    sample_closure: Array = field(default_factory=_no_numbers)
+    sample_pressure: Array = field(default_factory=_no_numbers)
     patch_area: Array = field(default_factory=_no_numbers)
     nodal_area: float = 0.0
     nodes: int = 0

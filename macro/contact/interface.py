@@ -91,8 +91,10 @@ class Interface:
     area = _result("contact_area", "Real contact area [mm²]; None where a law does not know it.")
     patch_pressure = _result("patch_pressure", "Mean pressures of the patches, shape (N,) [MPa].")
     patch_closure = _result("patch_closure", "Mean closures of the patches, shape (N,) [mm].")
-    closure = _result("closure", "Closures of this rank's samples, patches or points, (n,) [mm].")
-    pressure = _result("pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
+    closure = _result(
+        "sample_closure", "Closures of this rank's samples, patches or points, (n,) [mm]."
+    )
+    pressure = _result("sample_pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
     plane = _result("plane", "The plane, also where it follows from loads, about the middle.")
 
     def __init__(

@@ -75,7 +75,7 @@ class EmbeddedCoupling:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
         if self._last is None:
             raise ValueError("no load step has been accepted yet")
-        pressure, face = self._last.pressure, self.face
+        pressure, face = self._last.sample_pressure, self.face
         if not hasattr(face, "on_both"):
             return pressure
         whole = np.zeros(len(face.on_both))
