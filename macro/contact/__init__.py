@@ -6,7 +6,7 @@
     ContactProblem              laws in a user's own variational problem     `contact_problem`
       └ Interface               laws on a face, as a term of its equations   `interface`
       └ UserEquations           residual and tangent of both                 `user_equations`
-    UnilateralContactProblem    no penetration of a rough top                `unilateral_problem`
+    UnilateralContactProblem    no interference with a rough top           `unilateral_problem`
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 

@@ -1,15 +1,15 @@
 """Contact at the nodes of a rough top by a primal-dual active set.
 
 The nodal displacements u minimise the elastic energy under d ≤ 0 at the nodes of the top, where d
-is the penetration of a node into the plane. With the nodal contact forces λ = −(K u)_z the
+is the interference of a node and the plane. With the nodal contact forces λ = −(K u)_z the
 conditions are
 
-    d ≤ 0,   λ ≥ 0,   λ d = 0:    no penetration, no tension, force in contact alone.
+    d ≤ 0,   λ ≥ 0,   λ d = 0:    no interference, no tension, force in contact alone.
 
 The active set is the set of nodes in contact. Each iteration solves for the block with d = 0 on the
-active set, removes the nodes in tension and adds those that penetrate (Hintermüller, Ito & Kunisch
-2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate at the
-end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
+active set, removes the nodes in tension and adds those behind the plane (Hintermüller, Ito &
+Kunisch 2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate
+at the end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
 move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
 contact, corrected near the active nodes.
 
@@ -47,7 +47,7 @@ _CLOSED = 1e-8
 """Gap relative to the largest displacement below which a node counts as touching."""
 
 _ROUNDING = 1e-15
-"""Penetration relative to the block's size that is rounding."""
+"""Interference relative to the block's size that is rounding."""
 
 _SOFT = 8.0
 """Stiffness of the springs under a plane without support: E* times this over the block's width."""
@@ -200,7 +200,7 @@ class PrimalDualActiveSet:
         return spent, allowed
 
     def _converged(self, now: _Iterate, sets: int, spent: int) -> ContactSolution:
-        """Remove the last penetrations."""
+        """Remove the last interferences."""
         depth = self._depth(now)
         removed = np.where(now.active, depth, np.maximum(depth, 0.0))
         now.displacement.array[self._top.dofs] -= removed
@@ -224,7 +224,7 @@ class PrimalDualActiveSet:
         self._residual.scale(-1.0)
 
     def _depth(self, now: _Iterate) -> Array:
-        return self._plane.penetration(now.plane, -now.displacement.array_r[self._top.dofs])
+        return self._plane.interference(now.plane, -now.displacement.array_r[self._top.dofs])
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""

@@ -1,11 +1,11 @@
 """Contact at the quadrature points of a rough top by an augmented Lagrangian.
 
-With d the penetration of a point into the plane and k a stiffness, the pressures are
+With d the interference of a point and the plane and k a stiffness, the pressures are
 
     p = ⟨p₀ + k d⟩,   ⟨·⟩ the positive part.
 
-The pressures of one solve are the multipliers p₀ of the next, until no point in contact penetrates
-(Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
+The pressures of one solve are the multipliers p₀ of the next, until no point in contact is behind
+the plane (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
 with line search finds the equilibrium.
 
 Theory: section 12 of ``docs/theory.md``.
@@ -41,8 +41,8 @@ _SPARE = 0.3
 _MOST_STEPS = 60
 """Newton steps of an equilibrium."""
 
-PENETRATION = {1: 1e-8, 2: 1e-5}
-"""Largest penetration of quadrature points, and largest gap of those under pressure, relative to
+INTERFERENCE = {1: 1e-8, 2: 1e-5}
+"""Largest interference of quadrature points, and largest gap of those under pressure, relative to
 the largest displacement, by the element's degree. On quadratic facets the conditions of
 neighbouring points are nearly dependent, and multipliers that share a load converge slowly."""
 
@@ -53,7 +53,7 @@ _HARDER, _HARDEST = 10.0, 10.0
 """Factor of k between updates, and its largest factor beyond the usual one."""
 
 _FALL = 0.1
-"""Factor by which an update must reduce the penetration; otherwise k grows."""
+"""Factor by which an update must reduce the interference; otherwise k grows."""
 
 _MOST_UPDATES = 40
 _NO_FORCE = 1e-6
@@ -88,7 +88,7 @@ class AugmentedLagrangian:
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
         self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
-        self._penetration = PENETRATION[body.degree]
+        self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
         self._forces = ContactForces(loaded, sampling, [self.law], none)
@@ -123,9 +123,9 @@ class AugmentedLagrangian:
             more, cycles = self._balance(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = forces.closure(displacement)
-            # penetration of points without pressure, penetration or gap of points under pressure
+            # interference of points without pressure, interference or gap of points under pressure
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
-            allowed = self._penetration * largest(displacement.array_r, comm)
+            allowed = self._interference * largest(displacement.array_r, comm)
             ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(comm.allreduce(hard, op=MPI.LAND))
@@ -137,7 +137,7 @@ class AugmentedLagrangian:
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             if hard:
-                near = min(0.1 * tolerance, _SPARE * self._penetration * ratio)
+                near = min(0.1 * tolerance, _SPARE * self._interference * ratio)
                 tolerance = max(self._tolerance, near)
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
 
@@ -210,12 +210,12 @@ class AugmentedLagrangian:
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
-        gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
+        gap = -self._plane.interference(plane, -displacement.array_r[self._top.dofs])
         comm = self._body.comm
         pressed = largest(nodal_force, comm)
         touching = nodal_force > _NO_FORCE * pressed
         if pressed:
-            touching |= gap < self._penetration * largest(displacement.array_r, comm)
+            touching |= gap < self._interference * largest(displacement.array_r, comm)
         return ContactSolution(
             end=Guess(plane, displacement.array_r.copy(), pressure),
             nodal_force=nodal_force,

@@ -165,7 +165,7 @@ class PlaneOverNodes:
             plane[0] = self.levers.first_touch(self.distance, plane[1:])
         return plane
 
-    def penetration(self, plane: Array, displacement: Array) -> Array:
+    def interference(self, plane: Array, displacement: Array) -> Array:
         """Return how far the plane is below the nodes, negative where it is above, (n,) [mm].
 
         Args:
@@ -206,7 +206,7 @@ class PlaneOverNodes:
         """
 
         def respond(plane: Array) -> PlaneResponse[None]:
-            depth = self.penetration(plane, displacement)
+            depth = self.interference(plane, displacement)
             return PlaneResponse(
                 loads=self.levers.loads(stiffness * np.maximum(depth, 0.0)),
                 stiffness=lambda: self.levers.stiffness(np.where(depth > 0.0, stiffness, 0.0)),

@@ -33,7 +33,8 @@ class UnilateralContactProblem:
         body: A block whose top is rough, or the rough face of any body.
         reference_height: Height of the highest point above the plane of the face's frame, from
             which the approach counts [mm].
-        method: ``"active-set"``: no node of the top penetrates; ``"augmented-lagrangian"``: no
+        method: ``"active-set"``: no node of the top lies behind
+            the plane; ``"augmented-lagrangian"``: no
             quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
 
@@ -104,7 +105,7 @@ class UnilateralContactProblem:
         displacement = body.stiffness.createVecRight()
         displacement.array[:] = moved
         downward = -moved[top.dofs]
-        gap = -self._plane.penetration(plane, downward)
+        gap = -self._plane.interference(plane, downward)
         loads = self._plane.levers.loads(solution.nodal_force)
         tilted = (top.patches.centres - self._plane.centre) @ plane[1:]
         nodal_force, touching = np.maximum(solution.nodal_force, 0.0), solution.touching

@@ -24,12 +24,12 @@ class AugmentedLaw:
 
     Args:
         distance: Distances d₀ of the points from the plane at no approach and no tilt, shape (n,)
-            [mm]; the penetration d is the closure minus d₀.
+            [mm]; the interference d is the closure minus d₀.
 
     Attributes:
         distance: As given.
         slope: Stiffness k of the points, shape (n,) [MPa/mm].
-        multiplier: Pressures p₀ at no penetration, shape (n,) [MPa].
+        multiplier: Pressures p₀ at no interference, shape (n,) [MPa].
     """
 
     def __init__(self, distance: Array) -> None:

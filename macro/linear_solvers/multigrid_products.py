@@ -174,10 +174,10 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
 
 @contextmanager
 def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
-    """Lend this rank's rows of a matrix of PETSc's type ``baij`` without copying entries.
+    """Yield this rank's rows of a matrix of PETSc's type ``baij`` without copying entries.
 
     Args:
-        matrix: Assembled, block size 3; must not change while it is lent.
+        matrix: Assembled, block size 3; must not change inside the context.
 
     Raises:
         PETSc.Error: When the matrix is of another type.
@@ -197,7 +197,7 @@ def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
 
 @contextmanager
 def _sequential(matrix: ctypes.c_void_p, columns: int | None) -> Iterator[sparse.bsr_matrix]:
-    """Lend the blocks of a ``seqbaij`` matrix; None takes its number of columns from itself."""
+    """Yield the blocks of a ``seqbaij`` matrix; None takes its number of columns from itself."""
     integer = np.ctypeslib.as_ctypes_type(PETSc.IntType)
     count, width, done = integer(), integer(), ctypes.c_int(0)
     rows, places, entries = map(_pointer, (PETSc.IntType, PETSc.IntType, np.float64))
