@@ -9,9 +9,9 @@ conditions are
 The active set is the set of nodes in contact. Each iteration solves for the block with d = 0 on the
 active set, removes the nodes in tension and adds those behind the plane (Hintermüller, Ito &
 Kunisch 2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate
-at the end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
-move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
-contact, corrected near the active nodes.
+at the end. Free motions of the plane are unknowns of the same linear solves, in which the active
+nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
+without contact, corrected near the active nodes.
 
 Theory: section 12 of ``docs/theory.md``.
 """

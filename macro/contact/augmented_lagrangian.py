@@ -5,8 +5,8 @@ With d the interference of a point and the plane and k a stiffness, the pressure
     p = ⟨p₀ + k d⟩,   ⟨·⟩ the positive part.
 
 The pressures of one solve are the multipliers p₀ of the next, until no point in contact is behind
-the plane (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
-with line search finds the equilibrium.
+the plane (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised
+Newton's method with line search finds the equilibrium.
 
 Theory: section 12 of ``docs/theory.md``.
 """

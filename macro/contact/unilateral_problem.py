@@ -33,9 +33,8 @@ class UnilateralContactProblem:
         body: A block whose top is rough, or the rough face of any body.
         reference_height: Height of the highest point above the plane of the face's frame, from
             which the approach counts [mm].
-        method: ``"active-set"``: no node of the top lies behind
-            the plane; ``"augmented-lagrangian"``: no
-            quadrature point of its facets does.
+        method: ``"active-set"``: no node of the top lies behind the plane;
+            ``"augmented-lagrangian"``: no quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
 
     Attributes:

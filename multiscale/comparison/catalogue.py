@@ -28,18 +28,13 @@ from multiscale.comparison.scene_content import (
     pressure_grid,
     scaled,
 )
-from multiscale.planning.problem_setup import make_setup
-from multiscale.planning.work import work_of
+from multiscale.couplings.coupling import Coupling
+from multiscale.inputs.block import LAW_BLOCK_CELLS, block_section
+from multiscale.inputs.loads import load_history_on, patch_grid
+from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.surfaces import make_surface
 from multiscale.scene.scene import Scene
-from multiscale.setup.memory import MemoryLacking
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import (
-    LAW_BLOCK_CELLS,
-    block_section,
-    load_history_on,
-    make_surface,
-    patch_grid,
-)
+from multiscale.setup import make_setup
 from support.errors import InputError, NotConverged
 
 LAW_HEIGHTS = 128
@@ -68,7 +63,7 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
         InputError: When the surface cannot be read.
     """
     found: dict[str, Configuration] = {}
-    setups: dict[str, ProblemSetup] = {}
+    setups: dict[str, Coupling] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
     for proposal in _Catalogue(scene).proposals():
         one = _allowed(proposal, setups)
@@ -78,7 +73,7 @@ def configurations(scene: Scene, ranks: int = 1) -> tuple[Configuration, ...]:
     return tuple(sorted(found.values(), key=lambda one: one.cost))
 
 
-def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Configuration | None:
+def _allowed(proposal: Configuration, setups: dict[str, Coupling]) -> Configuration | None:
     """Return a configuration with all its keys and its cost; None when its scene is refused.
 
     A reference that does not fit into the memory stays, with the reason.
@@ -90,7 +85,7 @@ def _allowed(proposal: Configuration, setups: dict[str, ProblemSetup]) -> Config
     cost, refusal, surface = float("inf"), "", json.dumps(proposal.content["surface"])
     try:
         setup = make_setup(proposal.scene, like=setups.get(surface))
-        cost = work_of(setup).computing
+        cost = setup.work().computing
         setups.setdefault(surface, setup)
     except (InputError, NotConverged) as error:
         if proposal.kind != "reference" or not isinstance(error, MemoryLacking):

@@ -10,16 +10,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.comparison import AGAINST
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.comparison import Comparison, compared
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 from multiscale.comparison.launch import check_launchable, launch_process
-from multiscale.planning.auto_keys import auto_keys, is_measured, resolved_sections, with_resolved
-from multiscale.planning.problem_setup import make_setup
 from multiscale.readable import duration
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
 from support.checked_store import read_record, write_record
 from support.errors import InputError
 

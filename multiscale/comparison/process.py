@@ -116,10 +116,10 @@ def run_here(configuration: Configuration, comm: Any = None) -> RunResult:
         return result
     return replace(
         result,
-        phases=run.times,
+        phases=run.clock.times,
         unknowns=run.unknowns,
         curves=_curves(run.history(), configuration.scale),
-        finite_slopes=configuration.kind == "reference" or run.setup.finite_slopes,
+        finite_slopes=configuration.kind == "reference" or run.coupling.finite_slopes,
     )
 
 

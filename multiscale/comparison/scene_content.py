@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, TypeAlias
 
+from multiscale.inputs.loads import patch_grid
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import patch_grid
 
 Content: TypeAlias = dict[str, Any]
 Grid: TypeAlias = tuple[int, int]

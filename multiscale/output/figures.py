@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from multiscale.couplings.coupling import Coupling
 from multiscale.figures.block import block_figure
 from multiscale.figures.contact import draw_contact
 from multiscale.figures.maps import colour_bar, draw_pressures, map_axes, place_colours
@@ -30,7 +31,6 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.readable import quantity, usual_unit
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.setup.problem import ProblemSetup
 
 MOST_POINTS = 40_000
 """Points of a face that are drawn at most."""
@@ -39,15 +39,14 @@ MOST_MARKED_LAWS = 36
 """Laws whose rows are marked; the dots of more would hide the curves."""
 
 
-def surface_figure_of(setup: ProblemSetup) -> Figure:
+def surface_figure_of(coupling: Coupling) -> Figure:
     """Draw the surface of a scene, with its summits where the micro model uses them.
 
     Args:
-        setup: The problem set up from the scene.
+        coupling: What was made of the scene.
     """
-    summits = setup.asperities if setup.uses_summits else None
-    target = setup.scene.surface.spectrum
-    return surface_figure(setup.surface, summits, setup.patches, target)
+    target = coupling.scene.surface.spectrum
+    return surface_figure(coupling.surface, coupling.summits, coupling.patches, target)
 
 
 @styled()
@@ -70,19 +69,19 @@ def load_text(step: LoadStep) -> str:
 
 @styled()
 def overview_figure(
-    setup: ProblemSetup, history: History, face: NDArray[np.float64] | None
+    coupling: Coupling, history: History, face: NDArray[np.float64] | None
 ) -> Figure:
     """Draw the surface beside the pressures on it: of cells, spots, the face or patches.
 
     Args:
-        setup: The problem set up from the scene.
+        coupling: What was made of the scene.
         history: The load steps.
         face: Pressures on a face with laws of samples, see `face_figure`; None without.
     """
     figure = new_figure(FULL_WIDTH, 2.8)
     left, right = figure.subplots(1, 2)
-    draw_surface(left, setup.surface, None)
-    left.set_title("surface" + " of a sample" * bool(setup.samples))
+    draw_surface(left, coupling.surface, None)
+    left.set_title("surface" + " of a sample" * (coupling.regions is not None))
     record, last = history.contact, history.steps[-1]
     if record is not None:
         draw_contact(right, record)
@@ -138,11 +137,11 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
     colour_bar(dots, axes, f"contact pressure [{name}]")
 
 
-def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
+def block_figure_of(coupling: Coupling, record: ContactRecord) -> Figure:
     """Draw the block of a scene in three dimensions, with the contact of a load step.
 
     Args:
-        setup: The problem set up from the scene.
+        coupling: What was made of the scene.
         record: The contact, with the pressures of the surface's cells.
     """
     pressure = np.asarray(record.pressure_MPa)
@@ -150,8 +149,8 @@ def block_figure_of(setup: ProblemSetup, record: ContactRecord) -> Figure:
         f"load step {record.step}: approach {quantity(record.approach_mm, 'mm')}, "
         f"force {quantity(record.force_N, 'N')}, {len(record.spots)} spots"
     )
-    poisson_ratio = setup.materials.first.poisson_ratio
-    return block_figure(setup.surface, pressure, poisson_ratio, title=title)
+    poisson_ratio = coupling.materials.first.poisson_ratio
+    return block_figure(coupling.surface, pressure, poisson_ratio, title=title)
 
 
 @styled()

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.couplings.law_couplings import EmbeddedCoupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
@@ -55,11 +54,11 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     drawn: list[Pictures] = []
     if run.scene.output.figures and run.steps:
-        names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
-        face = _face_pressures(run)
+        names = ["overview", "surface", "curves"] + ["pressures"] * (run.coupling.regions is None)
+        face = run.coupling.face_pressures()
         names += ["face"] * (face is not None)
         names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
-        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
+        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.coupling.table is not None)
         with run.phase("output"):
             drawn = shared(
                 run.comm,
@@ -145,7 +144,7 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
 def has_block_figure(run: Run) -> bool:
     """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
     pressure = run.contacts[-1].pressure_MPa if run.contacts else None
-    return pressure is not None and pressure.shape == run.setup.surface.grid
+    return pressure is not None and pressure.shape == run.coupling.surface.grid
 
 
 class Pictures(NamedTuple):
@@ -192,26 +191,19 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
     return [write_bytes(folder / name, content) for name, content in pictures.items()]
 
 
-def _face_pressures(run: Run) -> NDArray[np.float64] | None:
-    """Return the pressures at the points of a face with laws of samples, where they are known."""
-    if run.setup.samples and isinstance(run.coupling, EmbeddedCoupling):
-        return run.coupling.face_pressures()
-    return None
-
-
 def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
     """Draw one figure; matplotlib is loaded only by ranks that draw."""
     from multiscale.output import figures
 
-    setup = run.setup
+    coupling = run.coupling
     if name == "overview":
-        return figures.overview_figure(setup, run.history(), face)
+        return figures.overview_figure(coupling, run.history(), face)
     if name == "surface":
-        return figures.surface_figure_of(setup)
+        return figures.surface_figure_of(coupling)
     if name == "curves":
         return run.history().plot(run.scene.kind)
     if name == "block":
-        return figures.block_figure_of(setup, run.contacts[-1])
+        return figures.block_figure_of(coupling, run.contacts[-1])
     if name == "contact":
         return run.contacts[-1].plot()
     if name == "face" and face is not None:

@@ -9,14 +9,14 @@ import pytest
 
 from geometry.patches import PatchGrid
 from micro import MODEL_NAMES
+from multiscale.auto.keys import auto_keys
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.compare import resolved_scene
 from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.comparison.measure import ranked, refinements
 from multiscale.comparison.scene_content import SMALL_SLOPES, pressure_grid
-from multiscale.planning.auto_keys import auto_keys
+from multiscale.inputs.block import LAW_BLOCK_CELLS
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS
 
 COLUMNS = (
     "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
