@@ -24,8 +24,8 @@ from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_csv, write_text
 from support.errors import InputError, NotConverged
+from support.whole_files import write_csv, write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -16,13 +16,13 @@ from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures
 from multiscale.restart.results_folder import locked
-from multiscale.storage import remove, write_csv
 from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
 from multiscale.sweeps.journal import CaseResult
 from multiscale.sweeps.sweep import JOURNAL, part_name, sweep
 from multiscale.sweeps.sweep_results import SweepResults
 from support.collective import on_root
 from support.errors import InputError, NotConverged
+from support.whole_files import remove, write_csv
 
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""

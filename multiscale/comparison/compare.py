@@ -127,7 +127,7 @@ def resolved_scene(scene: Scene, folder: Path) -> Scene:
         return scene
     path, given, values = folder / AUTO_VALUES, identity(scene), None
     with suppress(OSError, InputError):
-        then, stored = read_record(path.read_bytes()).facts
+        then, stored = read_record(path.read_bytes())
         values = stored if then == given else None
     if values is None:
         values = resolved_sections(make_setup(scene), scene)

@@ -210,6 +210,6 @@ def read_result(path: Path) -> RunResult | None:
         path: The file.
     """
     try:
-        return _RESULTS.validate_python(read_record(path.read_bytes()).facts)
+        return _RESULTS.validate_python(read_record(path.read_bytes()))
     except (OSError, ValueError, PatchlawError):
         return None

@@ -11,8 +11,7 @@ from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts
 from multiscale.exports.tables import csv_text
 from multiscale.laws.law_table import LawTable
-from multiscale.storage import remove, write_text
-from support.whole_files import written
+from support.whole_files import remove, write_text, written
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

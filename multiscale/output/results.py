@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from multiscale.laws.law_file import write_laws
+from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 from support.collective import on_root, shared
 from support.errors import NotInstalled
 from support.packages import optional_packages
-from support.whole_files import write_bytes, write_whole, written
+from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,17 +52,9 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     drawn: list[Pictures] = []
     if run.scene.output.figures and run.steps:
-        names = ["overview", "surface", "curves"] + ["pressures"] * (run.coupling.regions is None)
-        face = run.coupling.face_pressures()
-        names += ["face"] * (face is not None)
-        names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
-        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.coupling.table is not None)
+        figures = list(_figures(run).items())
         with run.phase("output"):
-            drawn = shared(
-                run.comm,
-                len(names),
-                lambda index: pictures_of(names[index], lambda: _figure(run, names[index], face)),
-            )
+            drawn = shared(run.comm, len(figures), lambda index: pictures_of(*figures[index]))
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = {name: content for one in drawn for name, content in one.files.items()}
     with run.phase("writing"):
@@ -78,9 +68,10 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     history, table = run.history(), run.laws
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
-        files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
+        files.append(write_laws(folder / "laws.h5", table))
     files += write_pictures(folder, pictures)
-    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
+    content = json.dumps(provenance(run, options=options), indent=2)
+    files.append(write_text(folder / "provenance.json", content + "\n"))
     if run.scene.output.report:
         files.append(
             write_text(folder / "report.html", report_html(run, pictures, options=options))
@@ -137,14 +128,8 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
                     group.create_dataset(name, data=data, compression=_COMPRESSION)
 
     if contacts[0].pressure_MPa is not None:
-        files.append(write_bytes(folder / "contact.h5", checksummed(fill)))
+        files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
-
-
-def has_block_figure(run: Run) -> bool:
-    """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
-    pressure = run.contacts[-1].pressure_MPa if run.contacts else None
-    return pressure is not None and pressure.shape == run.coupling.surface.grid
 
 
 class Pictures(NamedTuple):
@@ -191,24 +176,30 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
     return [write_bytes(folder / name, content) for name, content in pictures.items()]
 
 
-def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
-    """Draw one figure; matplotlib is loaded only by ranks that draw."""
-    from multiscale.output import figures
+def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
+    """Return what draws each figure of a run; matplotlib is loaded only by ranks that draw."""
+    coupling, history, laws = run.coupling, run.history(), run.laws
+    face = coupling.face_pressures()
 
-    coupling = run.coupling
-    if name == "overview":
-        return figures.overview_figure(coupling, run.history(), face)
-    if name == "surface":
-        return figures.surface_figure_of(coupling)
-    if name == "curves":
-        return run.history().plot(run.scene.kind)
-    if name == "block":
-        return figures.block_figure_of(coupling, run.contacts[-1])
-    if name == "contact":
-        return run.contacts[-1].plot()
-    if name == "face" and face is not None:
-        return figures.face_figure(face, run.history().steps[-1])
-    if name == "pressures":
-        return figures.pressure_figure(run.history())
-    assert run.laws is not None
-    return figures.law_figure(run.laws)
+    def by(name: str, *content: Any) -> Callable[[], Figure]:
+        """Draw by a function of `multiscale.output.figures`."""
+        return lambda: getattr(import_module("multiscale.output.figures"), name)(*content)
+
+    figures = {
+        "overview": by("overview_figure", coupling, history, face),
+        "surface": by("surface_figure_of", coupling),
+        "curves": lambda: history.plot(run.scene.kind),
+    }
+    if coupling.regions is None:
+        figures["pressures"] = by("pressure_figure", history)
+    if face is not None:
+        figures["face"] = by("face_figure", face, history.steps[-1])
+    if run.contacts:
+        contact = run.contacts[-1]
+        figures["contact"] = contact.plot
+        of_cells = getattr(contact.pressure_MPa, "shape", None) == coupling.surface.grid
+        if run.scene.output.figures == "all" and of_cells:
+            figures["block"] = by("block_figure_of", coupling, contact)
+    if laws is not None:
+        figures["laws"] = by("law_figure", laws)
+    return figures

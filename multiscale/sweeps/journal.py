@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.scene.identity import changes, told
-from support.checked_store import START, Record, append, end_of, unsealed
+from support.checked_store import START, append, end_of, unsealed
 from support.errors import InputError
 from support.whole_files import written
 
@@ -63,10 +63,10 @@ class Journal:
 
     def _results(self, path: Path) -> Iterator[CaseResult]:
         try:
-            for record, mark in unsealed(path.read_bytes()):
+            for value, mark in unsealed(path.read_bytes()):
                 if mark.records > 1:
-                    yield CaseResult(**record.facts)
-                elif found := list(changes(self._identity, record.facts)):
+                    yield CaseResult(**value)
+                elif found := list(changes(self._identity, value)):
                     raise InputError(
                         f"holds the cases of another scene, where {told(found)}", key="--out",
                         value=str(path.parents[2]), allowed="another folder, or --overwrite",
@@ -99,7 +99,7 @@ class Journal:
 
         def store(result: CaseResult) -> None:
             nonlocal mark
-            head = [Record(self._identity)] if mark == START else []
-            mark = append(path, [*head, Record(asdict(result))], mark)
+            head = [self._identity] if mark == START else []
+            mark = append(path, [*head, asdict(result)], mark)
 
         yield store

@@ -14,8 +14,8 @@ from multiscale.comparison import AGAINST
 from multiscale.comparison.compare import compare
 from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.scene.scene import Scene
-from multiscale.storage import write_csv
 from support.errors import InputError, NotConverged
+from support.whole_files import write_csv
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)
