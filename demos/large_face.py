@@ -86,13 +86,13 @@ print("| force [N] | α | effective radius over Hertz' | middle line over Hertz'
 print("|---|---|---|---|---|")
 for force in FORCES:
     state = problem.solve(Control(force=force))
-    line = state.pressure * FACE  # force per length [N/mm]
+    line = state.patch_pressure * FACE  # force per length [N/mm]
     hertz = (0.75 * force * RADIUS / STEEL.contact_modulus) ** (1 / 3)
     alpha = ROUGHNESS * RADIUS / hertz**2
     middle = 0.75 * force / hertz  # of Hertz' parabola; its radius is (3/4) force / middle
     ratio = line[CELLS // 2] / middle
     found.append((force, alpha, hertz, middle, line))
-    steps = state.newton_iterations
+    steps = state.iterations
     print(f"| {force:g} | {alpha:.3f} | {1 / ratio:.3f} | {ratio:.3f} | {steps} |")
 
 # %%

@@ -1,7 +1,7 @@
 """Elastic bodies in dolfinx, in contact with a rigid plane or with each other.
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → LawContactState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → ContactState for every load step.
 A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block;
 TaggedMesh → write_mesh → a file that ranks read in parts.
 
@@ -10,40 +10,31 @@ TaggedMesh → write_mesh → a file that ranks read in parts.
 """
 
 from geometry.materials import Material
-from macro.block import Block
-from macro.body_pair import BodyPair
+from macro.bodies import Block, MeshedBody
 from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
+from macro.contact.contact_state import ContactState
 from macro.contact.face_pair import FacePair
-from macro.contact.face_regions import FaceRegions
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
-from macro.contact.law_problem import LawContactProblem, LawContactState
-from macro.contact.loaded_face import (
-    LoadedFace,
-    displacements_under,
-    patch_compliance_matrix,
-)
+from macro.contact.law_problem import LawContactProblem
+from macro.contact.loaded_face import LoadedFace, displacements_under, patch_compliance_matrix
 from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
-    UnilateralContactState,
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
 from macro.fields import AtPoints, write_fields, write_rough_fields
-from macro.mesh.block import BOTTOM, SIDES, TOP, BlockMesh, block_mesh
+from macro.mesh.block import BOTTOM, SIDES, TOP, block_mesh, stepped_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import PlanarFace, planar_face
-from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
-from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
-from macro.mesh.supports import check_supports
-from macro.mesh.tagged import TaggedMesh
-from macro.mesh.to_file import write_mesh
-from macro.meshed_body import MeshedBody, Support, Traction
+from macro.mesh.rough_surface import MeshQuality, rough_block_mesh, rough_stepped_mesh
+from macro.mesh.supports import Support, Traction, check_supports
+from macro.mesh.tagged import TaggedMesh, planar_face
+from macro.mesh.xdmf import write_mesh
 
 __all__ = [
     "BOTTOM",
@@ -51,31 +42,26 @@ __all__ = [
     "TOP",
     "AtPoints",
     "Block",
-    "BlockMesh",
-    "BodyPair",
     "ContactFacets",
     "ContactLaw",
     "ContactProblem",
+    "ContactState",
     "ElasticBody",
     "FaceCompliance",
     "FacePair",
-    "FaceRegions",
     "Interface",
     "LawContactProblem",
-    "LawContactState",
     "LawOperator",
     "LawsAtPoints",
     "LoadedFace",
     "Material",
     "MeshQuality",
     "MeshedBody",
-    "PlanarFace",
     "RoughFace",
     "Support",
     "TaggedMesh",
     "Traction",
     "UnilateralContactProblem",
-    "UnilateralContactState",
     "block_mesh",
     "check_supports",
     "contact_facets",

@@ -135,11 +135,11 @@ class _Halves:
     def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x."""
         parts = slice(None, self._count), slice(self._count, None)
-        for operate, part, (given, found) in zip(
+        for operate, part, (given, result) in zip(
             self._operators, parts, self._vectors, strict=True
         ):
             given.array[:] = x.array_r[part]
-            operate(given, found)
-            y.array[part] = found.array_r
+            operate(given, result)
+            y.array[part] = result.array_r
 
     mult = multTranspose = apply

@@ -32,6 +32,9 @@ _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compi
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
+_ROUNDING = 1e-12
+"""Value of a basis function that is rounding."""
+
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -200,6 +203,31 @@ def scalar_space(
     return (fem.TensorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
 
 
+def cell_constant(mesh: Any, values: Any, name: str | None = None) -> Any:
+    """Return a function that is constant on every cell.
+
+    Args:
+        mesh: dolfinx mesh.
+        values: The values of this rank's cells, ghosts included, shape (cells, …).
+        name: Name of the function in files.
+    """
+    space = scalar_space(mesh, 0, "DG", shape=np.shape(values)[1:])
+    function = fem.Function(space, name=name)
+    rows = cell_nodes(space)[:, 0]
+    function.x.array.reshape(len(rows), -1)[rows] = np.reshape(values, (len(rows), -1))
+    return function
+
+
+def is_hexahedral(mesh: Any) -> bool:
+    """Tell whether the cells of a mesh are hexahedra; else they are tetrahedra."""
+    return bool(mesh.topology.cell_name() == "hexahedron")
+
+
+def geometry_degree(mesh: Any) -> int:
+    """Return the degree of the shape of a mesh's cells: 2 where edges can be curved."""
+    return 2 if cell_vertices(mesh).shape[1] in (10, 27) else 1
+
+
 def cell_nodes(space: Any) -> NDArray[np.int32]:
     """Return the rank-local nodes of every rank-local cell, shape (cells, nodes per cell)."""
     table = space.dofmap.list
@@ -249,6 +277,8 @@ def cell_vertices(mesh: Any) -> NDArray[np.int32]:
 def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) -> NDArray:
     """Tabulate the scalar Lagrange basis on the reference cell, shape (points, nodes).
 
+    Nodes that are not on the facet of a point have exact zeros there.
+
     Args:
         cell_name: Name of the cell, such as ``hexahedron``.
         degree: Polynomial degree.
@@ -257,7 +287,8 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     element = _lagrange(cell_name, degree)
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
-    return element.tabulate(0, points)[0].reshape(len(points), -1)
+    values = element.tabulate(0, points)[0].reshape(len(points), -1)
+    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
 
 
 def lagrange_gradients(
@@ -342,6 +373,20 @@ def assemble_vector(form: Any) -> PETSc.Vec:
 def petsc_vector(function: Any) -> PETSc.Vec:
     """Return PETSc's view of a function, ghosts included."""
     return function.x.petsc_vec if hasattr(function.x, "petsc_vec") else function.vector
+
+
+def sum_of_ranks(space: Any, values: NDArray[Any]) -> NDArray[np.float64]:
+    """Return the sums of all ranks' values at this rank's degrees of freedom of a space.
+
+    Args:
+        space: The space.
+        values: This rank's values, those of ghosts included.
+    """
+    function = fem.Function(space)
+    function.x.array[:] = values
+    vector = petsc_vector(function)
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return np.array(vector.array_r[: vector.local_size])
 
 
 def assemble_matrix_into(matrix: PETSc.Mat, form: Any, conditions: Sequence[Any]) -> None:

@@ -6,19 +6,45 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import ufl
 from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro import compat
-from macro.elasticity import rigid_body_modes
-from macro.linear_solvers.options import PREFIX, solve_linear
+from macro.elasticity import rigid_body_modes, stiffness_form
+from macro.linear_solvers.multigrid import Lattice
+from macro.linear_solvers.node_matrices import Stiffened
+from macro.linear_solvers.options import PREFIX
+from macro.linear_solvers.selection import body_solver
+from macro.linear_solvers.solvers import solve_linear
+from macro.mesh.supports import Traction
 
 Array = NDArray[np.float64]
+
+
+class Held(NamedTuple):
+    """A displacement component that supports prescribe at some nodes.
+
+    Attributes:
+        axis: The component: 0, 1 or 2.
+        nodes: This rank's nodes, ghosts included, shape (n,).
+        value: The displacement [mm].
+    """
+
+    axis: int
+    nodes: NDArray[np.int32]
+    value: float = 0.0
+
+    @property
+    def dofs(self) -> NDArray[np.int32]:
+        """The degrees of freedom, shape (n,)."""
+        return (3 * self.nodes + self.axis).astype(np.int32)
 
 
 class ElasticBody(ABC):
@@ -28,12 +54,16 @@ class ElasticBody(ABC):
 
     Attributes:
         mesh: Its dolfinx mesh as ``mesh.mesh``, and ``mesh.facet_tags``.
+        normal: Direction out of the contact face, along which `reaction` is taken, shape (3,).
+        tractions: Loaded surfaces, beside the contact.
 
     Note:
         Everything is collective over the communicator of the mesh.
     """
 
     mesh: Any
+    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    tractions: Sequence[Traction] = ()
 
     @property
     @abstractmethod
@@ -42,38 +72,27 @@ class ElasticBody(ABC):
 
     @property
     @abstractmethod
-    def form(self) -> Any:
-        """Bilinear form of the stiffness, as UFL."""
-
-    @property
-    @abstractmethod
-    def conditions(self) -> list[Any]:
-        """Dirichlet conditions of the supports."""
-
-    @property
-    @abstractmethod
-    def solver(self) -> PETSc.KSP:
-        """Linear solver of the body alone; its preconditioner also serves the contact solves."""
+    def poisson_ratio(self) -> float:
+        """Largest Poisson's ratio in the body."""
 
     @property
     @abstractmethod
     def cell_lame(self) -> tuple[Any, Any]:
         """Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,) [MPa]."""
 
+    @property
     @abstractmethod
-    def reaction(self, displacement: PETSc.Vec) -> float:
-        """Return the force that the supports bear against contact pressures, from nodal residuals.
-
-        Args:
-            displacement: Owned degrees of freedom [mm].
-
-        Returns:
-            The force [N].
-        """
+    def held(self) -> list[Held]:
+        """What the supports prescribe."""
 
     @property
-    def preload(self) -> Array | None:
-        """Displacements without contact, this rank's owned ones [mm]; None where there are none."""
+    @abstractmethod
+    def linear(self) -> ElasticBody:
+        """The same body with linear displacements; for quadratic ones, made on first use."""
+
+    @property
+    def lattice(self) -> Lattice | None:
+        """The rectangular lattice of the nodes; None where they form none."""
         return None
 
     @property
@@ -89,7 +108,7 @@ class ElasticBody(ABC):
     @property
     def hexahedral(self) -> bool:
         """Whether the cells are hexahedra."""
-        return bool(self.mesh.mesh.topology.cell_name() == "hexahedron")
+        return compat.is_hexahedral(self.mesh.mesh)
 
     @property
     def dofs(self) -> int:
@@ -109,12 +128,27 @@ class ElasticBody(ABC):
         """
         return 2 * self.degree if self.hexahedral else 2 * (self.degree - 1)
 
-    def assembled(self, kind: str = "aij") -> PETSc.Mat:
-        """Return the stiffness matrix [N/mm] with unit rows for constrained degrees of freedom.
+    @cached_property
+    def form(self) -> Any:
+        """Bilinear form of the stiffness, as UFL."""
+        return stiffness_form(self.space, self.cell_lame, self.quadrature_degree)
 
-        Args:
-            kind: PETSc's type of the matrix.
+    @cached_property
+    def conditions(self) -> list[Any]:
+        """Dirichlet conditions of the supports; their values are those of the prescription."""
+        return [
+            fem.dirichletbc(PETSc.ScalarType(part.value), part.dofs, self.space.sub(part.axis))
+            for part in self.held
+        ]
+
+    @cached_property
+    def stiffness(self) -> PETSc.Mat:
+        """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom.
+
+        Lattices and quadratic elements have it in blocks of 3 × 3, which geometric multigrid takes:
+        0.74 instead of 1.05 kB an unknown on quadratic tetrahedra. Algebraic multigrid takes none.
         """
+        kind = "baij" if self.lattice or self.degree == 2 else "aij"
         matrix = compat.assemble_matrix(compat.compile_form(self.form), self.conditions, kind)
         if kind == "aij":
             matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
@@ -124,18 +158,19 @@ class ElasticBody(ABC):
         return matrix
 
     @cached_property
-    def stiffness(self) -> PETSc.Mat:
-        """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom.
+    def solver(self) -> PETSc.KSP:
+        """Linear solver of the body alone; its preconditioner also serves the contact solves."""
+        _ = self._held_row  # needs 70 bytes an unknown for a moment, which are free as yet
+        return self.solver_of()
 
-        Quadratic elements have it in blocks of 3 × 3, which geometric multigrid takes: 0.74 instead
-        of 1.05 kB an unknown on tetrahedra. Algebraic multigrid takes none.
+    def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
+        """Return a linear solver for the stiffness, and for what else holds the body.
+
+        Args:
+            stiffened: The stiffness with springs, which the preconditioner then knows; keep it as
+                long as the solver. None: no springs.
         """
-        return self.assembled("baij" if self.degree == 2 else "aij")
-
-    @property
-    @abstractmethod
-    def linear(self) -> ElasticBody:
-        """The same body with linear displacements; for quadratic ones, made on first use."""
+        return body_solver(self, stiffened)
 
     def solve(self, load: PETSc.Vec) -> Any:
         """Return the displacement under a nodal load.
@@ -169,8 +204,70 @@ class ElasticBody(ABC):
     def free(self) -> PETSc.Vec:
         """1 for free degrees of freedom, 0 for those that the supports constrain."""
         free = self.stiffness.createVecRight()
-        free.set(1.0)
-        for condition in self.conditions:
-            dofs, _ = condition.dof_indices()
-            free.array[dofs[dofs < self.owned_dofs]] = 0.0
+        free.array[:] = ~self.supported[: self.owned_dofs]
         return free
+
+    @cached_property
+    def supported(self) -> NDArray[np.bool_]:
+        """Which of this rank's degrees of freedom supports constrain, those of ghosts included."""
+        supported = np.zeros(3 * len(self.space.tabulate_dof_coordinates()), dtype=bool)
+        for part in self.held:
+            supported[part.dofs] = True
+        return supported
+
+    @cached_property
+    def preload(self) -> Array | None:
+        """Displacements without contact, this rank's owned ones [mm]; None where there are none.
+
+        They follow from tractions, and from supports that move.
+        """
+        moved = any(part.value for part in self.held)
+        if not moved and not self.tractions:
+            return None
+        prescribed = fem.Function(self.space)
+        for part in self.held:
+            prescribed.x.array[part.dofs] = part.value
+        load = self.stiffness.createVecRight()
+        if moved:
+            load.axpy(-1.0, self._product(prescribed))
+        if self.tractions:
+            load.axpy(1.0, self._traction_load())
+        load.pointwiseMult(load, self.free)
+        solution = self.stiffness.createVecRight()
+        solve_linear(self.solver, load, solution)
+        return np.asarray(solution.array_r + prescribed.x.array[: self.owned_dofs])
+
+    def reaction(self, displacement: PETSc.Vec) -> float:
+        """Return the force that the supports bear against contact pressures, from nodal residuals.
+
+        Args:
+            displacement: Owned degrees of freedom, without the preload [mm].
+
+        Returns:
+            The force along the normal of the contact face [N].
+        """
+        return float(self._held_row.dot(displacement))
+
+    @cached_property
+    def _held_row(self) -> PETSc.Vec:
+        """Sum of the unconstrained stiffness' rows of held displacements along the normal."""
+        lift = fem.Function(self.space)
+        for part in self.held:
+            lift.x.array[part.dofs] = self.normal[part.axis]
+        return self._product(lift)
+
+    def _product(self, function: Any) -> PETSc.Vec:
+        """Return the product of the unconstrained stiffness and a function [N]."""
+        return compat.assemble_vector(compat.compile_form(ufl.action(self.form, function)))
+
+    def _traction_load(self) -> PETSc.Vec:
+        test, mesh = ufl.TestFunction(self.space), self.mesh.mesh
+        ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.mesh.facet_tags)
+        stresses = [
+            fem.Constant(mesh, np.array(each.stress, PETSc.ScalarType)) for each in self.tractions
+        ]
+        terms = [
+            ufl.inner(stress, test) * ds(each.tag)
+            for stress, each in zip(stresses, self.tractions, strict=True)
+        ]
+        return compat.assemble_vector(compat.compile_form(sum(terms[1:], terms[0])))

@@ -13,7 +13,9 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.materials import Material
+from macro import compat
+
+Array = NDArray[np.float64]
 
 
 def strain(displacement: Any) -> Any:
@@ -33,27 +35,31 @@ def stress(displacement: Any, lame: tuple[Any, Any]) -> Any:
     return first * ufl.tr(eps) * ufl.Identity(3) + 2.0 * shear * eps
 
 
-def stiffness_form(space: Any, material: Material | tuple[Any, Any], quadrature_degree: int) -> Any:
+def stiffness_form(space: Any, lame: tuple[Any, Any], quadrature_degree: int) -> Any:
     """Return the bilinear form a(u, v) = ∫ σ(u) : ε(v) dV as UFL.
 
-    Lamé's constants enter as UFL constants, so that one compiled form serves every material.
+    Lamé's constants enter as UFL constants, so that one compiled form serves every material, or as
+    functions that are constant on every cell.
 
     Args:
         space: Vector space of the displacements.
-        material: Elastic constants [MPa], or Lamé's constants as functions on the mesh.
+        lame: Lamé's constants (λ, μ), or arrays of those of this rank's cells [MPa].
         quadrature_degree: Polynomial degree that is integrated exactly.
     """
-    first, shear = (
-        (fem.Constant(space.mesh, PETSc.ScalarType(value)) for value in material.lame)
-        if isinstance(material, Material)
-        else material
+    mesh = space.mesh
+    constants = (
+        compat.cell_constant(mesh, values)
+        if np.ndim(values)
+        else fem.Constant(mesh, PETSc.ScalarType(values))
+        for values in lame
     )
     trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
-    dx = ufl.Measure("dx", domain=space.mesh, metadata={"quadrature_degree": quadrature_degree})
+    dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": quadrature_degree})
+    first, shear = constants
     return ufl.inner(stress(trial, (first, shear)), strain(test)) * dx
 
 
-def rigid_body_modes(points: NDArray[np.float64], comm: Any) -> PETSc.NullSpace:
+def rigid_body_modes(points: Array, comm: Any) -> PETSc.NullSpace:
     """Return the six rigid body modes of nodes, the near-nullspace for algebraic multigrid.
 
     Args:

@@ -13,12 +13,12 @@ from xml.etree import ElementTree
 import numpy as np
 from dolfinx import fem, io
 from numpy.typing import NDArray
-from petsc4py import PETSc
 
 from geometry.materials import von_mises
 from macro import compat
+from macro.contact.contact_state import ContactState
 from macro.contact.loaded_face import LoadedFace
-from macro.contact.unilateral_problem import UnilateralContactProblem, UnilateralContactState
+from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
 from support.collective import on_root
 
@@ -26,9 +26,6 @@ Array = NDArray[np.float64]
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""
-
-_ZERO = 1e-9
-"""Value below which a basis function counts as zero at a node."""
 
 
 class AtPoints(NamedTuple):
@@ -78,7 +75,7 @@ def write_fields(
 def write_rough_fields(
     path: Path | str,
     problem: UnilateralContactProblem,
-    steps: Iterable[tuple[int, UnilateralContactState]],
+    steps: Iterable[tuple[int, ContactState]],
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of a rough block as XDMF.
 
@@ -97,7 +94,7 @@ def write_rough_fields(
     block, mesh = problem.body, problem.body.mesh.mesh
 
     def functions() -> Iterator[tuple[int, list[Any]]]:
-        space = compat.scalar_space(mesh, _file_degree(mesh))
+        space = compat.scalar_space(mesh, compat.geometry_degree(mesh))
         for number, state in steps:
             pressures = _interpolated(space, _vertex_pressures(problem, state), "pressure")
             yield number, [*_of_body(block, block.function(state.displacement)), pressures]
@@ -124,7 +121,7 @@ def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
 
     moved = displacement.x.array.reshape(-1, 3)
     strain = gradient(moved, compat.cell_nodes(body.space), body.degree) @ np.linalg.inv(
-        gradient(mesh.geometry.x, geometry, _file_degree(mesh))
+        gradient(mesh.geometry.x, geometry, compat.geometry_degree(mesh))
     )
     strain = 0.5 * (strain + np.swapaxes(strain, 1, 2))
     first, shear = (np.asarray(constant)[..., None, None] for constant in body.cell_lame)
@@ -135,16 +132,11 @@ def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
 def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
     """Return displacement, stress and von Mises' stress, as XDMF files can hold them."""
     mesh = body.mesh.mesh
-    shown = _interpolated(
-        compat.vector_space(mesh, _file_degree(mesh)), displacement, "displacement"
-    )
-    stress = fem.Function(compat.scalar_space(mesh, 0, "DG", shape=(3, 3)), name="stress")
-    equivalent = fem.Function(compat.scalar_space(mesh, 0, "DG"), name="von_Mises")
+    space = compat.vector_space(mesh, compat.geometry_degree(mesh))  # all that files can hold
+    shown = _interpolated(space, displacement, "displacement")
     values = cell_stresses(body, displacement)
-    rows = compat.cell_nodes(equivalent.function_space)[:, 0]
-    stress.x.array.reshape(-1, 9)[rows] = values.reshape(-1, 9)
-    equivalent.x.array[rows] = von_mises(values)
-    return [shown, stress, equivalent]
+    equivalent = compat.cell_constant(mesh, von_mises(values), "von_Mises")
+    return [shown, compat.cell_constant(mesh, values, "stress"), equivalent]
 
 
 def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
@@ -161,17 +153,13 @@ def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
     return pressures
 
 
-def _file_degree(mesh: Any) -> int:
-    """Return the degree of the mesh's cells, the only one of functions that XDMF files hold."""
-    return 2 if compat.cell_vertices(mesh).shape[1] == 10 else 1
-
-
-def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContactState) -> Any:
+def _vertex_pressures(problem: UnilateralContactProblem, state: ContactState) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
     Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no
     tributary area, and one of a square far less than the middle node.
     """
+    assert state.nodal is not None
     block, top = problem.body, problem.top
     pressures = fem.Function(compat.scalar_space(block.mesh.mesh, 1))
     vertices, cells = compat.cell_nodes(pressures.function_space), compat.cell_nodes(block.space)
@@ -179,20 +167,18 @@ def _vertex_pressures(problem: UnilateralContactProblem, state: UnilateralContac
     shares = compat.lagrange_values(
         cell_name, 1, compat.lagrange_points(cell_name, block.degree)
     )  # weights of the vertices in the nodes of a cell
-    shares[shares < _ZERO] = 0.0
     place = np.empty(cells.max(initial=-1) + 1, dtype=np.intp)
     place[cells.ravel()] = np.arange(cells.size)  # one of the cells of each node
     cell, node = np.divmod(place[top.dofs // 3], cells.shape[1])
-    numbers = pressures.function_space.dofmap.index_map
-    rows = numbers.local_to_global(vertices[cell].ravel()).astype(PETSc.IntType)
+    space, size = pressures.function_space, len(pressures.x.array)
     force, area = (
-        PETSc.Vec().createMPI((numbers.size_local, None), comm=block.mesh.comm) for _ in range(2)
+        compat.sum_of_ranks(
+            space, np.bincount(vertices[cell].ravel(), (shares[node] * each[:, None]).ravel(), size)
+        )
+        for each in (state.nodal.force, top.area)
     )
-    for vector, values in ((force, state.nodal_force), (area, top.area)):
-        vector.setValues(rows, (shares[node] * values[:, None]).ravel(), addv=True)
-        vector.assemble()
-    loaded = area.array_r > 0.0
-    pressures.x.array[: numbers.size_local][loaded] = force.array_r[loaded] / area.array_r[loaded]
+    own = pressures.x.array[: len(area)]
+    np.divide(force, area, out=own, where=area > 0.0)
     pressures.x.scatter_forward()
     return pressures
 

@@ -24,7 +24,7 @@ def places_in_reach(
     spacing: float,
     tilt: tuple[float, float] = (0.0, 0.0),
 ) -> Array:
-    """Return the places that the plane can touch: where the undeformed surface penetrates it.
+    """Return the places that the plane can touch: where the undeformed surface interferes with it.
 
     Under pressure a half-space only moves away from the plane, so that contact occurs nowhere else.
 

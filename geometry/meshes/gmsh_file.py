@@ -121,16 +121,16 @@ def _kind_of_cells(content: MshContent) -> int:
     for part in content.elements:
         if KINDS[part.kind][0] == 3 and len(part.nodes):
             counts[part.kind] = counts.get(part.kind, 0) + len(part.nodes)
-    found = ", ".join(f"{count} × {KINDS[kind][2]}" for kind, count in counts.items())
+    kinds = ", ".join(f"{count} × {KINDS[kind][2]}" for kind, count in counts.items())
     if not counts:
         flat = any(KINDS[part.kind][0] == 2 for part in content.elements)
         problem = "is two-dimensional, it has surfaces only" if flat else "has no cells"
         raise InputError(f"the mesh {problem}", allowed=_ALLOWED)
     if len(counts) > 1:
-        raise InputError(f"the mesh has cells of several kinds: {found}", allowed=_ALLOWED)
+        raise InputError(f"the mesh has cells of several kinds: {kinds}", allowed=_ALLOWED)
     (kind,) = counts
     if KINDS[kind][2] not in _CORNERS:
-        raise InputError(f"the mesh has cells of another kind: {found}", allowed=_ALLOWED)
+        raise InputError(f"the mesh has cells of another kind: {kinds}", allowed=_ALLOWED)
     return kind
 
 

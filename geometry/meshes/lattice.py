@@ -113,15 +113,15 @@ def cells_beyond(cells: Counts, ranks: int, part: Part) -> tuple[Numbers, Number
         faces, shapes (n,); cells at edges of the part come more than once, with different ranks.
     """
     numbers = np.arange(np.prod([len(of) for of in part])).reshape([len(of) for of in part])
-    found, others = [numbers[:0].ravel()], [numbers[:0].ravel()]
+    beside, others = [numbers[:0].ravel()], [numbers[:0].ravel()]
     for rank in range(ranks):
         beyond = lattice_part(cells, ranks, rank)
         steps = [*np.eye(3, dtype=int), *-np.eye(3, dtype=int)] if beyond != part else []
         for step in steps:
             near = tuple(map(_common, part, beyond, step))
-            found.append(numbers[near].ravel())
-            others.append(np.full(len(found[-1]), rank))
-    return np.concatenate(found), np.concatenate(others)
+            beside.append(numbers[near].ravel())
+            others.append(np.full(len(beside[-1]), rank))
+    return np.concatenate(beside), np.concatenate(others)
 
 
 def _common(one: range, other: range, step: int) -> slice:

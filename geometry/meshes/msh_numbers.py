@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,26 +14,6 @@ Table = NDArray[np.int64]
 
 _EXACT = 2.0**53
 """Whole numbers up to this are exact as floats."""
-
-
-class Numbers(Protocol):
-    """The numbers of a section from its beginning on."""
-
-    def table(self, rows: int, kinds: str) -> Array:
-        """Return the next rows of numbers, shape (rows, len(kinds)).
-
-        Args:
-            rows: Number of rows.
-            kinds: What stands in a row: ``i`` an int, ``u`` a size, ``d`` a double.
-
-        Raises:
-            InputError: When the section ends before.
-        """
-        ...
-
-    def line(self) -> int:
-        """Return the next number, which stands on a line of its own, as text in any file."""
-        ...
 
 
 class TextNumbers:
@@ -57,7 +36,15 @@ class TextNumbers:
         self._at = 0
 
     def table(self, rows: int, kinds: str) -> Array:
-        """Return the next rows; see `Numbers`."""
+        """Return the next rows of numbers, shape (rows, len(kinds)).
+
+        Args:
+            rows: Number of rows.
+            kinds: What stands in a row: ``i`` an int, ``u`` a size, ``d`` a double.
+
+        Raises:
+            InputError: When the section ends before.
+        """
         end = self._at + rows * len(kinds)
         if rows < 0 or end > len(self._values):
             raise _too_short()
@@ -66,7 +53,7 @@ class TextNumbers:
         return part
 
     def line(self) -> int:
-        """Return the next number."""
+        """Return the next number, which stands on a line of its own, as text in any file."""
         return int(whole(self.table(1, "i"))[0, 0])
 
     def rest(self) -> Table:
@@ -91,18 +78,18 @@ class ByteNumbers:
         self._types = {"i": f"{order}i4", "u": f"{order}u8", "d": f"{order}f8"}
 
     def table(self, rows: int, kinds: str) -> Array:
-        """Return the next rows; see `Numbers`."""
+        """Return the next rows; see `TextNumbers.table`."""
         row = np.dtype([(str(k), self._types[kind]) for k, kind in enumerate(kinds)])
         if rows < 0 or self.at + rows * row.itemsize > len(self._data):
             raise _too_short()
         if len(set(kinds)) == 1:
             flat = np.frombuffer(self._data, self._types[kinds[0]], rows * len(kinds), self.at)
-            found = flat.reshape(rows, len(kinds)).astype(np.float64)
+            numbers = flat.reshape(rows, len(kinds)).astype(np.float64)
         else:
             parts = np.frombuffer(self._data, row, rows, self.at)
-            found = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
+            numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
         self.at += rows * row.itemsize
-        return found
+        return numbers
 
     def line(self) -> int:
         """Return the number on the next line."""
@@ -112,6 +99,10 @@ class ByteNumbers:
         if not text.isdigit():
             raise _too_short()
         return int(text)
+
+
+Numbers = TextNumbers | ByteNumbers
+"""The numbers of a section from its beginning on."""
 
 
 def whole(values: Array) -> Table:

@@ -81,23 +81,23 @@ def msh_content(data: bytes) -> MshContent:
     Raises:
         InputError: When they are no such file, or contradict themselves.
     """
-    found, seen = MshContent(), set[str]()
+    content, seen = MshContent(), set[str]()
     version, order = _format(data)
     for name, numbers in _sections(data, order):
         if name in seen:
             raise InputError(f"the file has several sections ${name}")
         seen.add(name)
         if name == "PhysicalNames":
-            _read_names(found, numbers)
+            _read_names(content, numbers)
         elif isinstance(numbers, bytes):
             continue
         elif name == "Nodes":
-            _read_nodes(found, numbers, version)
+            _read_nodes(content, numbers, version)
         elif name == "Elements":
-            (_read_elements if version >= 4.0 else _read_elements_2)(found, numbers, version)
+            (_read_elements if version >= 4.0 else _read_elements_2)(content, numbers, version)
         elif version >= 4.0:
-            _read_entities(found, numbers, version, parts=name.startswith("Part"))
-    return found
+            _read_entities(content, numbers, version, parts=name.startswith("Part"))
+    return content
 
 
 def _format(data: bytes) -> tuple[float, str]:
@@ -143,21 +143,21 @@ def _sections(data: bytes, order: str) -> Iterator[tuple[str, Numbers | bytes]]:
         at = end.end()
 
 
-def _read_names(found: MshContent, content: Numbers | bytes) -> None:
+def _read_names(mesh: MshContent, content: Numbers | bytes) -> None:
     """Take the names of physical groups."""
     assert isinstance(content, bytes)
     for line in re.finditer(rb'^\s*(\d)\s+(-?\d+)\s+"(.*)"\s*$', content, re.M):
         key = int(line[1]), abs(int(line[2]))
         name = line[3].decode("utf-8", "replace")
-        for (dimension, other), known in found.names.items():
+        for (dimension, other), known in mesh.names.items():
             if dimension == key[0] and known == name and other != key[1]:
                 raise InputError(
                     f"physical groups {other} and {key[1]} have the same name", value=name
                 )
-        found.names[key] = name
+        mesh.names[key] = name
 
 
-def _read_entities(found: MshContent, numbers: Numbers, version: float, *, parts: bool) -> None:
+def _read_entities(mesh: MshContent, numbers: Numbers, version: float, *, parts: bool) -> None:
     """Take the physical groups of points, curves, surfaces and volumes, or of parts of them."""
     if parts:
         numbers.table(1, "u")
@@ -171,12 +171,12 @@ def _read_entities(found: MshContent, numbers: Numbers, version: float, *, parts
                 numbers.table(_count(numbers), "i")
             numbers.table(1, "d" * (3 if dimension == 0 and version > 4.0 else 6))
             groups = whole(numbers.table(_count(numbers), "i")).ravel()
-            found.groups[dimension, tag] = np.abs(groups).tolist()
+            mesh.groups[dimension, tag] = np.abs(groups).tolist()
             if dimension:
                 numbers.table(_count(numbers), "i")
 
 
-def _read_nodes(found: MshContent, numbers: Numbers, version: float) -> None:
+def _read_nodes(mesh: MshContent, numbers: Numbers, version: float) -> None:
     """Take numbers and places of the nodes."""
     tables = [np.empty((0, 4))]
     if version < 4.0:
@@ -195,10 +195,10 @@ def _read_nodes(found: MshContent, numbers: Numbers, version: float) -> None:
             else:
                 tables += [numbers.table(count, "i" + further)[:, :4]]
     table = np.concatenate(tables)
-    found.numbers, found.points = whole(table[:, 0]), table[:, 1:]
+    mesh.numbers, mesh.points = whole(table[:, 0]), table[:, 1:]
 
 
-def _read_elements(found: MshContent, numbers: Numbers, version: float) -> None:
+def _read_elements(mesh: MshContent, numbers: Numbers, version: float) -> None:
     """Take the elements of format 4, entity by entity."""
     blocks = whole(numbers.table(1, "uuuu" if version > 4.0 else "uu"))[0, 0]
     for _ in range(blocks):
@@ -206,9 +206,9 @@ def _read_elements(found: MshContent, numbers: Numbers, version: float) -> None:
         entity, count = (second if version > 4.0 else first), _count(numbers)
         dimension, nodes, _ = _kind(kind)
         table = whole(numbers.table(count, ("u" if version > 4.0 else "i") * (1 + nodes)))
-        groups = found.groups.get((dimension, entity), [])
+        groups = mesh.groups.get((dimension, entity), [])
         if len(set(groups)) > 1 and count:
-            known = [found.names.get((dimension, group), str(group)) for group in groups]
+            known = [mesh.names.get((dimension, group), str(group)) for group in groups]
             kind_of = {2: "surface", 3: "volume"}.get(dimension, "curve")
             raise InputError(
                 f"{kind_of} {entity} of the mesh is in several physical groups: "
@@ -216,12 +216,12 @@ def _read_elements(found: MshContent, numbers: Numbers, version: float) -> None:
                 allowed=f"at most one group for a {kind_of}",
             )
         group = np.full(count, groups[0] if groups else 0)
-        found.elements += [
+        mesh.elements += [
             Elements(kind=kind, nodes=table[:, 1:], entity=np.full(count, entity), group=group)
         ]
 
 
-def _read_elements_2(found: MshContent, numbers: Numbers, _version: float) -> None:
+def _read_elements_2(mesh: MshContent, numbers: Numbers, _version: float) -> None:
     """Take the elements of format 2, each of which has its group and its entity."""
     count = numbers.line()
     if isinstance(numbers, TextNumbers):
@@ -231,7 +231,7 @@ def _read_elements_2(found: MshContent, numbers: Numbers, _version: float) -> No
     for kind, tags, table in tables:
         group = np.abs(table[:, 0]) if tags > 0 else np.zeros(len(table), np.int64)
         entity = table[:, 1] if tags > 1 else group
-        found.elements += [Elements(kind=kind, nodes=table[:, tags:], entity=entity, group=group)]
+        mesh.elements += [Elements(kind=kind, nodes=table[:, tags:], entity=entity, group=group)]
 
 
 def _rows_of_bytes(numbers: Numbers, count: int) -> Iterator[tuple[int, int, Table]]:

@@ -217,12 +217,12 @@ def _size_near(fields: Any, kind: str, tags: list[int], least: float, shape: Ref
 
 def _seams(gmsh: Any, shape: RefinedShape) -> list[int]:
     """Return the curves at the bottom of a block along which boxes are joined to it."""
-    slack, found = 1e-6 * shape.height, []
+    slack, seams = 1e-6 * shape.height, []
     width, depth = shape.interface
     for _, curve in gmsh.model.getEntities(1):
         x, y, z, x_end, y_end, z_end = gmsh.model.getBoundingBox(1, curve)
         level = max(abs(z + shape.height), abs(z_end + shape.height)) < slack
         within = min(x, y) > -slack and x_end < width + slack and y_end < depth + slack
         if level and within:
-            found.append(curve)
-    return found
+            seams.append(curve)
+    return seams

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.materials import Material
-from macro.block import Sides
+from macro.bodies import Sides
 from macro.compliance.cache import cached
 from macro.compliance.elements import block_lines
 from macro.compliance.parity_block import Parity, ParityBlock, Response
@@ -114,20 +114,20 @@ def face_compliance(
         ).response()
 
     parts = shared(comm, len(families), response)
-    found = dict(zip(families, parts, strict=True))
+    responses = dict(zip(families, parts, strict=True))
     if alike and count > 1:  # exchange x and y
-        exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in found[0, 1]))
-        found[1, 0] = exchanged._replace(xx=exchanged.yy, yy=exchanged.xx)
-    return _gathered(found, lengths, count, material)
+        exchanged = Response(*(part.transpose(1, 0, 3, 2) for part in responses[0, 1]))
+        responses[1, 0] = exchanged._replace(xx=exchanged.yy, yy=exchanged.xx)
+    return _gathered(responses, lengths, count, material)
 
 
 def _gathered(
-    found: dict[Parity, Response], lengths: tuple[float, float], count: int, material: Material
+    responses: dict[Parity, Response], lengths: tuple[float, float], count: int, material: Material
 ) -> FaceCompliance:
     """Join the modes of all parities, per unit of force."""
     area = lengths[0] * lengths[1]
     total = np.zeros((len(Response._fields), *4 * (count,)))
-    for (odd_x, odd_y), response in found.items():
+    for (odd_x, odd_y), response in responses.items():
         for field, part in zip(total, response, strict=True):
             turn = part is response.xy
             seen_x, seen_y = (odd_x + turn) % 2, (odd_y + turn) % 2

@@ -16,15 +16,12 @@ from scipy.sparse import csr_matrix
 from geometry.legendre_modes import mode_values
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.compliance.surroundings import whole
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets
 
 Array = NDArray[np.float64]
 
-_SHAPES = {4: 1, 10: 2, 8: 1, 27: 2}
-"""Degree of a cell's shape by the number of its nodes."""
 _MORE = 4
 """Degree of the quadrature beyond that of products of two basis functions."""
 
@@ -51,7 +48,7 @@ class FaceMoments:
     Args:
         body: The body.
         facets: Facets of its contact face, in its frame.
-        rectangle: Patches that fill the rectangle, in that frame.
+        rectangle: The rectangle as one patch, in that frame.
         count: Modes K along a side.
 
     Note:
@@ -63,15 +60,14 @@ class FaceMoments:
     ) -> None:
         self._body, self._frame = body, facets.frame
         self._area = float(np.prod(rectangle.lengths))
-        one = whole(rectangle)
         degree = (4 if body.hexahedral else 2) * body.degree + _MORE
         number = max(body.comm.allreduce(len(facets.cell)), 1)
         degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much
-        self.points = LoadedFace(body, facets, one, degree=degree).quadrature
+        self.points = LoadedFace(body, facets, rectangle, degree=degree).quadrature
         x, y = (
             mode_values(at - start, length, count)
             for at, start, length in zip(
-                (self.points.x, self.points.y), one.origin, one.lengths, strict=True
+                (self.points.x, self.points.y), rectangle.origin, rectangle.lengths, strict=True
             )
         )
         self._modes = (x[:, None] * y).reshape(count**2, -1) * self.points.weight
@@ -88,8 +84,8 @@ class FaceMoments:
         return Moments(*total)
 
     def load(self, mode: int) -> Array:
-        """Return the nodal forces of a mode of pressure, this rank's share, (local dofs,) [N]."""
-        return np.asarray(self._operators[0].T @ self._modes[mode])
+        """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
+        return compat.sum_of_ranks(self._body.space, self._operators[0].T @ self._modes[mode])
 
     @cached_property
     def _operators(self) -> tuple[csr_matrix, ...]:
@@ -117,7 +113,7 @@ class FaceMoments:
         if not len(points.x):
             return np.empty((*points.values.shape, 2))
         rows = compat.cell_vertices(mesh)[points.cell]
-        shape = compat.lagrange_gradients(name, _SHAPES[rows.shape[1]], points.reference)
+        shape = compat.lagrange_gradients(name, compat.geometry_degree(mesh), points.reference)
         maps = np.einsum("nak,naj->nkj", shape, mesh.geometry.x[rows])  # ∂x_j/∂X_k
         basis = compat.lagrange_gradients(name, degree, points.reference)
         gradients = np.linalg.solve(maps, basis.transpose(0, 2, 1))

@@ -28,15 +28,16 @@ from geometry.face_frame import FaceFrame
 from geometry.materials import Material
 from geometry.patches import PatchGrid
 from macro import compat
+from macro.bodies import MeshedBody
 from macro.compliance.face_compliance import FaceCompliance
 from macro.compliance.face_moments import FaceMoments
 from macro.elastic_body import ElasticBody
 from macro.elasticity import stiffness_form
-from macro.linear_solvers.node_matrices import distributed
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver, solve_linear
+from macro.linear_solvers.options import PREFIX
+from macro.linear_solvers.solvers import solve_linear, solved_at_once
+from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
-from macro.mesh.outer_facets import OuterFacets, outer_facets
-from macro.meshed_body import MeshedBody
+from macro.mesh.facets import OuterFacets, outer_facets
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -45,8 +46,6 @@ MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
 _FACTORISED = 100_000
 """Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
-_FLAT = 1e-9
-"""Height below the plane, relative to the rectangle, that is rounding."""
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
 _MORE = 4
@@ -114,9 +113,7 @@ def raised(body: ElasticBody) -> ElasticBody:
 
 def lowered(body: ElasticBody) -> ElasticBody | None:
     """Return the body with linear elements, where it has quadratic ones on a mesh of its own."""
-    if isinstance(body, MeshedBody) and body.degree == 2:
-        return replace(body, order=1)
-    return None
+    return body.linear if isinstance(body, MeshedBody) and body.degree == 2 else None
 
 
 def mesh_face_compliance(
@@ -132,7 +129,7 @@ def mesh_face_compliance(
     Args:
         body: The body.
         facets: Facets of its contact face, in its frame.
-        rectangle: Patches that fill the rectangle, in that frame.
+        rectangle: The rectangle as one patch, in that frame.
         material: Elastic constants under the rectangle.
         count: Modes K along a side of the rectangle.
         fields: The half-space of that material under the modes, where the body lies on one side of
@@ -150,26 +147,25 @@ def mesh_face_compliance(
     if count < 1 or (fields is not None and fields.count != count):
         raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
     moments = FaceMoments(body, facets, rectangle, count)
-    loads = (
-        _Pressures(body, moments)
-        if fields is None
-        else _Corrections(body, facets, rectangle, material, fields)
+    corrections = (
+        None if fields is None else _Corrections(body, facets, rectangle, material, fields)
     )
-    found = np.zeros((4, count**2, count**2))
-    for mode, values in _solutions(body, loads, count**2):
+    responses = np.zeros((4, count**2, count**2))
+    for mode, values in _solutions(body, corrections or moments, count**2):
         total = body.function(values)
-        total.x.array[:] += loads.prescribed(mode)
-        found[:, :, mode] = moments.of(total)
+        if corrections is not None:
+            total.x.array[:] += corrections.prescribed(mode)
+        responses[:, :, mode] = moments.of(total)
     area = float(np.prod(rectangle.lengths))
     # per unit moment: a mode has the moment A, and its own displacements' moments are over A
-    return _gathered(found / area, area, material, fields)
+    return _gathered(responses / area, area, material, fields)
 
 
 def _gathered(
-    found: Array, area: float, material: Material, fields: HalfSpaceFields | None
+    responses: Array, area: float, material: Material, fields: HalfSpaceFields | None
 ) -> FaceCompliance:
     """Return the whole response from the moments of displacements and strains."""
-    normal, xx, yy, xy = found
+    normal, xx, yy, xy = responses
     nu, modulus = material.poisson_ratio, material.young_modulus
     plane = modulus / (1.0 - nu**2)
     stresses = np.stack([plane * (xx + nu * yy), plane * (yy + nu * xx), modulus / (1.0 + nu) * xy])
@@ -189,53 +185,8 @@ def _gathered(
     )
 
 
-class _Loads:
-    """Sums loads of the nodes over the ranks, and leaves out supported components."""
-
-    def __init__(self, body: ElasticBody, nodes: NDArray[np.int32]) -> None:
-        self.body = body
-        self.nodes = np.unique(nodes)  # of this rank, that bear loads
-        numbers = body.space.dofmap.index_map.local_to_global(self.nodes.astype(np.int32))
-        columns = (3 * np.asarray(numbers, np.int64)[:, None] + np.arange(3)).ravel()
-        size = len(columns), 3 * body.space.dofmap.index_map.size_global
-        ones = np.ones(len(columns)), columns, np.arange(len(columns) + 1)
-        self._sum = distributed(csr_matrix(ones, shape=size), body.owned_dofs, body.comm)
-        self._local, self._free = self._sum.createVecLeft(), body.free
-
-    def write(self, mode: int, load: PETSc.Vec) -> None:
-        """Write the load of a mode."""
-        raise NotImplementedError
-
-    def prescribed(self, mode: int) -> Array:
-        """Return the displacements that supports prescribe, this rank's with ghosts."""
-        return np.zeros(1)
-
-    def write_sum(self, local: Array, load: PETSc.Vec) -> None:
-        """Write the load of all ranks, from this rank's (n, 3) at its nodes."""
-        self._local.array[:] = local.ravel()
-        self._sum.multTranspose(self._local, load)
-
-    def leave_out_supports(self, load: PETSc.Vec) -> None:
-        """Write zeros where components are supported."""
-        load.pointwiseMult(load, self._free)
-
-
-class _Pressures(_Loads):
-    """The modes themselves as loads."""
-
-    def __init__(self, body: ElasticBody, moments: FaceMoments) -> None:
-        super().__init__(body, moments.points.nodes)
-        self._moments = moments
-
-    def write(self, mode: int, load: PETSc.Vec) -> None:
-        """Write the load of a mode."""
-        local = self._moments.load(mode).reshape(-1, 3)[self.nodes]
-        self.write_sum(local, load)
-        self.leave_out_supports(load)
-
-
-class _Corrections(_Loads):
-    """What a half-space under the modes does wrong on a body's surface."""
+class _Corrections:
+    """What a half-space under the modes does wrong on a body's surface, as loads of the body."""
 
     def __init__(
         self,
@@ -248,28 +199,29 @@ class _Corrections(_Loads):
         frame = facets.frame.moved(*rectangle.origin)
         outer = outer_facets(body.space, 2 * body.degree + _MORE)
         level = np.abs(frame.height(outer.points.reshape(-1, 3))).reshape(outer.weights.shape)
-        off = level.max(axis=1, initial=0.0) > _FLAT * max(rectangle.lengths)
+        off = level.max(axis=1, initial=0.0) > FLAT * max(rectangle.lengths)
         outer = outer.among(off)
-        super().__init__(body, outer.nodes[outer.on_facet])
+        self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
         self._frame, self._fields, self._material = frame, fields, material
         self._tractions = self._integrated(outer)
         self._held = fem.Function(body.space)
-        dofs = [condition.dof_indices()[0] for condition in body.conditions]
-        self._supported = np.unique(np.concatenate([np.empty(0, np.int32), *dofs]))
+        self._supported = np.flatnonzero(body.supported)
         self._support_nodes, self._row = np.unique(self._supported // 3, return_inverse=True)
         self._displacements = self._displacement(self._support_nodes)
         self._product = compat.compile_form(ufl.action(body.form, self._held))
 
-    def write(self, mode: int, load: PETSc.Vec) -> None:
-        """Write the load of a mode."""
-        self.write_sum(self._tractions[..., mode], load)
+    def load(self, mode: int) -> Array:
+        """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
+        local = np.zeros((len(self._held.x.array) // 3, 3))
+        local[self._nodes] = self._tractions[..., mode]
+        forces = compat.sum_of_ranks(self._body.space, local.ravel())
         self._held.x.array[:] = self.prescribed(mode)
-        load.axpy(-1.0, compat.assemble_vector(self._product))
+        forces -= compat.assemble_vector(self._product).array_r
         if self._elsewhere is not None:
             form, function, nodes, displacements = self._elsewhere
             function.x.array.reshape(-1, 3)[nodes] = displacements[..., mode]
-            load.axpy(-1.0, compat.assemble_vector(form))
-        self.leave_out_supports(load)
+            forces -= compat.assemble_vector(form).array_r
+        return forces
 
     def prescribed(self, mode: int) -> Array:
         """Return the displacements that supports prescribe, this rank's with ghosts."""
@@ -280,8 +232,8 @@ class _Corrections(_Loads):
     def _integrated(self, outer: OuterFacets) -> Array:
         """Return the forces at the nodes by the half-space's tractions, (nodes, 3, K²) [N]."""
         count, points = outer.weights.shape
-        total = np.zeros((len(self.nodes), 3 * self._fields.count**2))
-        place = np.searchsorted(self.nodes, outer.nodes)
+        total = np.zeros((len(self._nodes), 3 * self._fields.count**2))
+        place = np.searchsorted(self._nodes, outer.nodes)
         for part in np.array_split(np.arange(count), -(-count * points // _BATCH) or 1):
             stress = self._fields(self._local_places(outer.points[part].reshape(-1, 3)))[1]
             normals = outer.normals[part].reshape(-1, 3) @ self._frame.axes.T
@@ -291,19 +243,19 @@ class _Corrections(_Loads):
             values = outer.values[outer.side[part]] * outer.on_facet[part][:, None]
             rows = np.repeat(place[part], points, axis=0)
             starts = np.arange(len(rows) + 1) * rows.shape[1]
-            flat = (values.reshape(rows.shape).ravel(), rows.ravel() % len(self.nodes), starts)
-            shape = csr_matrix(flat, shape=(len(rows), len(self.nodes)))
+            flat = (values.reshape(rows.shape).ravel(), rows.ravel() % len(self._nodes), starts)
+            shape = csr_matrix(flat, shape=(len(rows), len(self._nodes)))
             total += shape.T @ tractions.reshape(len(rows), -1)
-        return total.reshape(len(self.nodes), 3, -1)
+        return total.reshape(len(self._nodes), 3, -1)
 
     def _displacement(self, nodes: NDArray[np.intp]) -> Array:
         """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""
-        places = self.body.space.tabulate_dof_coordinates()[nodes]
-        found = np.empty((len(nodes), 3, self._fields.count**2))
+        places = self._body.space.tabulate_dof_coordinates()[nodes]
+        displacements = np.empty((len(nodes), 3, self._fields.count**2))
         for part in np.array_split(np.arange(len(nodes)), -(-len(nodes) // _BATCH) or 1):
             local = self._fields(self._local_places(places[part]))[0]
-            found[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
-        return found
+            displacements[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
+        return displacements
 
     def _local_places(self, points: Array) -> Array:
         """Return points in the coordinates of the rectangle."""
@@ -315,7 +267,7 @@ class _Corrections(_Loads):
 
         It acts on a function, whose nodes there get the displacements of the half-space.
         """
-        body = self.body
+        body = self._body
         differences = [
             np.asarray(values, float) - own
             for values, own in zip(body.cell_lame, self._material.lame, strict=True)
@@ -324,45 +276,25 @@ class _Corrections(_Loads):
         other = np.abs(differences[0]) + np.abs(differences[1]) > _SAME * size
         if not body.comm.allreduce(bool(other.any())):
             return None
-        constant = compat.scalar_space(body.mesh.mesh, 0, "DG")
-        rows = compat.cell_nodes(constant)[:, 0]
-        lame = []
-        for values in differences:
-            function = fem.Function(constant)
-            function.x.array[rows] = np.where(other, values, 0.0)
-            lame.append(function)
+        cells = [np.where(other, values, 0.0) for values in differences]
         displacement = fem.Function(body.space)
-        form = stiffness_form(body.space, (lame[0], lame[1]), body.quadrature_degree)
+        form = stiffness_form(body.space, (cells[0], cells[1]), body.quadrature_degree)
         nodes = np.unique(compat.cell_nodes(body.space)[np.flatnonzero(other)])
         action = compat.compile_form(ufl.action(form, displacement))
         return action, displacement, nodes, self._displacement(nodes)
 
 
-def _solutions(body: ElasticBody, loads: _Loads, count: int) -> Iterator[tuple[int, Array]]:
+def _solutions(
+    body: ElasticBody, loads: FaceMoments | _Corrections, count: int
+) -> Iterator[tuple[int, Array]]:
     """Yield every mode and its displacements, this rank's owned ones."""
+    free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
     if body.dofs <= _FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
-        yield from enumerate(_by_factors(body, loads, count))
+        right = np.stack([free * loads.load(mode) for mode in range(count)], axis=1)
+        yield from enumerate(solved_at_once(body.stiffness, right).T)
         return
-    load, solution = body.stiffness.createVecs()
     for mode in range(count):
-        loads.write(mode, load)
+        load.array[:] = free * loads.load(mode)
         solve_linear(body.solver, load, solution)
         yield mode, solution.array_r
         compat.collect_garbage(solution.comm)
-
-
-def _by_factors(body: ElasticBody, loads: _Loads, count: int) -> Array:
-    """Return the displacements of all modes by one factorisation, shape (modes, owned dofs)."""
-    solver = linear_solver(body.stiffness, preconditioner=DIRECT_DEFAULTS)
-    load = body.stiffness.createVecRight()
-    right = np.zeros((body.owned_dofs, count), order="F")
-    for mode in range(count):
-        loads.write(mode, load)
-        right[:, mode] = load.array_r
-    solution = np.zeros_like(right, order="F")
-    size = (body.owned_dofs, body.dofs), (None, count)
-    dense = [PETSc.Mat().createDense(size, array=a, comm=load.comm) for a in (right, solution)]
-    solver.pc.getFactorMatrix().matSolve(*dense)
-    for part in (*dense, solver.pc, solver):  # PETSc keeps objects that Python drops
-        part.destroy()
-    return solution.T

@@ -19,9 +19,9 @@ from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
 from geometry.materials import Material
-from macro.block import Sides
+from macro.bodies import Sides
 from macro.compliance.elements import Line
-from macro.linear_solvers.options import set_up
+from macro.linear_solvers.solvers import solved_at_once
 
 Array = NDArray[np.float64]
 Parity = tuple[int, int]
@@ -110,12 +110,12 @@ class ParityBlock:
         free = np.concatenate([part.ravel() for part in self._free])
         forces = np.zeros((len(free), len(loads)))
         forces[splits[1] :].reshape(-1, sizes[2][2], len(loads))[:, end] = -loads.T
-        solved = _solution(self._stiffness()[free][:, free], np.asfortranarray(forces[free]))
-        found = np.zeros_like(forces)  # also where a roller constrains
-        found[free] = solved
+        solved = _solution(self._stiffness()[free][:, free], forces[free])
+        displacements = np.zeros_like(forces)  # also where a roller constrains
+        displacements[free] = solved
         tops = [
             part.reshape(-1, size[2], len(loads))[:, end]
-            for part, size in zip(np.split(found, splits[:2]), sizes, strict=True)
+            for part, size in zip(np.split(displacements, splits[:2]), sizes, strict=True)
         ]
         # derivative of the inverse stiffness when all elements grow in proportion
         change = self._stiffness(by_height=True)[free][:, free]
@@ -133,11 +133,11 @@ class ParityBlock:
     @cached_property
     def _free(self) -> list[NDArray[np.bool_]]:
         """Which unknowns (ix, iy, iz) no roller constrains, by component."""
-        found = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
+        free = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
         if self.sides == "roller":
             for axis in (0, 1):
-                np.moveaxis(found[axis], axis, 0)[self._lines[axis][axis].end] = False
-        return found
+                np.moveaxis(free[axis], axis, 0)[self._lines[axis][axis].end] = False
+        return free
 
     def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
         """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].
@@ -184,26 +184,11 @@ class ParityBlock:
 
 
 def _solution(stiffness: csr_matrix, right: Array) -> Array:
-    """Solve for many right-hand sides with one factorisation."""
-    kind = PETSc.IntType
-    rows, columns = stiffness.indptr.astype(kind), stiffness.indices.astype(kind)
-    matrix = PETSc.Mat().createAIJ(
-        stiffness.shape, csr=(rows, columns, stiffness.data), comm=PETSc.COMM_SELF
-    )
+    """Solve for many right-hand sides."""
+    pattern = (part.astype(PETSc.IntType) for part in (stiffness.indptr, stiffness.indices))
+    csr = (*pattern, stiffness.data)
+    matrix = PETSc.Mat().createAIJ(stiffness.shape, csr=csr, comm=PETSc.COMM_SELF)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOperators(matrix)
-    solver.setType("preonly")
-    conditioner = solver.pc
-    conditioner.setType("cholesky")
-    conditioner.setFactorSolverType("mumps")
-    set_up(solver)
-    solution = np.zeros_like(right, order="F")
-    dense = [
-        PETSc.Mat().createDense(right.shape, array=array, comm=matrix.comm)
-        for array in (right, solution)
-    ]
-    conditioner.getFactorMatrix().matSolve(*dense)
-    for part in (*dense, conditioner, solver, matrix):  # PETSc keeps objects that Python drops
-        part.destroy()
+    solution = solved_at_once(matrix, right)
+    matrix.destroy()
     return solution

@@ -18,7 +18,7 @@ from geometry.patches import PatchGrid
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.outer_facets import OuterFacets, outer_facets
+from macro.mesh.facets import OuterFacets, outer_facets
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -40,14 +40,12 @@ class Surroundings:
 
     Args:
         free_sides: Whether a free plane across the face bounds the rectangle, by side.
-        covers: Whether the rectangle is all of the face.
         thickness: Least distance under the rectangle to the other side of the body [mm].
         above: Largest height of the body above the plane of the face, at least 0 [mm].
         material: Elastic constants under the rectangle.
     """
 
     free_sides: Sides
-    covers: bool
     thickness: float
     above: float
     material: Material
@@ -64,7 +62,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     Args:
         body: The body.
         facets: Facets of the face, in its frame.
-        rectangle: Patches that fill the rectangle, in that frame.
+        rectangle: The rectangle as one patch, in that frame.
 
     Raises:
         InputError: When the rectangle reaches beyond the face, or lies on several materials.
@@ -73,7 +71,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
         Collective.
     """
     comm, area = body.comm, float(np.prod(rectangle.lengths))
-    covered = _area_in(body, facets, rectangle.origin, rectangle.lengths)
+    covered = _area_in(body, facets, rectangle)
     if covered < (1.0 - _COVERED) * area:
         raise InputError(
             "the surface's rectangle reaches beyond the contact face",
@@ -88,30 +86,17 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     strip = _STRIP * min(*rectangle.lengths, thickness)
     free = outer.among(~_held(body, outer))
     sides = [_free_plane(body, free, frame, rectangle, side, strip, slack) for side in range(4)]
-    covers = comm.allreduce(float(facets.area.sum())) < (1.0 + _COVERED) * area
     return Surroundings(
         free_sides=(sides[0], sides[1], sides[2], sides[3]),
-        covers=covers,
         thickness=thickness,
         above=above if above > slack else 0.0,
         material=_material_under(body, facets, rectangle),
     )
 
 
-def whole(rectangle: PatchGrid) -> PatchGrid:
-    """Return a rectangle of patches as one patch."""
-    return PatchGrid(grid=(1, 1), lengths=rectangle.lengths, origin=rectangle.origin)
-
-
-def _area_in(
-    body: ElasticBody,
-    facets: ContactFacets,
-    origin: tuple[float, float],
-    lengths: tuple[float, float],
-) -> float:
+def _area_in(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> float:
     """Return the area of facets within a rectangle in their plane, of all ranks [mm²]."""
-    one = PatchGrid(grid=(1, 1), lengths=lengths, origin=origin)
-    quadrature = LoadedFace(body, facets, one, degree=1).quadrature
+    quadrature = LoadedFace(body, facets, rectangle, degree=1).quadrature
     return float(body.comm.allreduce(float(quadrature.weight.sum())))
 
 
@@ -129,10 +114,7 @@ def _thickness(
 
 def _held(body: ElasticBody, outer: OuterFacets) -> NDArray[np.bool_]:
     """Return which facets are supported: all their nodes are, in one component at least."""
-    held = np.zeros(len(body.space.tabulate_dof_coordinates()) * 3, dtype=bool)
-    for condition in body.conditions:
-        held[condition.dof_indices()[0]] = True
-    nodes = held.reshape(-1, 3)[outer.nodes] | ~outer.on_facet[..., None]
+    nodes = body.supported.reshape(-1, 3)[outer.nodes] | ~outer.on_facet[..., None]
     return np.asarray(nodes.all(axis=1).any(axis=1))
 
 
@@ -161,7 +143,7 @@ def _free_plane(
     )
     chosen = contact_sides(body, free.among(flat), plane)
     length = rectangle.lengths[1 - axis]
-    area = _area_in(body, chosen, (0.0, 0.0), (length, strip))
+    area = _area_in(body, chosen, PatchGrid(grid=(1, 1), lengths=(length, strip)))
     return area > (1.0 - _COVERED) * length * strip
 
 
@@ -176,16 +158,16 @@ def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> Co
 
 def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> Material:
     """Return the one material of the cells under the rectangle."""
-    cells = np.unique(LoadedFace(body, facets, whole(rectangle), degree=1).quadrature.cell)
+    cells = np.unique(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
     own = _pairs(body, cells)
-    found = set().union(*body.comm.allgather(own))
-    if len(found) != 1:
+    pairs = set().union(*body.comm.allgather(own))
+    if len(pairs) != 1:
         raise InputError(
             "the surface's rectangle lies on several materials",
-            value=len(found),
+            value=len(pairs),
             allowed="one material under the rectangle",
         )
-    first, shear = found.pop()
+    first, shear = pairs.pop()
     return Material(
         young_modulus=shear * (3.0 * first + 2.0 * shear) / (first + shear),
         poisson_ratio=0.5 * first / (first + shear),

@@ -3,10 +3,13 @@
     LawContactProblem           laws of patches on a face                    `law_problem`
       └ LoadedFace, FacePair    patches on the faces of one body, or two     `loaded_face`, …
       └ ContactForces           laws under a plane                           `contact_forces`
-      └ Equilibrium, Newton     residual, tangent, PETSc's SNES              `equilibrium`, …
-    UnilateralContactProblem    no penetration of a rough top                `unilateral_problem`
+    ContactProblem              laws in a user's own variational problem     `contact_problem`
+      └ Interface               laws on a face, as a term of its equations   `interface`
+      └ UserEquations           residual and tangent of both                 `user_equations`
+    UnilateralContactProblem    no interference with a rough top           `unilateral_problem`
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 
-`face_nodes` and `facet_area` read results off the top.
+Both problems with laws are solved by `newton`; all three give a `contact_state`. `face_nodes` and
+`facet_area` read results off a rough top.
 """

@@ -1,17 +1,17 @@
 """Contact at the nodes of a rough top by a primal-dual active set.
 
 The nodal displacements u minimise the elastic energy under d ≤ 0 at the nodes of the top, where d
-is the penetration of a node into the plane. With the nodal contact forces λ = −(K u)_z the
+is the interference of a node and the plane. With the nodal contact forces λ = −(K u)_z the
 conditions are
 
-    d ≤ 0,   λ ≥ 0,   λ d = 0:    no penetration, no tension, force in contact alone.
+    d ≤ 0,   λ ≥ 0,   λ d = 0:    no interference, no tension, force in contact alone.
 
 The active set is the set of nodes in contact. Each iteration solves for the block with d = 0 on the
-active set, removes the nodes in tension and adds those that penetrate (Hintermüller, Ito & Kunisch
-2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate at the
-end. Free motions of the plane are unknowns of the same linear solves, in which the active nodes
-move with the plane. Conjugate gradients are preconditioned by the multigrid of the block without
-contact, corrected near the active nodes.
+active set, removes the nodes in tension and adds those behind the plane (Hintermüller, Ito &
+Kunisch 2002, doi 10.1137/S1052623401383558). Solves are inexact while the set changes, and accurate
+at the end. Free motions of the plane are unknowns of the same linear solves, in which the active
+nodes move with the plane. Conjugate gradients are preconditioned by the multigrid of the block
+without contact, corrected near the active nodes.
 
 Theory: section 12 of ``docs/theory.md``.
 """
@@ -27,15 +27,8 @@ from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
 from macro.contact.face_nodes import TopNodes
-from macro.contact.node_contact import (
-    ContactSolution,
-    Extrapolation,
-    Guess,
-    PlaneOverNodes,
-    largest,
-    not_found,
-)
-from macro.contact.rough_face import RoughFace
+from macro.contact.initial_guess import Guess
+from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]
@@ -54,7 +47,7 @@ _CLOSED = 1e-8
 """Gap relative to the largest displacement below which a node counts as touching."""
 
 _ROUNDING = 1e-15
-"""Penetration relative to the block's size that is rounding."""
+"""Interference relative to the block's size that is rounding."""
 
 _SOFT = 8.0
 """Stiffness of the springs under a plane without support: E* times this over the block's width."""
@@ -90,6 +83,7 @@ class PrimalDualActiveSet:
 
     Attributes:
         most_solves: Linear solves of a load step before it fails.
+        points: Number of forces in a guess: this rank's nodes.
 
     Note:
         Everything here is collective.
@@ -104,22 +98,25 @@ class PrimalDualActiveSet:
         self._solver = ConstrainedSolver(body.stiffness, body.solver.pc, layers=3 - body.degree)
         self._tolerance = contact_tolerance()
         self._residual = body.stiffness.createVecRight()
-        self._history = Extrapolation(body.owned_dofs, len(top.dofs))
+        self.points = len(top.dofs)
         modulus, half = face.modulus, plane.levers.half
         self._zero_force, self._rounding = _NO_FORCE * modulus * half**2, _ROUNDING * half
         self._springs = top.area * modulus * _SOFT / (2.0 * half)
 
-    def solve(self, control: Control) -> ContactSolution:
-        """Find the contact of a load step, with an initial guess from the steps before.
+    def solve(self, control: Control, guess: Guess) -> ContactSolution:
+        """Find the contact of a load step.
+
+        Args:
+            control: What the load step prescribes.
+            guess: Where to start: the plane with its prescribed motions, and nodal forces.
 
         Raises:
             NotConverged: When the active set does not converge, nothing can hold the plane, or a
-                linear solve fails; earlier solutions stay what they were.
+                linear solve fails.
         """
-        guess, displacement = self._history.guess(control), self._body.stiffness.createVecRight()
+        displacement = self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
-        placed = self._plane.placed(control, guess.plane)
-        now = _Iterate(control, placed, displacement, guess.contact > 0.0)
+        now = _Iterate(control, guess.plane, displacement, guess.contact > 0.0)
         if control.free.any() and not self._count(now.active):
             self._put_on_springs(now)
         now.active = now.active | (self._depth(now) > self._rounding)
@@ -203,26 +200,23 @@ class PrimalDualActiveSet:
         return spent, allowed
 
     def _converged(self, now: _Iterate, sets: int, spent: int) -> ContactSolution:
-        """Remove the last penetrations, and remember the solution for later guesses."""
+        """Remove the last interferences."""
         depth = self._depth(now)
         removed = np.where(now.active, depth, np.maximum(depth, 0.0))
         now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
         forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
         slack = _CLOSED * largest(now.displacement.array_r, self._comm)
-        found = ContactSolution(
-            plane=now.plane,
-            displacement=now.displacement.array_r.copy(),
-            nodal_force=np.where(now.active, forces, 0.0),
+        forces = np.where(now.active, forces, 0.0)
+        return ContactSolution(
+            end=Guess(now.plane, now.displacement.array_r.copy(), forces),
+            nodal_force=forces,
             # vertices of quadratic triangles touch without a force
             touching=now.active | (depth > -slack),
-            active_sets=sets,
+            iterations=sets,
             linear_iterations=spent,
             reason="CONVERGED_ACTIVE_SET" if self._count(now.active) else "CONVERGED_NO_CONTACT",
         )
-        force = float(self._plane.levers.loads(found.nodal_force)[0])
-        self._history.add(Guess(found.plane, found.displacement, found.nodal_force), force)
-        return found
 
     def _update_residual(self, displacement: PETSc.Vec) -> None:
         """Set the residual −K u of a displacement; on the top it is the contact forces."""
@@ -230,7 +224,7 @@ class PrimalDualActiveSet:
         self._residual.scale(-1.0)
 
     def _depth(self, now: _Iterate) -> Array:
-        return self._plane.penetration(now.plane, -now.displacement.array_r[self._top.dofs])
+        return self._plane.interference(now.plane, -now.displacement.array_r[self._top.dofs])
 
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""

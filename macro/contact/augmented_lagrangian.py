@@ -1,12 +1,12 @@
 """Contact at the quadrature points of a rough top by an augmented Lagrangian.
 
-With d the penetration of a point into the plane and k a stiffness, the pressures are
+With d the interference of a point and the plane and k a stiffness, the pressures are
 
     p = ⟨p₀ + k d⟩,   ⟨·⟩ the positive part.
 
-The pressures of one solve are the multipliers p₀ of the next, until no point in contact penetrates
-(Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised Newton's method
-with line search finds the equilibrium.
+The pressures of one solve are the multipliers p₀ of the next, until no point in contact is behind
+the plane (Alart & Curnier 1991, doi 10.1016/0045-7825(91)90022-X). For every p₀ a generalised
+Newton's method with line search finds the equilibrium.
 
 Theory: section 12 of ``docs/theory.md``.
 """
@@ -19,25 +19,30 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
-from macro.contact.augmented_newton import LOOSEST, SPARE, AugmentedLaw, FacetNewton
+from geometry.slope_search import slope_search
+from macro import compat
 from macro.contact.contact_forces import ContactForces
-from macro.contact.equilibrium import Equilibrium
+from macro.contact.equations import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.node_contact import (
-    ContactSolution,
-    Extrapolation,
-    Guess,
-    PlaneOverNodes,
-    largest,
-    not_found,
-)
-from macro.contact.rough_face import RoughFace
+from macro.contact.initial_guess import Guess
+from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
+from macro.contact.unilateral_springs import AugmentedLaw, StiffPreconditioner
 from macro.linear_solvers.constrained import contact_tolerance
+from macro.linear_solvers.options import conjugate_gradients, reason_name
 
 Array = NDArray[np.float64]
 
-PENETRATION = {1: 1e-8, 2: 1e-5}
-"""Largest penetration of quadrature points, and largest gap of those under pressure, relative to
+_LOOSEST = 0.03
+"""Largest relative residual of linear solves, and tolerance of the first equilibrium."""
+
+_SPARE = 0.3
+"""Share of a tolerance that an inner solve aims at."""
+
+_MOST_STEPS = 60
+"""Newton steps of an equilibrium."""
+
+INTERFERENCE = {1: 1e-8, 2: 1e-5}
+"""Largest interference of quadrature points, and largest gap of those under pressure, relative to
 the largest displacement, by the element's degree. On quadratic facets the conditions of
 neighbouring points are nearly dependent, and multipliers that share a load converge slowly."""
 
@@ -48,7 +53,7 @@ _HARDER, _HARDEST = 10.0, 10.0
 """Factor of k between updates, and its largest factor beyond the usual one."""
 
 _FALL = 0.1
-"""Factor by which an update must reduce the penetration; otherwise k grows."""
+"""Factor by which an update must reduce the interference; otherwise k grows."""
 
 _MOST_UPDATES = 40
 _NO_FORCE = 1e-6
@@ -68,6 +73,7 @@ class AugmentedLagrangian:
     Attributes:
         law: Law of the quadrature points.
         equilibrium: Equations of the body with this law.
+        points: Number of pressures in a guess: this rank's quadrature points.
 
     Note:
         Everything here is collective.
@@ -78,41 +84,48 @@ class AugmentedLagrangian:
         body, loaded = face.body, face.loaded(2 * face.body.degree)
         self._sampling = sampling = loaded.pointwise
         (distance,) = top.with_ghosts(plane.distance)
-        points = loaded.quadrature
+        self._points = points = loaded.quadrature
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
         self._stiff, self._soft = _HARD * unit, _SOFT * unit
         self._tolerance = contact_tolerance()
-        self._penetration = PENETRATION[body.degree]
+        self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
         self._forces = ContactForces(loaded, sampling, [self.law], none)
         self.equilibrium = Equilibrium(body, self._forces)
-        self._newton = FacetNewton(self.equilibrium, self.law, loaded, top, plane)
-        self._history = Extrapolation(body.owned_dofs, len(points.x))
+        self._preconditioner = StiffPreconditioner(
+            body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree
+        )
+        self._ksp = conjugate_gradients(
+            self.equilibrium.tangent, body.stiffness, self._preconditioner
+        )
+        self.points = len(points.x)
 
-    def solve(self, control: Control) -> ContactSolution:
-        """Find the contact of a load step, with an initial guess from the steps before.
+    def solve(self, control: Control, guess: Guess) -> ContactSolution:
+        """Find the contact of a load step.
+
+        Args:
+            control: What the load step prescribes.
+            guess: Where to start: the plane with its prescribed motions, and pressures at points.
 
         Raises:
-            NotConverged: When an iteration fails or nothing can hold the plane; earlier solutions
-                stay what they were.
+            NotConverged: When an iteration fails or nothing can hold the plane.
         """
-        guess = self._history.guess(control)
         forces, law = self._forces, self.law
-        forces.control, forces.plane = control, self._plane.placed(control, guess.plane)
+        forces.control, forces.plane = control, guess.plane
         law.multiplier = np.maximum(guess.contact, 0.0)
         displacement = self._body.stiffness.createVecRight()
         displacement.array[:] = guess.displacement
         comm = self._body.comm
-        steps, spent, tolerance, before = 0, 0, LOOSEST, np.inf
+        steps, spent, tolerance, before = 0, 0, _LOOSEST, np.inf
         law.slope, hardest = self._soft, self._stiff
         for _ in range(_MOST_UPDATES):
-            more, cycles = self._newton.solve(displacement, tolerance, control)
+            more, cycles = self._balance(displacement, tolerance, control)
             steps, spent = steps + more, spent + cycles
             closure = forces.closure(displacement)
-            # penetration of points without pressure, penetration or gap of points under pressure
+            # interference of points without pressure, interference or gap of points under pressure
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
-            allowed = self._penetration * largest(displacement.array_r, comm)
+            allowed = self._interference * largest(displacement.array_r, comm)
             ratio = depth / max(allowed, _TINY)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(comm.allreduce(hard, op=MPI.LAND))
@@ -124,9 +137,71 @@ class AugmentedLagrangian:
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             if hard:
-                near = min(0.1 * tolerance, SPARE * self._penetration * ratio)
+                near = min(0.1 * tolerance, _SPARE * self._interference * ratio)
                 tolerance = max(self._tolerance, near)
         raise not_found(control, "MULTIPLIERS", _MOST_UPDATES)
+
+    def _balance(
+        self, displacement: PETSc.Vec, tolerance: float, control: Control
+    ) -> tuple[int, int]:
+        """Find the equilibrium under fixed multipliers, by generalised Newton's method.
+
+        Args:
+            displacement: Initial guess; receives the solution [mm].
+            tolerance: Norm of the residual relative to that of the contact forces.
+            control: What is prescribed, for an error.
+
+        Returns:
+            Newton steps and linear iterations.
+
+        Raises:
+            NotConverged: When Newton's method, its line search or a linear solve fails.
+        """
+        equilibrium, spent = self.equilibrium, 0
+        residual, step = displacement.duplicate(), displacement.duplicate()
+        for steps in range(_MOST_STEPS):
+            equilibrium.residual(displacement, residual)
+            norm, scale = residual.norm(), equilibrium.scale
+            if norm <= tolerance * scale:
+                return steps, spent
+            if not scale:  # no contact
+                displacement.set(0.0)
+                continue
+            self._linearise(displacement)
+            rtol = max(min(_LOOSEST, norm / scale), _SPARE * tolerance * scale / norm)
+            self._ksp.setTolerances(rtol=rtol)
+            self._ksp.solve(residual, step)
+            spent += int(self._ksp.its)
+            if self._ksp.reason < 0:
+                name = reason_name(PETSc.KSP.ConvergedReason, self._ksp.reason)
+                raise not_found(control, name, spent)
+            if not self._advance(displacement, residual, step):
+                raise not_found(control, "LINE_SEARCH", steps)
+            compat.collect_garbage(displacement.comm)  # every step leaves a field
+        raise not_found(control, "NEWTON", _MOST_STEPS)
+
+    def _linearise(self, displacement: PETSc.Vec) -> None:
+        """Move the tangent and its preconditioner to a displacement."""
+        self.equilibrium.update_tangent(displacement)
+        slope = self.law.stiffness(self.equilibrium.forces.closure(displacement))
+        points = self._points
+        rows, columns = np.nonzero((points.values != 0.0) & (slope > 0.0)[:, None])
+        loaded = self._top.sum_of_ranks(points.nodes[rows, columns], np.ones(len(rows))) > 0.0
+        free = self.equilibrium.forces.control.free
+        motions = self._plane.levers.scaled(free)[loaded]
+        motions = motions @ self._plane.supported_motions(free, loaded)
+        self._preconditioner.update(slope / points.weight, self._top.dofs[loaded], motions)
+
+    def _advance(self, displacement: PETSc.Vec, residual: PETSc.Vec, step: PETSc.Vec) -> bool:
+        """Subtract a share of a step after which the slope of the energy along it has fallen."""
+        start = displacement.copy()
+
+        def slope_after(share: float) -> float:
+            displacement.waxpy(-share, step, start)
+            self.equilibrium.residual(displacement, residual)
+            return -float(residual.dot(step))
+
+        return slope_search(slope_after, -float(residual.dot(step)), 1.0) is not None
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
         closure, plane = self._forces.closure(displacement), self._forces.plane.copy()
@@ -135,22 +210,17 @@ class AugmentedLagrangian:
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         nodal_force = -load.array_r[self._top.dofs]
-        gap = -self._plane.penetration(plane, -displacement.array_r[self._top.dofs])
+        gap = -self._plane.interference(plane, -displacement.array_r[self._top.dofs])
         comm = self._body.comm
         pressed = largest(nodal_force, comm)
         touching = nodal_force > _NO_FORCE * pressed
         if pressed:
-            touching |= gap < self._penetration * largest(displacement.array_r, comm)
-        values = displacement.array_r.copy()
-        self._history.add(
-            Guess(plane, values, pressure), float(self._plane.levers.loads(nodal_force)[0])
-        )
+            touching |= gap < self._interference * largest(displacement.array_r, comm)
         return ContactSolution(
-            plane=plane,
-            displacement=values,
+            end=Guess(plane, displacement.array_r.copy(), pressure),
             nodal_force=nodal_force,
             touching=touching,
-            active_sets=steps,
+            iterations=steps,
             linear_iterations=spent,
             reason="CONVERGED_MULTIPLIERS" if pressed else "CONVERGED_NO_CONTACT",
         )

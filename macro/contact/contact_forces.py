@@ -5,22 +5,28 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Callable, Sequence
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
-from geometry.rigid_plane import Control, PlaneLevers, plane_failure
-from macro.contact.loaded_face import Loadable, Sampling
+from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
+from macro.contact.contact_state import ContactState
+from macro.contact.loaded_face import ContactFace
+from macro.contact.sampling import Sampling
 from support.collective import together
 
 Array = NDArray[np.float64]
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
+
+
+_MATRIX = "patchlaw matrix"
 
 
 class ContactLaw(Protocol):
@@ -59,8 +65,7 @@ class ContactForces:
         face: The contact face with its patches.
         sampling: Where the laws are evaluated.
         laws: One law per patch, the same on every rank.
-        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm]; None:
-            the depth of the face below its plane.
+        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
 
     Attributes:
         levers: Levers of this rank's samples about the middle of the patches.
@@ -74,20 +79,16 @@ class ContactForces:
     """
 
     def __init__(
-        self,
-        face: Loadable,
-        sampling: Sampling,
-        laws: Sequence[ContactLaw],
-        gap: Array | None = None,
+        self, face: ContactFace, sampling: Sampling, laws: Sequence[ContactLaw], gap: Array
     ) -> None:
-        self._sampling, self.comm = sampling, face.comm
+        self._face, self._sampling, self.comm = face, sampling, face.comm
         self._pressures = [law.pressure for law in laws]
         self._stiffnesses = [law.stiffness for law in laws]
         patches = face.patches
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
         )
-        self._gap = sampling.depth if gap is None else gap
+        self._gap = gap
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
         self._unloaded = False
@@ -165,7 +166,7 @@ class ContactForces:
         self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 
-    def add_stiffness(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y."""
         operator, samples = self._sampling.operator, self._sampling.values
         operator.multTranspose(x, samples)
@@ -196,6 +197,28 @@ class ContactForces:
             pressure: Pressures of this rank's samples, shape (n,) [MPa].
         """
         return self.levers.loads(self._sampling.weight * pressure)
+
+    def state(self, closure: Array, **known: Any) -> ContactState:
+        """Return the contact under the plane as it is now.
+
+        Args:
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            known: What else is known of the state.
+        """
+        pressure, areas = self.pressure(closure), self._face.areas
+        (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
+        (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
+        return ContactState(
+            plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
+            force=float(force),
+            moment=np.array(moment),
+            patch_force=patch_force,
+            patch_pressure=patch_force / areas,
+            patch_closure=self._sampling.patch_sums(closure) / areas,
+            sample_closure=closure,
+            sample_pressure=pressure,
+            **known,
+        )
 
     def border(self, stiffness: Array) -> Array:
         """Return E, shape (n, k'): free motions of the plane reduce D ds by E Eᵀ W ds.
@@ -237,3 +260,50 @@ def first_touch(touched: Callable[[float], bool], control: Control, half: float)
         width, middle = above - below, 0.5 * (below + above)
         below, above = (below, middle) if touched(middle) else (middle, above)
     return below
+
+
+class AddsProduct(Protocol):
+    """Contact whose derivative is applied without being assembled."""
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative with a vector x to y."""
+        ...
+
+
+class ContactTangent:
+    """What PETSc holds of a matrix plus the derivatives of contacts, which their owners keep.
+
+    The references to them are weak, and PETSc itself counts the matrix: an object that Python lets
+    go of while PETSc frees the shell would never be freed.
+
+    Args:
+        contacts: The contacts.
+    """
+
+    def __init__(self, contacts: Sequence[AddsProduct]) -> None:
+        self.follow(contacts)
+
+    def follow(self, contacts: Sequence[AddsProduct]) -> None:
+        """Take the derivatives of other contacts from now on."""
+        self._contacts = [weakref.proxy(contact) for contact in contacts]
+
+    def shell(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Return the sum with a matrix, as a PETSc matrix without entries."""
+        shell = PETSc.Mat().createPython(matrix.getSizes(), self, comm=matrix.comm)
+        shell.compose(_MATRIX, matrix)
+        shell.setUp()
+        return shell
+
+    def mult(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product with x; PETSc calls this."""
+        shell.query(_MATRIX).mult(x, y)
+        self._add_contacts(x, y)
+
+    def multTranspose(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product of the transpose with x; the part of contact is symmetric."""
+        shell.query(_MATRIX).multTranspose(x, y)
+        self._add_contacts(x, y)
+
+    def _add_contacts(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        for contact in self._contacts:
+            contact.add_product(x, y)

@@ -12,7 +12,6 @@ import ufl
 from dolfinx import fem
 from mpi4py import MPI
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
@@ -160,15 +159,15 @@ class TopNodes:
         pairs = np.stack([np.broadcast_to(hub[:, None], nodes.shape)[linked], nodes[linked]])
         pairs = np.concatenate(self._body.comm.allgather(pairs), axis=1)
         names, ends = np.unique(pairs, return_inverse=True)
-        found = np.full(len(self.dofs), -1, dtype=np.intp)
+        regions = np.full(len(self.dofs), -1, dtype=np.intp)
         if not len(names):
-            return found, 0
+            return regions, 0
         shape = (len(names), len(names))
         graph = coo_array((np.ones(pairs.shape[1]), tuple(ends.reshape(2, -1))), shape=shape)
         count, region = connected_components(graph, directed=False)
         own = self._numbers(self.dofs[touching] // 3)
-        found[touching] = region[np.searchsorted(names, own)]
-        return found, int(count)
+        regions[touching] = region[np.searchsorted(names, own)]
+        return regions, int(count)
 
     @cached_property
     def _empty(self) -> tuple[NDArray[np.bool_], csr_array]:
@@ -182,7 +181,7 @@ class TopNodes:
         # all nodes at the smallest distance
         near = tree.query_ball_point(centres, (1.0 + 1e-9) * least) if tree.n else []
         rows = np.concatenate([np.empty(0, dtype=np.intp), *map(np.asarray, near)]).astype(np.intp)
-        counts = np.array([len(found) for found in near], dtype=np.intp)
+        counts = np.array([len(nodes) for nodes in near], dtype=np.intp)
         columns = np.repeat(np.arange(len(near)), counts)
         shape = (len(self.x), len(centres))
         return empty, coo_array((np.ones(len(rows)), (rows, columns)), shape=shape).tocsr()
@@ -221,11 +220,11 @@ class TopNodes:
             nodes: Rank-local nodes of the top, any shape.
             values: Values for them, of the same shape.
         """
-        vector = self._body.stiffness.createVecRight()
-        rows = (3 * self._numbers(nodes).astype(np.int64) + 2).astype(PETSc.IntType)
-        vector.setValues(rows.ravel(), values.ravel(), addv=True)
-        vector.assemble()
-        return vector.array_r[self.dofs].copy()
+        space = self._body.space
+        index_map = space.dofmap.index_map
+        size = 3 * (index_map.size_local + index_map.num_ghosts)
+        local = np.bincount(3 * nodes.ravel() + 2, values.ravel(), minlength=size)
+        return compat.sum_of_ranks(space, local)[self.dofs]
 
     def _numbers(self, nodes: Index) -> Index:
         """Return the global numbers of rank-local nodes."""

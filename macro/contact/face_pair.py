@@ -9,7 +9,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,8 @@ from scipy.spatial import cKDTree
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.body_pair import BodyPair
-from macro.contact.loaded_face import LoadedFace, Mode, Sampling, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, normal_rows
+from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
 from support.errors import InputError
@@ -37,15 +38,17 @@ _UNLIKE = 1e-6
 """Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
 
 
+_SAMPLED = ("weight", "x", "y", "depth", "patch")
+
+
 @dataclass(frozen=True, eq=False)
-class FacePair:
+class FacePair(ContactFace):
     """Patches on the contact faces of a body and its counter-body.
 
     Args:
         first: The face of the body with its patches.
         second: The face of the counter-body with the same patches, its facets in the frame of the
-            first (``opposed``).
-        bodies: Both bodies.
+            first (``opposed``), on the same communicator.
 
     Note:
         Everything here is collective.
@@ -53,12 +56,11 @@ class FacePair:
 
     first: LoadedFace
     second: LoadedFace
-    bodies: BodyPair
 
-    @property
+    @cached_property
     def body(self) -> BodyPair:
         """Both bodies."""
-        return self.bodies
+        return BodyPair(self.first.body, self.second.body)
 
     @property
     def comm(self) -> Any:
@@ -66,7 +68,7 @@ class FacePair:
         return self.first.comm
 
     @property
-    def patches(self) -> PatchGrid:
+    def patches(self) -> PatchGrid | Outline:  # type: ignore[override]
         """Patches on both faces."""
         return self.first.patches
 
@@ -75,19 +77,11 @@ class FacePair:
         """Areas of the patches on the first face, shape (N,) [mm²]."""
         return self.first.areas
 
-    def sampling(self, mode: Mode) -> Sampling:
-        """Return the samples of a mode, see `LoadedFace.sampling`.
-
-        Raises:
-            InputError: When the faces do not cover the patches alike, or there is no such mode.
-        """
-        return self.pointwise if mode == "pointwise" else self.patchwise
-
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        one, other = self.first.sampling("patchwise"), self.second.patchwise
-        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.patches.areas):
+        one, other = self.first.patchwise, self.second.patchwise
+        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.areas):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),
@@ -99,24 +93,16 @@ class FacePair:
     def pointwise(self) -> Sampling:
         """Laws at the quadrature points of the first face that lie on the second."""
         one = self.first.pointwise
-        rows, depth, found = self._counter_rows
-        own = _local_rows(self.first.points_by_dofs)[found]
-        kept = Sampling(
-            operator=one.operator,
-            weight=one.weight[found],
-            x=one.x[found],
-            y=one.y[found],
-            depth=one.depth[found],
-            patch=one.patch[found],
-            count=one.count,
-        )
+        rows, depth, kept = self._counter_rows
+        own = _local_rows(self.first.points_by_dofs)[kept]
         both = []
-        for points_by_dofs, face in ((own, self.first), (rows[found], self.second)):
+        for points_by_dofs, face in ((own, self.first), (rows[kept], self.second)):
             unknowns = 3 * face.space.dofmap.index_map.size_local
             matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
             matrix.transpose(transposed)
             both.append(_local_rows(transposed))
-        return self._both(kept, both[0], both[1], depth[found])
+        samples = {name: getattr(one, name)[kept] for name in _SAMPLED}
+        return self._both(replace(one, **samples), both[0], both[1], depth[kept])
 
     @property
     def on_both(self) -> NDArray[np.bool_]:
@@ -130,78 +116,44 @@ class FacePair:
             pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
         """
         parts = [face.load(pressures).array_r for face in (self.first, self.second)]
-        load = self.bodies.stiffness.createVecRight()
+        load = self.body.stiffness.createVecRight()
         load.array[:] = np.concatenate(parts)
         return load
-
-    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the sums of the displacements of the patches into both bodies, (N,) [mm]."""
-        sampling = self.patchwise
-        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
 
     def _both(self, one: Sampling, own: csr_matrix, other: csr_matrix, depth: Array) -> Sampling:
         """Return samples of both faces, from the rows of both bodies in their operators."""
         rows = vstack([own, other]).tocsr()
-        return Sampling(
-            operator=distributed(rows, len(one.weight), self.comm),
-            weight=one.weight,
-            x=one.x,
-            y=one.y,
-            depth=one.depth + depth,
-            patch=one.patch,
-            count=one.count,
-        )
+        operator = distributed(rows, len(one.weight), self.comm)
+        return replace(one, operator=operator, depth=one.depth + depth)
 
     @cached_property
     def _counter_rows(self) -> tuple[csr_matrix, Array, NDArray[np.bool_]]:
         """The counter-body's −w φ n at this rank's points, its depths, and which points it has."""
         points, space = self.first.quadrature, self.second.space
-        whole = _gathered(self.second.facets, space, self.comm)
-        facet, local = _located(whole.facets, np.column_stack([points.x, points.y]))
-        found = facet >= 0
-        facet, local = np.where(found, facet, 0), np.where(found[:, None], local, 0.0)
-        if not len(whole.nodes):
+        own, index_map = self.second.facets, space.dofmap.index_map
+        cells = compat.cell_nodes(space)[own.cell]
+        numbers = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
+        nodes = np.concatenate(self.comm.allgather(numbers))
+        first, *others = self.comm.allgather(own)
+        whole = first.joined(others)
+        if not len(nodes):
             raise InputError("the counter-body has no contact face")
+        facet, local = _located(whole, np.column_stack([points.x, points.y]))
+        on_both = facet >= 0
+        facet, local = np.where(on_both, facet, 0), np.where(on_both[:, None], local, 0.0)
         values = compat.lagrange_values(
             space.mesh.topology.cell_name(),
             compat.lagrange_degree(space),
-            whole.facets.pull_back(facet, local),
+            whole.pull_back(facet, local),
         )
         rows = normal_rows(
             points.weight[:, None] * values,
-            whole.nodes[facet],
-            np.abs(values) > 1e-12,
-            self.second.facets.outward,
-            space.dofmap.index_map.size_global,
+            nodes[facet],
+            values != 0.0,
+            own.outward,
+            index_map.size_global,
         )
-        return rows, whole.facets.depths(facet, local), found
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _WholeFace:
-    """Facets of all ranks, and the global numbers of their cells' nodes, shape (facets, m)."""
-
-    facets: ContactFacets
-    nodes: NDArray[np.int64]
-
-
-def _gathered(facets: ContactFacets, space: Any, comm: Any) -> _WholeFace:
-    """Return the facets of all ranks on every rank."""
-    cells, index_map = compat.cell_nodes(space)[facets.cell], space.dofmap.index_map
-    nodes = index_map.local_to_global(cells.ravel()).reshape(cells.shape).astype(np.int64)
-    parts = (facets.cell, facets.side, facets.reference, facets.corners, facets.depth, nodes)
-    shared = zip(*comm.allgather(parts), strict=True)
-    cell, side, reference, corners, depth, numbers = (np.concatenate(part) for part in shared)
-    whole = ContactFacets(
-        frame=facets.frame,
-        outward=facets.outward,
-        cell=cell,
-        side=side,
-        reference=reference,
-        corners=corners,
-        depth=depth,
-    )
-    return _WholeFace(whole, numbers)
+        return rows, whole.depths(facet, local), on_both
 
 
 def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Array]:

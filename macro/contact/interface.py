@@ -6,8 +6,8 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -18,27 +18,24 @@ from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
-from macro.contact.chosen_face import ChosenFace, chosen_face
-from macro.contact.contact_forces import ContactForces, ContactLaw
-from macro.contact.contact_tangent import ContactTangent, free_unknowns
-from macro.contact.interface_laws import InterfaceLaws, laws_on_face
-from macro.contact.interface_state import InterfaceResults, InterfaceState
-from macro.contact.loaded_face import LoadedFace, Mode, crown_depth
-from macro.linear_solvers.stiffened import springs_at
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTangent
+from macro.contact.contact_state import ContactState
+from macro.contact.interface_parts import ChosenFace, InterfaceLaws, chosen_face, laws_on_face
+from macro.contact.loaded_face import LoadedFace, Mode
+from macro.contact.sampling import crown_depth
+from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
-class _Displacements:
-    """What `LoadedFace` needs of a body: the space of its displacements."""
-
-    space: Any
+def _result(name: str, meaning: str) -> Any:
+    """Return a property: a part of the latest state, read without communication."""
+    return property(lambda interface: getattr(interface.state, name), doc=meaning)
 
 
-class Interface(InterfaceResults):
+class Interface:
     """Contact laws between a planar face of a body and a rigid plane, as a term of its equations.
 
     The body, its material and its supports are the user's; displacements are in mm and stresses in
@@ -89,6 +86,17 @@ class Interface(InterfaceResults):
         those of the latest `evaluate`, and the same on every rank unless they say so.
     """
 
+    force = _result("force", "Force on the face against its normal [N].")
+    moment = _result("moment", "First moments of the pressures about the middle, (2,) [N mm].")
+    area = _result("contact_area", "Real contact area [mm²]; None where a law does not know it.")
+    patch_pressure = _result("patch_pressure", "Mean pressures of the patches, shape (N,) [MPa].")
+    patch_closure = _result("patch_closure", "Mean closures of the patches, shape (N,) [mm].")
+    closure = _result(
+        "sample_closure", "Closures of this rank's samples, patches or points, (n,) [mm]."
+    )
+    pressure = _result("sample_pressure", "Pressures of this rank's samples, shape (n,) [MPa].")
+    plane = _result("plane", "The plane, also where it follows from loads, about the middle.")
+
     def __init__(
         self,
         space: Any,
@@ -117,7 +125,7 @@ class Interface(InterfaceResults):
     def _make(self, face: ChosenFace, chosen: InterfaceLaws, crown: Any) -> None:
         self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = LoadedFace(_Displacements(self.space), face.facets, chosen.patches)
+        self._face = LoadedFace(SimpleNamespace(space=self.space), face.facets, chosen.patches)
         sampling = self._face.sampling(chosen.mode)
         self.sampling, self.marked, self._crown = sampling, face.marked, crown
         gap = together(self.comm, lambda: sampling.below(crown))
@@ -129,6 +137,7 @@ class Interface(InterfaceResults):
         self._load = sampling.operator.createVecLeft()
         self._masked = self._load.duplicate()
         self._free: PETSc.Vec | None = None
+        self._state: ContactState | None = None
 
     @property
     def comm(self) -> Any:
@@ -180,7 +189,7 @@ class Interface(InterfaceResults):
         for part in (self._free, rows) if self._free is not None else ():
             if part is not None:
                 part.destroy()
-        self._free = free_unknowns(self.space, bcs, self._load) if bcs else None
+        self._free = free_unknowns(bcs, self._load.duplicate()) if bcs else None
 
     def add_residual(self, x: Any, residual: PETSc.Vec) -> None:
         """Add −B p(c(u)) to a residual of internal less external forces [N].
@@ -245,26 +254,43 @@ class Interface(InterfaceResults):
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product of the derivative with a vector x to y, as a shell does."""
         if self._free is None:
-            self.forces.add_stiffness(x, y)
+            self.forces.add_product(x, y)
             return
         product = self._load
         self._masked.pointwiseMult(x, self._free)
         product.set(0.0)
-        self.forces.add_stiffness(self._masked, product)
+        self.forces.add_product(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 
-    def evaluate(self, x: Any) -> InterfaceState:
+    def evaluate(self, x: Any) -> ContactState:
         """Evaluate the contact at displacements; the properties then give its parts.
 
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
         closure = self.forces.closure(self._vector(x))
-        self._state = InterfaceState.of(
-            self.forces, self.sampling, self.laws, self._face.areas, self.patches, closure
-        )
+        self._state = self.forces.state(closure, contact_area=self._contact_area(closure))
         return self._state
+
+    @property
+    def state(self) -> ContactState:
+        """The contact at the latest `evaluate`.
+
+        Raises:
+            InputError: Before that.
+        """
+        if self._state is None:
+            raise InputError("nothing is solved or evaluated on this interface yet")
+        return self._state
+
+    def _contact_area(self, closure: Array) -> float | None:
+        """Return the contact area, on the tangents beyond tables; None without ``at`` of a law."""
+        if not all(hasattr(law, "at") for law in self.laws):
+            return None
+        functions = [partial(_area_fraction, law) for law in self.laws]
+        share = together(self.comm, lambda: self.sampling.by_patch(functions, closure))
+        return float(self.sampling.patch_sums(share).sum())
 
     def check_range(self) -> None:
         """Refuse closures of the latest `evaluate` beyond the tables of the laws.
@@ -310,6 +336,10 @@ class Interface(InterfaceResults):
                 allowed=f"{self._load.getSize()} unknowns",
             )
         return vector
+
+
+def _area_fraction(law: Any, closure: Array) -> Array:
+    return np.asarray(law.at(closure, extend=True).contact_area_fraction)
 
 
 def _prescribed(indenter: RigidPlane | Control, middle: Array) -> Control:

@@ -16,7 +16,7 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from macro.contact.interface import Interface
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facets import facet_nodes
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -167,5 +167,5 @@ def _cell_facets(mesh: Any, surface: Any, mapped: Any) -> NDArray[np.int32]:
     """Return the cell and the local facet in it of every cell of a surface, shape (m, 2)."""
     cells = surface.topology.index_map(2)
     own = np.arange(cells.size_local + cells.num_ghosts, dtype=np.int32)
-    found = facet_nodes(mesh, mapped.sub_topology_to_topology(own, False))
-    return np.column_stack((found.cell, found.side)).astype(np.int32)
+    nodes = facet_nodes(mesh, mapped.sub_topology_to_topology(own, False))
+    return np.column_stack((nodes.cell, nodes.side)).astype(np.int32)

@@ -6,61 +6,28 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
 from macro import compat
+from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
-from macro.contact.equilibrium import Equilibrium
-from macro.contact.loaded_face import Loadable, Mode
-from macro.contact.newton import DisplacementBasis, NewtonReport, NewtonSolver
-from macro.linear_solvers.options import solve_linear
+from macro.contact.contact_state import ContactState
+from macro.contact.equations import Equilibrium
+from macro.contact.initial_guess import DisplacementBasis
+from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
+from macro.contact.newton import Newton
+from macro.linear_solvers.node_matrices import Stiffened, springs_at
+from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LawContactState:
-    """Equilibrium of the body at one load step.
-
-    All but the displacement is the same on every rank.
-
-    Args:
-        approach: Approach of the rigid plane at the middle of the patches [mm].
-        tilt: Change of the approach along x and y [mm/mm].
-        displacement: This rank's owned displacements, dof by dof, those by other loads than the
-            contact included [mm].
-        closure: Mean closure of the patches, shape (N,) [mm].
-        pressure: Mean pressure of the patches, shape (N,) [MPa].
-        force: Force on the contact face [N].
-        moment: First moments of the pressures along x and y, about the middle of the patches,
-            shape (2,) [N mm].
-        reaction: Force that the supports bear [N]; equals ``force`` in equilibrium.
-        newton_iterations: Newton steps.
-        linear_iterations: Iterations of the linear solver, all Newton steps together.
-        residuals: Norm of the residual before each Newton step and at the end, relative to the
-            norm of the load on the face there.
-        reason: Name of PETSc's reason to stop.
-    """
-
-    approach: float
-    tilt: tuple[float, float]
-    displacement: Array
-    closure: Array
-    pressure: Array
-    force: float
-    moment: Array
-    reaction: float
-    newton_iterations: int
-    linear_iterations: int
-    residuals: Array
-    reason: str
 
 
 class LawContactProblem:
@@ -88,7 +55,7 @@ class LawContactProblem:
 
     def __init__(
         self,
-        face: Loadable,
+        face: ContactFace,
         laws: Sequence[ContactLaw],
         mode: Mode = "patchwise",
         *,
@@ -107,14 +74,18 @@ class LawContactProblem:
             gap = gap + sampling.displacements(preload)
         self.forces = ContactForces(face, sampling, laws, gap)
         self.equilibrium = Equilibrium(body, self.forces)
-        self.newton = NewtonSolver(
+        self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, body.solver
         )
+        self.newton = Newton(self.equilibrium, self._preconditioner)
+        condensed = " or, on a very soft body, coupling.newton = 'condensed'"
+        steps = "take more load steps (load.steps)"
+        self._remedies = {"": steps + condensed if mode == "patchwise" else steps}
         self.basis = DisplacementBasis(self.equilibrium, self._sampling)
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def solve(self, control: Control) -> LawContactState:
+    def solve(self, control: Control) -> ContactState:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
@@ -131,9 +102,19 @@ class LawContactProblem:
         self.forces.prescribe(control, self._plane)
         solution = equilibrium.body.stiffness.createVecRight()
         self.basis.write_guess(solution)
-        report = self.newton.solve(solution, control)
+        report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self.basis.add(solution)
-        state = self._state(solution, report)
+        self._closure, body = self.forces.closure(solution), equilibrium.body
+        self._plane = self.forces.plane.copy()
+        state = self.forces.state(
+            self._closure,
+            displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
+            reaction=body.reaction(solution),
+            iterations=report.iterations,
+            linear_iterations=report.linear_iterations,
+            residuals=report.residuals,
+            reason=report.reason,
+        )
         compat.collect_garbage(solution.comm)
         return state
 
@@ -172,11 +153,6 @@ class LawContactProblem:
         values = together(self._face.comm, lambda: sampling.by_patch(functions, self._closure))
         return sampling.patch_sums(values) / self._face.areas
 
-    @property
-    def pressures(self) -> Array:
-        """Pressures at this rank's samples at the latest equilibrium, shape (n,) [MPa]."""
-        return self.forces.pressure(self._closure)
-
     def patch_largest(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Return the largest values of functions of closure on the patches, as `patch_means` does.
 
@@ -189,29 +165,80 @@ class LawContactProblem:
         Note:
             Collective.
         """
-        sampling, found = self._sampling, np.zeros(self._sampling.count)
-        np.maximum.at(found, sampling.patch, sampling.by_patch(functions, self._closure))
-        parts = self._face.comm.allgather(found)
-        return np.asarray(np.max(parts, axis=0))
+        sampling, largest = self._sampling, np.zeros(self._sampling.count)
+        np.maximum.at(largest, sampling.patch, sampling.by_patch(functions, self._closure))
+        return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
-    def _state(self, solution: PETSc.Vec, report: NewtonReport) -> LawContactState:
-        body, contact, sampling = self.equilibrium.body, self.forces, self._sampling
-        self._closure = closure = contact.closure(solution)
-        self._plane = plane = contact.plane.copy()
-        pressure = contact.pressure(closure)
-        forces, load = sampling.patch_sums(pressure), contact.loads(pressure)
-        areas = self._face.areas
-        return LawContactState(
-            approach=float(plane[0]),
-            tilt=(float(plane[1]), float(plane[2])),
-            displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
-            closure=sampling.patch_sums(closure) / areas,
-            pressure=forces / areas,
-            force=float(forces.sum()),
-            moment=load[1:],
-            reaction=body.reaction(solution),
-            newton_iterations=report.iterations,
-            linear_iterations=report.linear_iterations,
-            residuals=report.residuals,
-            reason=report.reason,
-        )
+
+_STIFF = 1.0
+"""Stiffness of laws over that of the elements, at the node where it is largest, from which on the
+preconditioner has it."""
+_MOVED = 0.5
+"""Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
+"""
+
+
+class ContactPreconditioner:
+    """The preconditioner of a body's tangents: with the stiffness of the laws where that matters.
+
+    The preconditioner of the body alone serves every tangent as long as the laws are softer than
+    the elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of:
+    iterations grow to ten times as many and more. Laws at points couple no other nodes than the
+    elements do, so that their stiffness fits into the matrix, and multigrid is set up with it. On
+    quadratic elements that takes no second matrix: only the coarser grid has the sum's entries.
+
+    Args:
+        equilibrium: The equations.
+        face: The contact face that laws stand on at points; None for other laws. Only those on the
+            face of one meshed body enter the matrix.
+        solver: Linear solver of the body alone.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(self, equilibrium: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
+        self._equilibrium, self._face, self._alone = equilibrium, face, solver
+        body = equilibrium.body
+        self._body: MeshedBody | None = None
+        if isinstance(face, LoadedFace) and isinstance(body, MeshedBody):
+            self._body = body
+        self._with_laws: PETSc.KSP | None = None
+        self._stiffened: Stiffened | None = None
+        self._slope: Array | None = None
+
+    def update(self) -> None:
+        """Follow the tangent, where the laws are stiff."""
+        body, slope = self._body, self._equilibrium.forces.slope
+        if body is None:
+            return
+        comm = self._face.comm
+        if self._slope is not None:
+            both = (np.abs(slope - self._slope).max(initial=0.0), slope.max(initial=0.0))
+            change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
+            if change <= _MOVED * largest:
+                return
+        self._slope = slope.copy()
+        if self._with_laws is not None:
+            self._with_laws.destroy()
+            self._with_laws = self._stiffened = None
+        if self._largest(slope) > _STIFF:
+            springs = springs_at(self._face.points_by_dofs, slope)
+            self._stiffened = Stiffened(body.stiffness, springs)
+            self._with_laws = body.solver_of(self._stiffened)
+        compat.collect_garbage(body.stiffness.comm)
+
+    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write y for x; PETSc calls this."""
+        (self._with_laws or self._alone).pc.apply(x, y)
+
+    def _largest(self, slope: Array) -> float:
+        """Return the largest ratio of the laws' to the body's stiffness at an unknown."""
+        own = self._equilibrium.body.stiffness.getDiagonal()
+        starts, columns, entries = self._face.points_by_dofs.getValuesCSR()
+        springs = own.duplicate()
+        springs.set(0.0)
+        springs.setValues(columns, np.repeat(slope, np.diff(starts)) * entries**2, addv=True)
+        springs.assemble()
+        springs.pointwiseDivide(springs, own)
+        return float(springs.max()[1])

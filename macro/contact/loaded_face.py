@@ -5,10 +5,11 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from mpi4py import MPI
@@ -19,16 +20,16 @@ from scipy.sparse import csr_matrix
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.block import Block
+from macro.bodies import Block
+from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import distributed
-from macro.linear_solvers.options import solve_linear
+from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.contact_face import (
     ContactFacets,
     FacetQuadrature,
     facet_quadrature,
     top_facets,
 )
-from support.checks import real_array
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -39,155 +40,84 @@ _WHOLE = 1e-9
 Mode = Literal["patchwise", "pointwise"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Sampling:
-    """The samples that laws are evaluated at, and the loads by their pressures.
+@dataclass(frozen=True, slots=True, eq=False)
+class Outline:
+    """What stands for patches on a face that is covered as a whole.
 
-    A sample is a whole patch or a quadrature point. With the nodal displacements u, the pressures p
-    and the weights w of the samples, the nodal load is ``B p`` and the displacement of the
-    samples into the body is ``(Bᵀ u) / w``. The same operator in both makes every tangent
-    symmetric.
-
-    Args:
-        operator: B, rows like the displacements, columns like the samples [mm²].
-        weight: Area of each of this rank's samples, shape (n,) [mm²].
-        x: Abscissae of this rank's samples, shape (n,) [mm].
-        y: Ordinates of this rank's samples, shape (n,) [mm].
-        depth: Depths of the undeformed face below its plane at this rank's samples, (n,) [mm].
-        patch: Flat patch index of this rank's samples, ascending, shape (n,).
-        count: Number of patches N.
+    Attributes:
+        count: Number of regions.
+        middle: Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm].
+        lengths: Sides of the bounding rectangle [mm].
     """
 
-    operator: PETSc.Mat
-    weight: Array
-    x: Array
-    y: Array
-    depth: Array
-    patch: NDArray[np.intp]
     count: int
-
-    def displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the displacements of this rank's samples into the body, shape (n,) [mm].
-
-        Args:
-            displacement: Nodal displacements [mm].
-        """
-        self.operator.multTranspose(displacement, self.values)
-        return np.asarray(self.values.array_r / self.weight)
-
-    def below(self, crown: Callable[[Array, Array], Array] | None) -> Array:
-        """Return the depths of this rank's samples on a crowned face, shape (n,) [mm].
-
-        Args:
-            crown: Further depth at points (x, y) of the plane [mm]; None: none.
-
-        Raises:
-            InputError: When it gives no numbers, or not one for every point.
-        """
-        return self.depth + crown_depth(crown, self.x, self.y)
-
-    @cached_property
-    def values(self) -> PETSc.Vec:
-        """Work space for a value of every sample; PETSc would keep one of every product."""
-        return self.operator.createVecRight()
-
-    def patch_sums(self, values: Array) -> Array:
-        """Return the integrals of sampled values over every patch, shape (N,); collective."""
-        local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
-        return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
-
-    def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
-        """Return functions of closure, one per patch, at this rank's samples, shape (n,).
-
-        Args:
-            functions: One function per patch.
-            closure: Closures of the samples, shape (n,) [mm].
-
-        Raises:
-            InputError: When a function's values are no numbers, or not one for every closure.
-        """
-        values = np.empty_like(closure)
-        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
-        for i in np.unique(self.patch):
-            part = slice(ends[i], ends[i + 1])
-            values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
-        return values
+    middle: Array
+    lengths: tuple[float, float]
 
 
-def crown_depth(crown: Any, x: Array, y: Array) -> Array:
-    """Return the depth of a crown at points of the plane, shapes (n,) [mm].
+class ContactFace(ABC):
+    """The contact face of a body, or of two bodies that are pressed together.
 
-    Args:
-        crown: A function of x and y; None: no crown.
-        x: Abscissae of the points [mm].
-        y: Their ordinates [mm].
+    Attributes:
+        body: The body, or both.
+        patches: Patches on the face, in its frame; or the outline of a face in regions.
 
-    Raises:
-        InputError: When it is no function, gives no finite numbers, or not one for every point.
+    Note:
+        Everything is collective.
     """
-    if crown is None:
-        return np.zeros_like(x)
-    if not callable(crown):
-        raise InputError("the crown is no function", value=crown, allowed="depth(x, y) in mm")
-    depth = _one_each(crown(x, y), x, "the crown")
-    if not np.isfinite(depth).all():
-        raise InputError("the crown has depths that are not finite")
-    return depth
 
-
-def _one_each(values: Any, points: Array, what: str) -> Array:
-    """Return what a user's function gives at points as numbers, one for each."""
-    try:
-        found = real_array(values)  # what is masked is not a number
-    except InputError as error:
-        raise InputError(f"{what} gives no numbers: {error.problem}", value=values) from None
-    if found.shape not in ((), points.shape):
-        raise InputError(
-            f"{what} does not give one value for each of {len(points)} points",
-            value=found.shape,
-            allowed=str(points.shape),
-        )
-    return np.broadcast_to(found, points.shape)
-
-
-class Loadable(Protocol):
-    """The contact face of a body, or of two bodies that are pressed together."""
+    body: Any
+    patches: PatchGrid | Outline
 
     @property
-    def body(self) -> Any:
-        """The body, or both."""
-        ...
-
-    @property
-    def patches(self) -> PatchGrid:
-        """Patches on the face, in its frame."""
-        ...
-
-    @property
+    @abstractmethod
     def comm(self) -> Any:
         """MPI communicator."""
-        ...
 
     @property
+    @abstractmethod
     def areas(self) -> Array:
         """Areas of the patches, shape (N,) [mm²]."""
-        ...
+
+    @property
+    @abstractmethod
+    def patchwise(self) -> Sampling:
+        """Laws at the mean closures of the patches, which are distributed over the ranks."""
+
+    @property
+    @abstractmethod
+    def pointwise(self) -> Sampling:
+        """Laws at quadrature points."""
+
+    @abstractmethod
+    def load(self, pressures: Array) -> PETSc.Vec:
+        """Return the nodal load of pressures that are uniform on every patch.
+
+        Args:
+            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
+        """
 
     def sampling(self, mode: Mode) -> Sampling:
-        """Return the samples of a mode."""
-        ...
+        """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
 
-    def load(self, pressures: Array) -> PETSc.Vec:
-        """Return the nodal load of pressures that are uniform on every patch, (N,) [MPa]."""
-        ...
+        Raises:
+            InputError: When there is no such mode, or two faces do not cover the patches alike.
+        """
+        if mode not in get_args(Mode):
+            raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
+        return self.patchwise if mode == "patchwise" else self.pointwise
 
     def patch_displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the mean displacements of the patches into the body, shape (N,) [mm]."""
-        ...
+        """Return the mean displacements of the patches into the body, on every rank, (N,) [mm].
+
+        Of two bodies they are the sums of both.
+        """
+        sampling = self.patchwise
+        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
 
 
 @dataclass(frozen=True, eq=False)
-class LoadedFace:
+class LoadedFace(ContactFace):
     """Patches on the contact face of a body; the rest of the face is free of traction.
 
     Args:
@@ -197,6 +127,9 @@ class LoadedFace:
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
         degree: Polynomial degree that the quadrature is exact for; None: that of products of two
             basis functions.
+        region: Region of every facet, on a face in regions that have a law each at its points,
+            shape (facets,); None on a face with patches. A region takes the place of a patch; its
+            facets may lie anywhere in the plane.
 
     Note:
         Everything here is collective. A rank may own no facet, or no part of a patch.
@@ -204,8 +137,9 @@ class LoadedFace:
 
     body: Any
     facets: ContactFacets
-    patches: PatchGrid
+    patches: PatchGrid | Outline
     degree: int | None = None
+    region: NDArray[np.intp] | None = None
 
     @classmethod
     def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:
@@ -222,6 +156,21 @@ class LoadedFace:
         require_inside(block.mesh.shape.interface, patches)
         return cls(block, top_facets(block.mesh), patches, degree)
 
+    @classmethod
+    def of_regions(
+        cls, body: Any, parts: Sequence[ContactFacets], lengths: tuple[float, float]
+    ) -> LoadedFace:
+        """Return a whole face of any outline whose regions are given by their facets.
+
+        Args:
+            body: The body.
+            parts: Facets of each region, all in one frame.
+            lengths: Sides of the rectangle around all of them, from the origin of the frame [mm].
+        """
+        region = np.repeat(np.arange(len(parts)), [len(part.cell) for part in parts])
+        outline = Outline(len(parts), 0.5 * np.asarray(lengths), lengths)
+        return cls(body, parts[0].joined(parts[1:]), outline, region=region)
+
     @property
     def space(self) -> Any:
         """Vector space of the displacements."""
@@ -235,14 +184,14 @@ class LoadedFace:
     @cached_property
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank."""
-        return facet_quadrature(
-            self.facets, self.space, self.patches, degree=self.quadrature_degree
-        )
+        parts = self.region if isinstance(self.patches, Outline) else self.patches
+        assert parts is not None
+        return facet_quadrature(self.facets, self.space, parts, degree=self.quadrature_degree)
 
     @property
     def quadrature_degree(self) -> int:
         """Polynomial degree that the quadrature is exact for."""
-        hexahedral = self.space.mesh.topology.cell_name() == "hexahedron"
+        hexahedral = compat.is_hexahedral(self.space.mesh)
         return self.degree or (4 if hexahedral else 2) * compat.lagrange_degree(self.space)
 
     @cached_property
@@ -262,16 +211,6 @@ class LoadedFace:
                 allowed="patches that each cover a part of it",
             )
         return np.asarray(areas)
-
-    def sampling(self, mode: Mode) -> Sampling:
-        """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
-
-        Raises:
-            InputError: When there is no such mode.
-        """
-        if mode not in get_args(Mode):
-            raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
-        return self.patchwise if mode == "patchwise" else self.pointwise
 
     @cached_property
     def pointwise(self) -> Sampling:
@@ -323,16 +262,11 @@ class LoadedFace:
         sampling.operator.mult(values, load)
         return load
 
-    def patch_displacements(self, displacement: PETSc.Vec) -> Array:
-        """Return the mean displacements of the patches into the body, on every rank, (N,) [mm]."""
-        sampling = self.patchwise
-        return sampling.patch_sums(sampling.displacements(displacement)) / self.areas
-
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:
         """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
         points, nodes = self.quadrature, self.space.dofmap.index_map
-        used = np.abs(points.values) > 1e-12  # excludes nodes that are not on the facet
+        used = points.values != 0.0  # excludes nodes that are not on the facet
         numbers = np.zeros(used.shape, dtype=np.int64)
         numbers[used] = nodes.local_to_global(points.nodes[used])
         rows = normal_rows(
@@ -353,6 +287,8 @@ class LoadedFace:
             for values in (points.x, points.y, points.depth)
         ]
         means = self.comm.allreduce(np.array(moments), op=MPI.SUM) / self.areas
+        if isinstance(patches, Outline):
+            return means[0], means[1], means[2]
         whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
         x, y = np.where(whole, patches.centres.T, means[:2])
         return x, y, means[2]
@@ -381,7 +317,7 @@ def normal_rows(
     return csr_matrix((entries, columns, starts), shape=(len(weights), 3 * nodes))
 
 
-def patch_compliance_matrix(face: Loadable) -> Array:
+def patch_compliance_matrix(face: ContactFace) -> Array:
     """Return the mean displacement of patch i into the body by unit pressure on patch j.
 
     By reciprocity the work A_i C_ij of one load along another is symmetric (Betti), and so is the
@@ -404,7 +340,7 @@ def patch_compliance_matrix(face: Loadable) -> Array:
     return np.asarray(0.5 * (work + work.T) / face.areas[:, None])
 
 
-def displacements_under(face: Loadable, pressures: Array) -> Array:
+def displacements_under(face: ContactFace, pressures: Array) -> Array:
     """Return the mean displacements of patches under pressures on them, shape (m, N) [mm].
 
     Args:

@@ -1,8 +1,4 @@
-"""Newton's method by PETSc's SNES for load steps with laws, and its initial guesses.
-
-Guesses minimise the energy in the space of earlier solutions. Extrapolation took 1.8 to 3.2 times
-as many linear iterations over eight load steps with 4 patches and one closure for each, and 3 to
-24 % more with 16 and 64 patches or laws at points.
+"""Newton's method by PETSc's SNES for equations with contact.
 
 Theory: section 11 of ``docs/theory.md``.
 """
@@ -10,30 +6,25 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.rigid_plane import Control
-from macro.contact.equilibrium import Equilibrium
-from macro.contact.loaded_face import Sampling
-from macro.contact.stiff_contact import ContactPreconditioner
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
     default_options,
     iterating,
+    options_read,
     reason_name,
     set_own_preconditioner,
     weakly,
 )
-from support.errors import NotConverged
-
-Array = NDArray[np.float64]
+from support.errors import InputError, NotConverged
 
 NONLINEAR_DEFAULTS: Mapping[str, object] = {
     "snes_type": "newtonls",
@@ -49,13 +40,6 @@ _LOOSEST = 0.1
 
 _SPARE = 0.3
 """Share of the tolerance that the last linear solve aims at."""
-
-
-_ROUNDING = 1e-7
-"""Smallest part of a displacement that must be new to the basis; less only adds rounding."""
-
-_STEPS, _HALVINGS = 30, 10
-"""Newton steps in the basis, and halvings of each."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +59,35 @@ class NewtonReport:
     reason: str
 
 
-class NewtonSolver:
-    """Solves a problem repeatedly.
+class Equations(Protocol):
+    """Nonlinear equations r(x) = 0; every method is collective."""
+
+    @property
+    def matrix(self) -> PETSc.Mat:
+        """The part of the tangent that has entries."""
+        ...
+
+    @property
+    def tangent(self) -> PETSc.Mat:
+        """The whole tangent."""
+        ...
+
+    @property
+    def scale(self) -> float:
+        """What the norm of the latest residual is compared with."""
+        ...
+
+    def residual(self, x: PETSc.Vec, residual: PETSc.Vec, /) -> None:
+        """Write r(x)."""
+        ...
+
+    def update_tangent(self, x: PETSc.Vec, /) -> None:
+        """Move the tangent to x."""
+        ...
+
+
+class Newton:
+    """Solves equations repeatedly.
 
     A linear system is solved to the tolerance max(min(ρ, 0.1), 0.3 rtol/ρ), where ρ is the relative
     residual. A tolerance proportional to ρ keeps convergence quadratic (Dembo, Eisenstat & Steihaug
@@ -84,9 +95,12 @@ class NewtonSolver:
     user's ``-patchlaw_ksp_rtol`` or ``-patchlaw_snes_ksp_ew`` replaces this rule.
 
     Args:
-        problem: The equations.
-        face: The contact face that laws stand on at points; None for laws of patches.
-        solver: Linear solver of the body alone, whose preconditioner is set up.
+        equations: The equations.
+        preconditioner: Has ``apply``, and ``update``, which follows the tangent; None: PETSc's own,
+            made of the equations' matrix by the options.
+        options: PETSc's options, which override the defaults here.
+        given: Those of them that the user gave: ones that PETSc does not read are refused.
+        method: Krylov method in place of a factorisation alone.
 
     Attributes:
         snes: PETSc's solver.
@@ -96,173 +110,85 @@ class NewtonSolver:
         Collective.
     """
 
-    def __init__(self, problem: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
-        self._problem = problem
+    def __init__(
+        self,
+        equations: Equations,
+        preconditioner: Any = None,
+        options: Mapping[str, object] | None = None,
+        given: Mapping[str, object] | None = None,
+        method: str = "cg",
+    ) -> None:
+        self._equations, self._preconditioner = equations, preconditioner
         self._residuals: list[float] = []
-        base = solver.getOperators()[1]
-        user = PETSc.Options(PREFIX)
-        self.forcing = not (user.hasName("ksp_rtol") or user.hasName("snes_ksp_ew"))
-        self.snes = PETSc.SNES().create(base.comm)
+        given = given or {}
+        self._options = {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS, **(options or {}), **given}
+        self._unread = set(given)
+        user, matrix = PETSc.Options(PREFIX), equations.matrix
+        ruled = {name for name in ("ksp_rtol", "snes_ksp_ew") if user.hasName(name)}
+        self.forcing = not ruled and not given.keys() & {"ksp_rtol", "snes_ksp_ew"}
+        self.snes = PETSc.SNES().create(matrix.comm)
         self.snes.setOptionsPrefix(PREFIX)
-        self.snes.setFunction(weakly(self._residual), base.createVecLeft())
-        self.snes.setJacobian(weakly(self._tangent), problem.tangent, base)
+        self.snes.setFunction(weakly(self._residual), matrix.createVecLeft())
+        self.snes.setJacobian(weakly(self._tangent), equations.tangent, matrix)
         self.snes.setConvergenceTest(weakly(self._converged))
-        self._preconditioner = ContactPreconditioner(problem, face, solver)
-        set_own_preconditioner(self.snes.ksp, self._preconditioner)
-        with default_options(PREFIX, {**KRYLOV_DEFAULTS, **NONLINEAR_DEFAULTS}):
+        if preconditioner is not None:
+            set_own_preconditioner(self.snes.ksp, preconditioner)
+        with default_options(PREFIX, self._options):
             self.snes.setFromOptions()
-        iterating(self.snes.ksp)
-        self._remedy = "take more load steps (load.steps)"
-        if face is None:
-            self._remedy += " or, on a very soft body, coupling.newton = 'condensed'"
+            self._unread -= options_read(PREFIX, self._unread)
+        iterating(self.snes.ksp, method)
 
-    def solve(self, solution: PETSc.Vec, control: Control) -> NewtonReport:
+    def solve(self, solution: PETSc.Vec, what: str, remedies: Mapping[str, str]) -> NewtonReport:
         """Solve from an initial guess.
 
         Args:
             solution: The initial guess; receives the solution.
-            control: What the load step prescribes, for the error.
+            what: What is solved for, for the error.
+            remedies: By the name of PETSc's reason what to do; ``""`` for all others.
 
         Raises:
             NotConverged: With the name of PETSc's reason.
+            InputError: With the names of options that PETSc did not read; some are read where the
+                first system is solved.
         """
-        self._residuals = []
-        self.snes.solve(None, solution)
-        reason = reason_name(PETSc.SNES.ConvergedReason, self.snes.reason)
-        if self.snes.reason < 0:
-            raise NotConverged(
-                f"the block at {control}",
-                reason=reason,
-                iterations=int(self.snes.its),
-                remedy=self._remedy,
+        self._residuals, snes = [], self.snes
+        own = self._preconditioner is not None  # PETSc's are made with the first system
+        with nullcontext() if own else default_options(PREFIX, self._options):
+            snes.solve(None, solution)
+            self._unread -= options_read(PREFIX, self._unread)
+        if self._unread and snes.its:
+            raise InputError(
+                "PETSc's solvers have no such option, or no use for it here",
+                key="petsc_options",
+                value=sorted(self._unread),
+                allowed="names without prefix and dash, such as 'pc_type'",
             )
+        reason = reason_name(PETSc.SNES.ConvergedReason, snes.reason)
+        if snes.reason < 0:
+            remedy = remedies.get(reason, remedies[""])
+            if reason == "DIVERGED_LINEAR_SOLVE":
+                reason += f" ({reason_name(PETSc.KSP.ConvergedReason, snes.ksp.reason)})"
+            raise NotConverged(what, reason=reason, iterations=int(snes.its), remedy=remedy)
         return NewtonReport(
-            iterations=int(self.snes.its),
-            linear_iterations=int(self.snes.getLinearSolveIterations()),
+            iterations=int(snes.its),
+            linear_iterations=int(snes.getLinearSolveIterations()),
             residuals=np.array(self._residuals),
             reason=reason,
         )
 
-    def _residual(self, _snes: PETSc.SNES, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
-        self._problem.residual(displacement, residual)
+    def _residual(self, _snes: PETSc.SNES, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        self._equations.residual(x, residual)
 
-    def _tangent(
-        self, snes: PETSc.SNES, displacement: PETSc.Vec, _tangent: PETSc.Mat, _base: PETSc.Mat
-    ) -> None:
-        self._problem.update_tangent(displacement)
-        self._preconditioner.update()
+    def _tangent(self, snes: PETSc.SNES, x: PETSc.Vec, _tangent: Any, _matrix: Any) -> None:
+        self._equations.update_tangent(x)
+        if self._preconditioner is not None:
+            self._preconditioner.update()
         if self.forcing:
-            wanted = snes.getTolerances()[0]
-            snes.ksp.setTolerances(rtol=newton_tolerance(self._residuals[-1], wanted))
+            now, wanted = self._residuals[-1], snes.getTolerances()[0]
+            snes.ksp.setTolerances(rtol=max(min(_LOOSEST, now), _SPARE * wanted / now))
 
     def _converged(self, snes: PETSc.SNES, _its: int, norms: tuple[float, float, float]) -> int:
-        scale = self._problem.scale
+        scale = self._equations.scale
         self._residuals.append(norms[2] / scale if scale > 0.0 else norms[2])
         done = norms[2] <= snes.getTolerances()[0] * scale
         return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_RELATIVE) if done else 0
-
-
-def newton_tolerance(now: float, wanted: float) -> float:
-    """Return the relative tolerance of a Newton step's linear solve, see `NewtonSolver`.
-
-    Args:
-        now: Relative residual before the step.
-        wanted: Relative residual that the steps aim at.
-    """
-    return max(min(_LOOSEST, now), _SPARE * wanted / now)
-
-
-class DisplacementBasis:
-    """Earlier displacements, orthonormal in the block's energy, as a basis for initial guesses.
-
-    The block is linear, so every solution lies in the space K⁻¹ range(B), which has as many
-    dimensions as there are samples. Galerkin's method in the span of the earlier solutions needs no
-    linear solve and gives the initial guess of least error in the energy norm, which includes
-    extrapolation. Once the basis has as many dimensions as there are patches, the guess is the
-    solution.
-
-    Args:
-        equilibrium: The equations that are being solved.
-        sampling: Their samples of the interface.
-        size: Largest number of vectors; the oldest are dropped first.
-
-    Attributes:
-        vectors: W, this rank's degrees of freedom of the k vectors, shape (n,) each [mm]. They are
-            all that is kept; three products with K for every solution replace their forces.
-
-    Note:
-        Collective.
-    """
-
-    def __init__(self, equilibrium: Equilibrium, sampling: Sampling, *, size: int = 32) -> None:
-        self._equilibrium, self._sampling, self._size = equilibrium, sampling, size
-        self._comm = equilibrium.body.comm
-        self.vectors: list[Array] = []
-        self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
-
-    def __len__(self) -> int:
-        return len(self.vectors)
-
-    def add(self, displacement: PETSc.Vec) -> None:
-        """Add the part of a displacement that is new to the basis; collective."""
-        stiffness = self._equilibrium.body.stiffness
-        work, force = displacement.copy(), displacement.duplicate()
-        vector, before = work.array, 0.0
-        for _ in range(2):  # a second pass removes what rounding left
-            stiffness.mult(work, force)
-            before = before or self._sum(vector @ force.array_r)
-            shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
-            for share, each in zip(shares, self.vectors, strict=True):
-                vector -= share * each
-        stiffness.mult(work, force)
-        square = self._sum(vector @ force.array_r)
-        if not square > _ROUNDING**2 * before:
-            return
-        vector /= square**0.5
-        sampled = self._sampling.operator.createVecRight()
-        self._sampling.operator.multTranspose(work, sampled)
-        first = max(0, len(self) + 1 - self._size)
-        self.vectors = [*self.vectors, vector.copy()][first:]
-        self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
-
-    def write_guess(self, into: PETSc.Vec) -> None:
-        """Write the state of least energy in the basis under what is prescribed of the plane.
-
-        It solves y = Wᵀ B p(closure(W y)) by damped Newton steps, which need not converge.
-        """
-        y = np.zeros(len(self))
-        value, slope = self._projected(y)
-        first = float(np.linalg.norm(value))
-        for _ in range(_STEPS):
-            if np.linalg.norm(value) <= _ROUNDING**2 * first:
-                break
-            step = np.linalg.solve(slope, value)
-            for share in 0.5 ** np.arange(_HALVINGS):
-                trial = y - share * step
-                trial_value, trial_slope = self._projected(trial)
-                if np.linalg.norm(trial_value) < np.linalg.norm(value):
-                    break
-            else:
-                break
-            y, value, slope = trial, trial_value, trial_slope
-        into.set(0.0)
-        for share, vector in zip(y, self.vectors, strict=True):
-            into.array[:] += share * vector
-
-    def _projected(self, y: Array) -> tuple[Array, Array]:
-        """Return the equilibrium's residual and tangent in the basis."""
-        equations, weight = self._equilibrium.forces, self._sampling.weight
-        columns = self._sampled
-        closure = equations.closure_of((y @ columns) / weight)
-        pressure, stiffness = equations.pressure(closure), equations.stiffness(closure)
-        parts = np.vstack([
-            -columns @ pressure,
-            (columns * (stiffness / weight)) @ columns.T,
-            (columns @ equations.border(stiffness)).T,
-        ])  # fmt: skip
-        parts = self._sum(parts)
-        stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
-        return y + parts[0], np.eye(len(y)) + stiff - border.T @ border
-
-    def _sum(self, values: Any) -> Any:
-        return self._comm.allreduce(values, op=MPI.SUM)

@@ -6,19 +6,23 @@ Theory: section 12 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from mpi4py import MPI
+from numpy.typing import NDArray
 
 from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
-from macro.block import Block
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers
+from macro.bodies import Block
+from macro.contact.initial_guess import Guess
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import TOP
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from support.errors import InputError
+from support.errors import InputError, NotConverged
 
 _UPRIGHT = 1e-12
 """Deviation of a face's normal from the z axis that is rounding."""
@@ -116,3 +120,146 @@ class RoughFace:
     def loaded(self, degree: int) -> LoadedFace:
         """Return the face with quadrature that is exact for a polynomial degree."""
         return LoadedFace(self.body, self.facets, self.whole, degree)
+
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+class PlaneOverNodes:
+    """A rigid plane above this rank's nodes on the top.
+
+    Args:
+        x: Abscissae of the nodes, shape (n,) [mm].
+        y: Their ordinates [mm].
+        distance: Their distances from the plane at no approach and no tilt [mm].
+        lengths: Sides of the interface, about whose centre the plane turns [mm].
+        comm: MPI communicator.
+
+    Attributes:
+        distance: As given.
+        levers: Levers of the nodes.
+        centre: Centre of the interface, shape (2,) [mm].
+
+    Note:
+        Methods that sum over the nodes are collective.
+    """
+
+    def __init__(
+        self, x: Array, y: Array, distance: Array, lengths: tuple[float, float], comm: Any
+    ) -> None:
+        self.distance, self.centre = distance, 0.5 * np.asarray(lengths)
+        self.levers = PlaneLevers.at(x, y, lengths, comm=comm)
+
+    def placed(self, control: Control, plane: Array) -> Array:
+        """Return the plane with its prescribed motions, and with its free ones as at the start.
+
+        Without any force the plane just touches the top.
+
+        Args:
+            control: What the load step prescribes.
+            plane: Where the plane may start, shape (3,).
+        """
+        plane = control.prescribed(plane)
+        if control.force == 0.0:
+            plane[0] = self.levers.first_touch(self.distance, plane[1:])
+        return plane
+
+    def interference(self, plane: Array, displacement: Array) -> Array:
+        """Return how far the plane is below the nodes, negative where it is above, (n,) [mm].
+
+        Args:
+            plane: Approach [mm] and slopes, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+        """
+        return self.levers.matrix @ plane - displacement - self.distance
+
+    def supported_motions(self, free: Flags, at: Flags) -> Array:
+        """Return the combinations of free motions that move some of the nodes, shape (k, k').
+
+        They are scaled so that ``levers.scaled(free)[at]`` times them has orthonormal columns, all
+        ranks together.
+
+        Args:
+            free: Motions that are free, shape (3,).
+            at: Which of this rank's nodes are meant, shape (n,).
+        """
+        levers = self.levers.scaled(free)[at]
+        values, vectors = np.linalg.eigh(self.levers.summed(levers.T @ levers))
+        supported = values > UNSUPPORTED * max(values.max(initial=0.0), 1.0)
+        scaled: Array = vectors[:, supported] / np.sqrt(values[supported])
+        return scaled
+
+    def on_springs(
+        self, control: Control, start: Array, displacement: Array, stiffness: Array
+    ) -> Array:
+        """Return where the plane comes to rest on springs at the nodes, shape (3,).
+
+        Args:
+            control: What the load step prescribes.
+            start: The plane to start from, with what is prescribed of it, shape (3,).
+            displacement: Downward displacements of the nodes, shape (n,) [mm].
+            stiffness: Stiffnesses of springs that only push, shape (n,) [N/mm].
+
+        Raises:
+            NotConverged: When nothing can hold the plane.
+        """
+
+        def respond(plane: Array) -> PlaneResponse[None]:
+            depth = self.interference(plane, displacement)
+            return PlaneResponse(
+                loads=self.levers.loads(stiffness * np.maximum(depth, 0.0)),
+                stiffness=lambda: self.levers.stiffness(np.where(depth > 0.0, stiffness, 0.0)),
+                state=None,
+            )
+
+        return find_equilibrium(respond, control, start, self.levers.half)[0]
+
+
+def not_found(control: Control, reason: str, iterations: int) -> NotConverged:
+    """Return the error of a load step whose contact was not found.
+
+    Args:
+        control: What the load step prescribes.
+        reason: Name of the reason.
+        iterations: Iterations that were made.
+    """
+    return NotConverged(
+        f"the contact of the rough block at {control}",
+        reason=reason,
+        iterations=iterations,
+        remedy="take smaller load steps (load.steps)",
+    )
+
+
+class ContactSolution(NamedTuple):
+    """Contact of a rough top with a rigid plane; arrays hold this rank's part.
+
+    Attributes:
+        end: Plane, displacement, and what the method starts from in further load steps.
+        nodal_force: Contact forces of the nodes of the top, shape (n,) [N].
+        touching: Whether these nodes are in contact, shape (n,).
+        iterations: Active sets that were solved for, or Newton steps.
+        linear_iterations: Iterations of the linear solver.
+        reason: Name of the reason to stop.
+    """
+
+    end: Guess
+    nodal_force: Array
+    touching: NDArray[np.bool_]
+    iterations: int
+    linear_iterations: int
+    reason: str
+
+
+def largest(values: Array, comm: Any) -> float:
+    """Return the largest size of numbers over all ranks; 0 where there are none.
+
+    Args:
+        values: This rank's numbers.
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from scipy.sparse import csr_array
 
 from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
-from macro.linear_solvers.options import PREFIX, WeakContext, reason_name
+from macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
 from support.errors import NotConverged
 
 Array = NDArray[np.float64]
@@ -28,8 +28,6 @@ to 2e-10 of the largest. A resumed run starts from other initial guesses and mus
 history to 1e-10. Each factor of ten costs one iteration on hexahedra and two to three on quadratic
 tetrahedra, of 12 and 30.
 """
-
-_MOST_ITERATIONS = 1000
 
 _SWEEPS = 2
 """Symmetric Gauss–Seidel sweeps near the constrained degrees of freedom."""
@@ -61,17 +59,9 @@ class ConstrainedSolver:
 
     def __init__(self, matrix: PETSc.Mat, preconditioner: PETSc.PC, layers: int = 2) -> None:
         self._matrix = matrix
-        operator = PETSc.Mat().createPython(matrix.getSizes(), WeakContext(self), comm=matrix.comm)
-        operator.setUp()
-        self._ksp = PETSc.KSP().create(matrix.comm)
-        self._ksp.setOperators(operator)
-        self._ksp.setType("cg")
-        self._ksp.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
-        self._ksp.setTolerances(max_it=_MOST_ITERATIONS)
-        self._ksp.pc.setType("python")
         self._preconditioner = ConstrainedPreconditioner(matrix, preconditioner, layers)
-        self._projection = self._preconditioner.projection
-        self._ksp.pc.setPythonContext(WeakContext(self._preconditioner))
+        self._projection, operator = self._preconditioner.projection, shell(matrix, self)
+        self._ksp = conjugate_gradients(operator, operator, self._preconditioner)
 
     def constrain(self, dofs: NDArray[np.intp], motions: Array | None = None) -> None:
         """Constrain degrees of freedom, apart from common motions, and free all others.

@@ -23,7 +23,7 @@ from geometry.meshes.block import BlockShape
 from macro import compat
 from macro.linear_solvers.multigrid_products import galerkin
 from macro.linear_solvers.node_matrices import distributed, for_displacements
-from macro.linear_solvers.options import CoarserGrid
+from macro.linear_solvers.solvers import CoarserGrid
 from macro.mesh.block import BlockMesh
 
 Array = NDArray[np.float64]
@@ -149,10 +149,10 @@ def lattice_of(space: Any, mesh: BlockMesh) -> Lattice | None:
         "nv,cvk->cnk", degree * corners, mesh.planes[compat.cell_vertices(mesh.mesh)]
     )
     nodes = space.dofmap.index_map
-    found = np.zeros((nodes.size_local + nodes.num_ghosts, 3), dtype=np.intp)
-    found[compat.cell_nodes(space)] = np.rint(places)
+    planes = np.zeros((nodes.size_local + nodes.num_ghosts, 3), dtype=np.intp)
+    planes[compat.cell_nodes(space)] = np.rint(places)
     grid = [Lines.of_elements(ticks, degree) for ticks in shape.ticks]
-    return Lattice(grid, found[: nodes.size_local])
+    return Lattice(grid, planes[: nodes.size_local])
 
 
 def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[CoarserGrid]:
@@ -167,12 +167,12 @@ def coarser_grids(lattice: Lattice, matrix: PETSc.Mat, free: PETSc.Vec) -> list[
     Note:
         Collective.
     """
-    found = []
+    coarser = []
     for step in transfers(lattice, free):
         matrix = galerkin(matrix, step.weights, step.free, step.coarse_free)
         step.weights.destroy()  # PETSc would keep what several ranks drop
-        found.append(CoarserGrid(step.interpolation, matrix))
-    return found
+        coarser.append(CoarserGrid(step.interpolation, matrix))
+    return coarser
 
 
 def transfers(lattice: Lattice, free: PETSc.Vec) -> Iterator[Transfer]:
@@ -240,18 +240,18 @@ def coarsenings(grid: Sequence[Lines], coarsest: int = COARSEST) -> list[Kept]:
         The kept planes of every grid but the coarsest. There is at least one coarser grid unless
         all nodes are corners of the block.
     """
-    found: list[Kept] = []
+    coarsened: list[Kept] = []
     longest = _SLACK * (1.0 + 1e-6) * min(float(np.diff(lines.ticks).min()) for lines in grid)
-    while any(len(lines) > 2 for lines in grid) and (not found or 3 * _size(grid) > coarsest):
+    while any(len(lines) > 2 for lines in grid) and (not coarsened or 3 * _size(grid) > coarsest):
         coarser, kept = list(grid), [np.arange(len(lines)) for lines in grid]
         while _size(coarser) * _LEAST > _size(grid) and any(len(lines) > 2 for lines in coarser):
             longest *= 2.0
             stay = [lines.merged(longest) for lines in coarser]
             kept = [of[which] for of, which in zip(kept, stay, strict=True)]
             coarser = [lines.only(which) for lines, which in zip(coarser, stay, strict=True)]
-        found.append((kept[0], kept[1], kept[2]))
+        coarsened.append((kept[0], kept[1], kept[2]))
         grid = coarser
-    return found
+    return coarsened
 
 
 def _size(grid: Sequence[Lines]) -> int:

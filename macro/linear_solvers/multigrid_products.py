@@ -92,9 +92,9 @@ def _weights_of(rows: BlockRows, weights: PETSc.Mat) -> tuple[sparse.csr_matrix,
     wanted = np.sort(seen).astype(PETSc.IntType)
     at = PETSc.IS().createGeneral(wanted, comm=PETSc.COMM_SELF)
     every = PETSc.IS().createStride(weights.getSize()[1], 0, 1, comm=PETSc.COMM_SELF)
-    found = weights.createSubMatrices(at, every)[0]
-    starts, columns, values = found.getValuesCSR()
-    found.destroy()
+    part = weights.createSubMatrices(at, every)[0]
+    starts, columns, values = part.getValuesCSR()
+    part.destroy()
     coarse, places = np.unique(columns, return_inverse=True)
     table = sparse.csr_matrix((values, places, starts), shape=(len(wanted), len(coarse)))
     return table[np.searchsorted(wanted, seen)], coarse
@@ -174,10 +174,10 @@ def _sum_of_parts(parts: list[sparse.bsr_matrix], coarse: Indices, weights: PETS
 
 @contextmanager
 def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
-    """Lend this rank's rows of a matrix of PETSc's type ``baij`` without copying entries.
+    """Yield this rank's rows of a matrix of PETSc's type ``baij`` without copying entries.
 
     Args:
-        matrix: Assembled, block size 3; must not change while it is lent.
+        matrix: Assembled, block size 3; must not change inside the context.
 
     Raises:
         PETSc.Error: When the matrix is of another type.
@@ -197,7 +197,7 @@ def block_rows(matrix: PETSc.Mat) -> Iterator[BlockRows]:
 
 @contextmanager
 def _sequential(matrix: ctypes.c_void_p, columns: int | None) -> Iterator[sparse.bsr_matrix]:
-    """Lend the blocks of a ``seqbaij`` matrix; None takes its number of columns from itself."""
+    """Yield the blocks of a ``seqbaij`` matrix; None takes its number of columns from itself."""
     integer = np.ctypeslib.as_ctypes_type(PETSc.IntType)
     count, width, done = integer(), integer(), ctypes.c_int(0)
     rows, places, entries = map(_pointer, (PETSc.IntType, PETSc.IntType, np.float64))

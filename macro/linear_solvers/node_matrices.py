@@ -1,11 +1,16 @@
-"""Distributed matrices of nodes with three unknowns each: parts of them, and interpolations."""
+"""Distributed matrices of nodes with three unknowns each: parts, interpolations, sums."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
+
+from macro.linear_solvers.options import shell
 
 Indices = NDArray[np.intp]
 
@@ -57,6 +62,20 @@ def coupled_nodes(matrix: PETSc.Mat) -> Indices:
     local.mult(part, alone)
     differs = (whole.array_r != alone.array_r).reshape(-1, 3)
     return np.flatnonzero(differs.any(axis=1))
+
+
+def free_unknowns(conditions: Sequence[Any], like: PETSc.Vec) -> PETSc.Vec:
+    """Return 1 for free degrees of freedom and 0 for those that Dirichlet conditions constrain.
+
+    Args:
+        conditions: The conditions.
+        like: A vector of these degrees of freedom, which becomes the result.
+    """
+    like.set(1.0)
+    for condition in conditions:
+        dofs, _ = condition.dof_indices()
+        like.array[dofs[dofs < like.local_size]] = 0.0
+    return like
 
 
 def dofs_of(nodes: Indices) -> Indices:
@@ -120,3 +139,71 @@ def for_displacements(
         )
     matrix.assemble()
     return matrix, coarse
+
+
+Array = NDArray[np.float64]
+
+
+def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:
+    """Return the stiffness Bᵀ diag(s) B of springs at points.
+
+    Args:
+        points: B, rows of weighted basis functions of the points [mm²].
+        slope: s of this rank's points, shape (n,) [N/mm⁵].
+
+    Note:
+        Collective.
+    """
+    scale, scaled = points.createVecLeft(), points.copy()
+    scale.array[:] = slope
+    scaled.diagonalScale(scale)
+    springs = points.transposeMatMult(scaled)
+    for part in (scale, scaled):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return springs
+
+
+class Stiffened:
+    """The sum K + S of a body's stiffness and that of springs at few of its nodes.
+
+    Args:
+        stiffness: K, symmetric positive definite.
+        springs: S, with entries only where K has some; of type ``aij``.
+
+    Attributes:
+        springs: S.
+        product: The sum as a PETSc matrix without entries; this object must be kept as long as it.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(self, stiffness: PETSc.Mat, springs: PETSc.Mat) -> None:
+        self._stiffness, self.springs = stiffness, springs
+        self.product = shell(stiffness, self)
+
+    def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the product y with x; PETSc calls this."""
+        self._stiffness.mult(x, y)
+        self.springs.multAdd(x, y, y)
+
+    def assembled(self) -> PETSc.Mat:
+        """Return the sum with entries, which takes as much memory as K."""
+        matrix = self._stiffness.copy()
+        matrix.axpy(1.0, self.springs, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix.setNearNullSpace(self._stiffness.getNearNullSpace())
+        return matrix
+
+    def diagonal_blocks(self) -> PETSc.Mat:
+        """Return the 3 × 3 blocks of the nodes, a matrix without others; K has type ``baij``."""
+        blocks = np.linalg.inv(np.reshape(self._stiffness.invertBlockDiagonal(), (-1, 3, 3)))
+        starts, columns, entries = self.springs.getDiagonalBlock().getValuesCSR()
+        rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
+        own = rows // 3 == columns // 3
+        rows, columns = rows[own], columns[own]
+        blocks[rows // 3, rows % 3, columns % 3] += entries[own]
+        first, count = self._stiffness.getOwnershipRange()[0] // 3, len(blocks)
+        pattern = np.arange(count + 1, dtype=PETSc.IntType), first + np.arange(count)
+        csr = (pattern[0], pattern[1].astype(PETSc.IntType), blocks.ravel())
+        size = (3 * count, None)
+        return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=self._stiffness.comm)

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from petsc4py import PETSc
 
 from macro.compat import call
-from support.errors import InputError, NotConverged
+from support.errors import InputError
 
 T = TypeVar("T")
 
@@ -57,19 +56,14 @@ four times as long."""
 DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 """A factorisation by MUMPS, distributed over the ranks."""
 
-MARGINS = (50, 200, 800, 3200)
-"""Memory beyond MUMPS's estimate that is tried in turn, in percent; its own default is 20. MUMPS
-estimates the memory of a front before it knows the pivots and which rank works on what. On several
-ranks the same matrix fits in one run and fails in the next (error −9)."""
 
-_MARGIN = 14  # MUMPS's ICNTL(14): memory beyond the estimate, in percent
-_OUT_OF_MEMORY = (-8, -9, -14, -15, -17, -20)  # errors that its guide answers with ICNTL(14)
+_MOST_ITERATIONS = 1000
 
 
 def users_options() -> tuple[tuple[str, str], ...]:
     """Return the user's PETSc options under `PREFIX`, sorted by name; results depend on them."""
-    found = PETSc.Options(PREFIX).getAll()
-    return tuple(sorted((name, str(value)) for name, value in found.items()))
+    given = PETSc.Options(PREFIX).getAll()
+    return tuple(sorted((name, str(value)) for name, value in given.items()))
 
 
 @contextmanager
@@ -108,11 +102,11 @@ def options_read(prefix: str, names: Iterable[str]) -> set[str]:
         prefix: Prefix of the options.
         names: Their names without it.
     """
-    found, read = set(), ctypes.c_int(0)
+    asked, read = set(), ctypes.c_int(0)
     for name in names:
         call("PetscOptionsUsed", None, f"{prefix}{name}".encode(), ctypes.byref(read))
-        found |= {name} if read.value else set()
-    return found
+        asked |= {name} if read.value else set()
+    return asked
 
 
 def iterating(solver: PETSc.KSP, method: str = "cg") -> None:
@@ -143,103 +137,6 @@ def set_own_preconditioner(solver: PETSc.KSP, preconditioner: Any) -> None:
     solver.pc.setPythonContext(WeakContext(preconditioner))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CoarserGrid:
-    """One of the coarser grids of a geometric multigrid.
-
-    Args:
-        interpolation: From this grid to the next finer one.
-        matrix: The matrix on this grid.
-    """
-
-    interpolation: PETSc.Mat
-    matrix: PETSc.Mat
-
-
-def linear_solver(
-    matrix: PETSc.Mat,
-    coarser: Sequence[CoarserGrid] | None = None,
-    preconditioner: Mapping[str, object] | None = None,
-    *,
-    finest: tuple[PETSc.Mat, PETSc.Mat] | None = None,
-    whole: PETSc.Mat | None = None,
-    prefix: str = PREFIX,
-) -> PETSc.KSP:
-    """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
-
-    Args:
-        matrix: The matrix, with its near-nullspace attached.
-        coarser: Coarser grids of a geometric multigrid, finest first; None for another
-            preconditioner.
-        preconditioner: Options of the preconditioner, which override the defaults here.
-        finest: What the finest grid of a geometric multigrid smooths in place of the matrix, and
-            the matrix with its diagonal blocks.
-        whole: The matrix that another preconditioner is made of, which is destroyed; None: the
-            matrix.
-        prefix: Prefix of its PETSc options.
-
-    Note:
-        Collective.
-    """
-    solver = PETSc.KSP().create(matrix.comm)
-    solver.setOptionsPrefix(prefix)
-    made_of = _pointwise(whole or matrix) if coarser is None else matrix
-    solver.setOperators(matrix, made_of)
-    if coarser is not None:
-        solver.pc.setType("mg")
-        solver.pc.setMGLevels(len(coarser) + 1)
-        for level, grid in enumerate(reversed(coarser)):
-            solver.pc.setMGInterpolation(level + 1, grid.interpolation)
-            solver.pc.getMGSmoother(level).setOperators(grid.matrix)
-        if finest is not None:
-            solver.pc.getMGSmoother(len(coarser)).setOperators(*finest)
-    one_rank = {"mg_coarse_pc_telescope_reduction_factor": matrix.comm.size}
-    usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
-    with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
-        solver.setFromOptions()
-        set_up(solver)  # multigrid reads the options of its levels here
-    if made_of is not matrix:
-        solver.pc.setReusePreconditioner(True)
-        solver.setOperators(matrix)
-        made_of.destroy()  # preconditioners that need it still hold it
-    return solver
-
-
-def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
-    """Return a matrix of type ``aij``, because few preconditioners take 3 × 3 blocks."""
-    if not matrix.getType().endswith("baij"):
-        return matrix
-    copy = matrix.convert("aij", PETSc.Mat())
-    copy.setOption(PETSc.Mat.Option.SPD, True)
-    copy.setNearNullSpace(matrix.getNearNullSpace())
-    return copy
-
-
-def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:
-    """Solve and return the number of iterations.
-
-    Args:
-        solver: The solver.
-        load: Right-hand side.
-        solution: Receives the solution.
-
-    Raises:
-        NotConverged: With the name of PETSc's reason.
-
-    Note:
-        Collective.
-    """
-    solver.solve(load, solution)
-    if solver.reason < 0:
-        raise NotConverged(
-            "the linear solve of the block",
-            reason=reason_name(PETSc.KSP.ConvergedReason, solver.reason),
-            iterations=solver.its,
-            remedy=f"see PETSc's options -{PREFIX}ksp_* and -{PREFIX}pc_*",
-        )
-    return int(solver.its)
-
-
 def reason_name(reasons: type, code: int) -> str:
     """Return the name of a PETSc converged reason, such as ``DIVERGED_LINE_SEARCH``.
 
@@ -250,50 +147,6 @@ def reason_name(reasons: type, code: int) -> str:
     names = [name for name, value in vars(reasons).items() if value == code and name.isupper()]
     # short aliases such as MAX_IT exist; PETSc documents the longest name
     return max(names, key=len, default=f"reason {code}")
-
-
-def set_up(solver: PETSc.KSP, margins: Sequence[int] = MARGINS) -> None:
-    """Set up a solver; a factorisation by MUMPS that runs out of memory is repeated with more.
-
-    Args:
-        solver: With its operators and options. Any other preconditioner is set up as it is.
-        margins: Memory beyond MUMPS's estimate to try in turn [%].
-
-    Raises:
-        NotConverged: When MUMPS fails otherwise, or with the largest margin.
-
-    Note:
-        Collective.
-    """
-    if not _by_mumps(solver.pc):
-        solver.setUp()
-        return
-    for margin in margins:
-        solver.pc.setFactorSetUpSolverType()  # makes the factor, which then takes its options
-        factor = solver.pc.getFactorMatrix()
-        factor.setMumpsIcntl(_MARGIN, margin)
-        solver.setUp()
-        error = factor.getMumpsInfog(1)
-        if error >= 0:
-            return
-        if error not in _OUT_OF_MEMORY:
-            break
-        operators = solver.getOperators()
-        solver.pc.reset()  # PETSc never retries a factor that failed
-        solver.setOperators(*operators)
-    raise NotConverged(
-        "the factorisation of the block",
-        reason=f"MUMPS's INFOG(1) = {error}",
-        iterations=0,
-        remedy="see MUMPS's guide for the number; more memory, or a coarser mesh",
-    )
-
-
-def _by_mumps(preconditioner: PETSc.PC) -> bool:
-    if preconditioner.getType() not in ("cholesky", "lu"):
-        return False
-    preconditioner.setFactorSetUpSolverType()  # PETSc chooses the package here
-    return str(preconditioner.getFactorSolverType()) == "mumps"
 
 
 def weakly(method: Callable[..., T]) -> Callable[..., T]:
@@ -344,3 +197,33 @@ class WeakContext:
         if context is None:
             raise ReferenceError("the owner of a PETSc context is gone")
         return context
+
+
+def shell(like: PETSc.Mat, context: Any) -> PETSc.Mat:
+    """Return a PETSc matrix without entries whose products an object writes.
+
+    Args:
+        like: A matrix of the same sizes.
+        context: Has ``mult``; keep it as long as the matrix.
+    """
+    matrix = PETSc.Mat().createPython(like.getSizes(), WeakContext(context), comm=like.comm)
+    matrix.setUp()
+    return matrix
+
+
+def conjugate_gradients(operator: PETSc.Mat, matrix: PETSc.Mat, preconditioner: Any) -> PETSc.KSP:
+    """Return conjugate gradients with a preconditioner of ours, whatever the user's options.
+
+    Args:
+        operator: The operator.
+        matrix: The matrix that the preconditioner is made of.
+        preconditioner: Has ``apply``; keep it as long as the solver.
+    """
+    solver = PETSc.KSP().create(operator.comm)
+    solver.setOperators(operator, matrix)
+    solver.setType("cg")
+    solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
+    solver.setTolerances(max_it=_MOST_ITERATIONS)
+    solver.pc.setType("python")
+    solver.pc.setPythonContext(WeakContext(preconditioner))
+    return solver

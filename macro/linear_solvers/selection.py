@@ -13,25 +13,42 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
                     28 to 43 on hexahedra of 8 : 1 and 20 : 1
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
+Without a lattice hypre's BoomerAMG coarsens linear elements.
+Coarse unknowns are some of the finer ones (PMIS or HMIS), and the others are interpolated from at
+most four of them ("extended+i"; De Sterck, Falgout, Nolting & Yang 2008, doi 10.1002/nla.544), each
+displacement component from its own kind. Two settings of twelve were best on brake pads, flanges,
+rings and L shapes of 3·10⁴ to 6·10⁵ unknowns, with moduli up to 10⁴ : 1.
+
+Tetrahedra coarsen node by node, by the norms of the 3 × 3 blocks: 13 to 20 iterations to 1e-8, and
+31 on flat cells, with half the time and three quarters of the memory of coarsening by component.
+Hexahedra coarsen by component with a high threshold: 10 to 17 iterations, 43 on cells 20 times as
+long as high on rollers. Norms of blocks do not tell the directions of such cells apart: 128 to 255.
+
+Smoothed aggregation (PETSc's GAMG) takes 11 to 20 iterations on cells of even lengths, but 61 to
+131 on flat ones on rollers, and its set-up takes 2 to 15 times as long, because its interpolation
+has tens of entries in a row. With a threshold, flat cells coarsen so slowly that set-up takes
+minutes. It is used on request (``-patchlaw_pc_type gamg``). The figures are of PETSc 3.18.
+
 Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from itertools import combinations
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy import sparse
 
-from geometry.materials import Material
-from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import RefinedShape
-from macro.linear_solvers.algebraic import algebraic_options
-from macro.linear_solvers.multigrid import Lattice, coarser_grids
-from macro.linear_solvers.multigrid_degrees import Linear, quadratic_options, vertex_grid
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX, linear_solver
-from macro.linear_solvers.stiffened import Stiffened
+from macro import compat
+from macro.linear_solvers.multigrid import coarser_grids
+from macro.linear_solvers.node_matrices import Stiffened, for_displacements
+from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
+from macro.linear_solvers.solvers import CoarserGrid, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -59,80 +76,112 @@ _ESTIMATES = 20
 wide ranges a smoother that misses more than 5 % is not definite; 20 miss 1 %."""
 
 
-def block_solver(
-    matrix: PETSc.Mat,
-    space: Any,
-    shape: BlockShape | RefinedShape,
-    lattice: Lattice | None,
-    material: Material,
-    free: PETSc.Vec,
-    linear: Callable[[], Linear],
-) -> PETSc.KSP:
-    """Return a solver for a block's stiffness; PETSc's options of the user win.
+_BOTH: Mapping[str, object] = {
+    "pc_type": "hypre",
+    "pc_hypre_type": "boomeramg",
+    "pc_hypre_boomeramg_interp_type": "ext+i",
+    "pc_hypre_boomeramg_P_max": 4,
+}
+
+_BY_NODES: Mapping[str, object] = {
+    **_BOTH,
+    "pc_hypre_boomeramg_nodal_coarsen": 4,
+    "pc_hypre_boomeramg_coarsen_type": "PMIS",
+    "pc_hypre_boomeramg_strong_threshold": 0.25,
+}
+
+_BY_COMPONENTS: Mapping[str, object] = {
+    **_BOTH,
+    "pc_hypre_boomeramg_coarsen_type": "HMIS",
+    "pc_hypre_boomeramg_strong_threshold": 0.7,
+}
+
+_SMOOTHING: Mapping[str, object] = {
+    "pc_mg_galerkin": "none",
+    "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.1",
+    "mg_levels_esteig_ksp_max_it": 30,
+    "mg_levels_pc_type": "pbjacobi",
+    "mg_coarse_ksp_type": "preonly",
+}
+"""Chebyshev smoothing with the nodes' blocks on all nodes. A third step saved one or two iterations
+and Gauss–Seidel three, but both took more time. PETSc's 10 iterations missed 12 % of the largest
+eigenvalue of a brake pad, so that the smoother was not definite; 20 found it."""
+
+_FLAT = 4.0
+"""Longest over shortest distance of a cell's vertices beyond which it counts as flat or slender."""
+
+_SMOOTHING_FLAT: Mapping[str, object] = {
+    "mg_levels_ksp_max_it": 6,
+    "mg_levels_ksp_chebyshev_esteig": "0,0.02,0,1.1",
+}
+"""Smoothing where most cells are flat: 31 iterations instead of 54 to 58 where they are eight times
+as long as high. The vertices do not see bending within a cell, which is soft there."""
+
+
+def body_solver(body: Any, stiffened: Stiffened | None = None) -> PETSc.KSP:
+    """Return a solver for a body's stiffness; PETSc's options of the user win.
 
     Args:
-        matrix: The stiffness with unit rows for constrained unknowns, its near-nullspace attached.
-        space: Its space.
-        shape: Shape that was meshed.
-        lattice: The lattice that its nodes form, if they form one.
-        material: Elastic constants of the block.
-        free: 1 for unknowns that are free, 0 for constrained ones.
-        linear: Gives the same block with linear displacements.
+        body: The `ElasticBody`.
+        stiffened: The stiffness with springs, which the preconditioner is to know where there is no
+            lattice; None: no springs.
 
     Note:
         Collective.
     """
-    ratio = material.poisson_ratio
+    matrix, ratio, lattice, mesh = body.stiffness, body.poisson_ratio, body.lattice, body.space.mesh
     requested = PETSc.Options(PREFIX).getString("pc_type", "")
-    if lattice is None:
-        return body_solver(
-            matrix, space, degree=shape.degree, poisson_ratio=ratio, free=free, linear=linear
-        )
-    if not requested and ratio > STIFF and matrix.getSize()[0] <= FACTORISED:
-        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS)
-    if requested not in ("", "mg"):
-        return linear_solver(matrix)
-    smoother = smoothing(ratio, hexahedral=shape.hexahedral)
-    return linear_solver(matrix, coarser_grids(lattice, matrix, free), smoother)
-
-
-def body_solver(
-    matrix: PETSc.Mat,
-    space: Any,
-    *,
-    degree: int,
-    poisson_ratio: float,
-    free: PETSc.Vec,
-    linear: Callable[[], Linear],
-    stiffened: Stiffened | None = None,
-) -> PETSc.KSP:
-    """Return a solver for the stiffness of a body whose mesh is no lattice.
-
-    Args:
-        matrix: The stiffness with unit rows for constrained unknowns, its near-nullspace attached.
-        space: Its space.
-        degree: Degree of the displacements.
-        poisson_ratio: Largest Poisson's ratio of the body.
-        free: 1 for unknowns that are free, 0 for constrained ones.
-        linear: Gives the same body with linear displacements; used for degree 2.
-        stiffened: The matrix with springs, which the preconditioner is to know; None: no springs.
-
-    Note:
-        Collective.
-    """
-    requested = PETSc.Options(PREFIX).getString("pc_type", "")
-    direct = not requested and poisson_ratio > COMPRESSIBLE and matrix.getSize()[0] <= FACTORISED
-    if degree == 2 and not direct and requested in ("", "mg"):
+    most = COMPRESSIBLE if lattice is None else STIFF
+    if not requested and ratio > most and matrix.getSize()[0] <= FACTORISED:
+        whole = None if stiffened is None else stiffened.assembled()
+        return linear_solver(matrix, preconditioner=DIRECT_DEFAULTS, whole=whole)
+    if lattice is not None and requested in ("", "mg"):
+        smoother = smoothing(ratio, hexahedral=compat.is_hexahedral(mesh))
+        return linear_solver(matrix, coarser_grids(lattice, matrix, body.free), smoother)
+    if lattice is None and body.degree == 2 and requested in ("", "mg"):
         springs, finest = None, None
         if stiffened is not None:
-            springs = stiffened.springs
-            finest = stiffened.product, stiffened.diagonal_blocks()
-        grid = vertex_grid(space, linear(), free, springs)
-        return linear_solver(matrix, grid, quadratic_options(space.mesh), finest=finest)
-    hexahedral = space.mesh.topology.cell_name() == "hexahedron"
-    options = DIRECT_DEFAULTS if direct else algebraic_options(hexahedral=hexahedral)
+            springs, finest = stiffened.springs, (stiffened.product, stiffened.diagonal_blocks())
+        grid = vertex_grid(body.space, body.linear, body.free, springs)
+        return linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
     whole = None if stiffened is None else stiffened.assembled()
-    return linear_solver(matrix, preconditioner=options, whole=whole)
+    return linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
+
+
+def algebraic_options(mesh: Any) -> Mapping[str, object]:
+    """Return PETSc's options of algebraic multigrid for linear elements.
+
+    Args:
+        mesh: dolfinx mesh of tetrahedra or hexahedra.
+    """
+    return _BY_COMPONENTS if compat.is_hexahedral(mesh) else _BY_NODES
+
+
+def quadratic_options(mesh: Any) -> Mapping[str, object]:
+    """Return PETSc's options of the two grids of `vertex_grid`.
+
+    Args:
+        mesh: dolfinx mesh of tetrahedra or hexahedra.
+
+    Note:
+        Collective.
+    """
+    algebraic = algebraic_options(mesh)
+    flat = _SMOOTHING_FLAT if _mostly_flat(mesh) else {}
+    return {**_SMOOTHING, **flat, **{f"mg_coarse_{key}": algebraic[key] for key in algebraic}}
+
+
+def _mostly_flat(mesh: Any) -> bool:
+    """Return whether most cells are flat or slender."""
+    vertices = len(compat.lagrange_points(mesh.topology.cell_name(), 1))
+    cells = compat.cell_vertices(mesh)[: mesh.topology.index_map(3).size_local, :vertices]
+    least, most = np.full(len(cells), np.inf), np.zeros(len(cells))
+    for one, other in combinations(range(vertices), 2):
+        edge = mesh.geometry.x[cells[:, one]] - mesh.geometry.x[cells[:, other]]
+        square = np.einsum("ck,ck->c", edge, edge)
+        least, most = np.minimum(least, square), np.maximum(most, square)
+    flat = int(np.sum(most > _FLAT**2 * least))
+    return bool(2 * mesh.comm.allreduce(flat) > mesh.comm.allreduce(len(cells)))
 
 
 def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]:
@@ -153,3 +202,74 @@ def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]
         "mg_levels_esteig_ksp_max_it": _ESTIMATES,
         "mg_levels_ksp_chebyshev_esteig": f"0,{smallest:g},0,1.05",
     }
+
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int32]
+
+
+def vertex_grid(
+    space: Any, linear: Any, free: PETSc.Vec, springs: PETSc.Mat | None = None
+) -> list[CoarserGrid]:
+    """Return the one coarser grid of displacements of degree 2: that of the vertices.
+
+    Args:
+        space: Vector space of degree 2.
+        linear: The same body with linear displacements, its stiffness of type ``aij``.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+        springs: Stiffness besides that of the body, such as that of contact laws.
+
+    Note:
+        Collective.
+    """
+    transfer, matrix = vertex_transfer(space, linear.space, free), linear.stiffness
+    if springs is not None:
+        matrix, modes = matrix.copy(), matrix.getNearNullSpace()
+        there = springs.ptap(transfer)
+        matrix.axpy(1.0, there, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        matrix.setNearNullSpace(modes)
+        there.destroy()
+    return [CoarserGrid(transfer, matrix)]
+
+
+def vertex_transfer(space: Any, linear: Any, free: PETSc.Vec) -> PETSc.Mat:
+    """Return the interpolation from the vertices to all nodes, constrained unknowns apart.
+
+    Args:
+        space: Vector space of degree 2.
+        linear: That of degree 1 on the same mesh, whose nodes the vertices are.
+        free: 1 for unknowns that are free, 0 for constrained ones.
+
+    Note:
+        Collective.
+    """
+    owned, vertices = (of.dofmap.index_map.size_local for of in (space, linear))
+    near, shares = (part[:owned] for part in _vertices_near(space, linear))
+    used = shares > 0.0
+    starts = np.concatenate([[0], np.cumsum(used.sum(axis=1))])
+    numbers = linear.dofmap.index_map.local_to_global(near[used].astype(np.int32))
+    total = linear.dofmap.index_map.size_global
+    weights = sparse.csr_matrix((shares[used], numbers, starts), (owned, total))
+    weights.sort_indices()
+    own = np.flatnonzero(shares.max(axis=1) == 1.0)  # both spaces own a vertex on the same rank
+    stay = np.empty(vertices, dtype=np.intp)
+    stay[near[own, shares[own].argmax(axis=1)]] = own
+    matrix, _ = for_displacements(weights, stay, free, blocks=True)
+    return matrix
+
+
+def _vertices_near(space: Any, linear: Any) -> tuple[Indices, Array]:
+    """Return the vertices of a cell of every node, and their shares in the node.
+
+    Returns:
+        Nodes of the linear space that are the vertices, and the values there of its basis, shape
+        (n, vertices of a cell), for the nodes of this rank's cells.
+    """
+    cell, nodes = space.mesh.topology.cell_name(), space.dofmap.index_map
+    values = compat.lagrange_values(cell, 1, compat.lagrange_points(cell, 2))
+    corner = np.count_nonzero(values, axis=1) == 1
+    values[corner] = np.rint(values[corner])
+    cells = compat.cell_nodes(space)
+    place = np.zeros((2, nodes.size_local + nodes.num_ghosts), dtype=np.int32)
+    place[:, cells] = np.indices(cells.shape, dtype=np.int32)  # a cell of every node
+    return compat.cell_nodes(linear)[place[0]], values[place[1]]

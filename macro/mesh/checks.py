@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from macro import compat
-from macro.mesh.neighbours import facets_between_ranks, inner_facets, parts
+from macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 
@@ -54,8 +54,8 @@ def check_cells(tagged: TaggedMesh) -> None:
         part = slice(start, start + _CHUNK)
         quality[part], hands[part] = _volumes(mesh.geometry.x[vertices[part]])
     bad = quality <= _FLAT
-    found = {hand for hands_there in comm.allgather(set(hands[~bad])) for hand in hands_there}
-    if len(found) > 1:
+    handedness = {hand for hands_there in comm.allgather(set(hands[~bad])) for hand in hands_there}
+    if len(handedness) > 1:
         bad |= _folded(mesh, vertices)
     _refuse(comm, bad, mesh, vertices)
 

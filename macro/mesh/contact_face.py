@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facet_nodes import facet_indices, facet_nodes
+from macro.mesh.facets import facet_indices, facet_nodes
 
 Array = NDArray[np.float64]
 
@@ -78,6 +79,14 @@ class ContactFacets:
         areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
         return np.asarray(areas, dtype=np.float64)
 
+    def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
+        """Return these facets and others of the same face."""
+        arrays = [each.name for each in fields(self) if each.name not in ("frame", "outward")]
+        parts = (self, *others)
+        return replace(
+            self, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
+        )
+
     def local(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
@@ -116,7 +125,7 @@ class ContactFacets:
 
 
 def facet_quadrature(
-    facets: ContactFacets, space: Any, patches: PatchGrid, *, degree: int
+    facets: ContactFacets, space: Any, parts: PatchGrid | NDArray[np.intp], *, degree: int
 ) -> FacetQuadrature:
     """Place quadrature points on the part of a contact face that the patches cover.
 
@@ -126,11 +135,15 @@ def facet_quadrature(
     Args:
         facets: Facets of the face.
         space: Displacements on their mesh.
-        patches: Patches on the face, in its frame.
+        parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
-    triangles, facet = _cut_into_patches(*_triangles(facets.corners), patches)
-    patch = patches.index_of(*triangles.mean(axis=1).T)
+    triangles, facet = _triangles(facets.corners)
+    if isinstance(parts, PatchGrid):
+        triangles, facet = _cut_into_patches(triangles, facet, parts)
+        patch = parts.index_of(*triangles.mean(axis=1).T)
+    else:
+        patch = parts[facet]
     order = np.argsort(patch, kind="stable")
     triangles, facet, patch = triangles[order], facet[order], patch[order]
 
@@ -172,15 +185,15 @@ def contact_facets(
     """
     mesh.topology.create_connectivity(2, 3)
     side_of_body = -1.0 if opposed else 1.0
-    found = facet_nodes(mesh, facet_indices(mesh, facets))
-    owned = found.cell < mesh.topology.index_map(3).size_local
+    nodes = facet_nodes(mesh, facet_indices(mesh, facets))
+    owned = nodes.cell < mesh.topology.index_map(3).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
-    side = found.side[owned]
-    corners = mesh.geometry.x[found.corners[owned]]
+    side = nodes.side[owned]
+    corners = mesh.geometry.x[nodes.corners[owned]]
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
-        cell=found.cell[owned],
+        cell=nodes.cell[owned],
         side=side,
         reference=vertices[shapes[side]],
         corners=frame.in_plane(corners),

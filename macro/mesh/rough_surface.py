@@ -5,6 +5,7 @@ Theory: section 12 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,9 +15,11 @@ from numpy.typing import NDArray
 
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.stepped import SteppedShape
 from geometry.surface import Surface
 from macro import compat
-from macro.mesh.block import BlockMesh, block_mesh
+from macro.mesh.block import FLAT, BlockMesh, block_mesh, stepped_mesh
+from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -32,12 +35,6 @@ _STEEPEST = 2.0
 
 _LEAST_BENT = 0.3
 """Relative volume below which the edges of a quadratic tetrahedron are made straight."""
-
-_FLAT = 1e-9
-"""Distance from a face, relative to the body, that is rounding."""
-
-_NODES_OF_CURVED = 10
-"""Nodes of a quadratic tetrahedron."""
 
 _EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
 """Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
@@ -90,6 +87,28 @@ def rough_block_mesh(
     return flat, move_onto(flat.mesh, surface, shape.height)
 
 
+def rough_stepped_mesh(
+    shape: SteppedShape, planes: Mapping[str, tuple[int, float]], surface: Surface, comm: Any
+) -> tuple[TaggedMesh, MeshQuality]:
+    """Mesh a block on boxes and move its nodes onto the roughness; see `rough_block_mesh`.
+
+    Args:
+        shape: The flat body; the top of its block is the surface's rectangle.
+        planes: Surfaces to mark, see `stepped_mesh`.
+        surface: The rough surface.
+        comm: MPI communicator.
+
+    Raises:
+        InputError: As `rough_block_mesh` and `stepped_mesh` do.
+
+    Note:
+        Collective.
+    """
+    check_cover(shape.block, surface)
+    flat = stepped_mesh(shape, planes, comm)
+    return flat, move_onto(flat.mesh, surface, shape.block.height)
+
+
 def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
     """Move the nodes below a planar face onto the roughness; see `rough_block_mesh`.
 
@@ -115,7 +134,7 @@ def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
     rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
     moved = points.copy()
     moved[:, 2] += rise * np.maximum(1.0 + points[:, 2] / depth, 0.0) ** _DECAY
-    if compat.cell_vertices(mesh).shape[1] == _NODES_OF_CURVED:
+    if compat.geometry_degree(mesh) == 2:
         _straighten(mesh, moved)
     quality = MeshQuality(
         thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), op=MPI.MIN)),
@@ -168,7 +187,7 @@ def _check_depth(depth: float, surface: Surface) -> None:
 
 def _check_sides(mesh: Any, surface: Surface, depth: float) -> None:
     """Refuse bodies that are wider, or higher, than the block under their face; collective."""
-    points, slack = mesh.geometry.x, _FLAT * max(*surface.lengths, depth)
+    points, slack = mesh.geometry.x, FLAT * max(*surface.lengths, depth)
     above = points[points[:, 2] > -depth + slack]
     beyond = np.maximum(-above, above - np.array([*surface.lengths, 0.0]))
     beyond[:, 2] = above[:, 2]
@@ -187,8 +206,8 @@ def _straighten(mesh: Any, moved: Array) -> None:
     done: Array = np.empty(0, dtype=np.int64)
     while True:
         middles = cells[:, 4:]
-        found = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < _LEAST_BENT]])
-        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(found)))
+        bent = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < _LEAST_BENT]])
+        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(bent)))
         if len(straight) == len(done):
             return
         done = straight
@@ -205,7 +224,7 @@ def _volumes(mesh: Any, moved: Array) -> Array:
     cells, points = compat.cell_vertices(mesh), mesh.geometry.x
     x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
     smallest = np.full(len(cells), np.inf)
-    degree = 2 if cells.shape[1] == _NODES_OF_CURVED else 1
+    degree = compat.geometry_degree(mesh)
     for slopes in compat.lagrange_gradients(mesh.topology.cell_name(), degree):
         normal = np.cross(x @ slopes, y @ slopes)
         volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
@@ -217,7 +236,7 @@ def _steepest(mesh: Any, depth: float, rise: Array) -> float:
     """Return the largest slope between horizontal neighbours on the top."""
     points = mesh.geometry.x
     cells = compat.cell_vertices(mesh)
-    top = np.abs(points[:, 2]) < _FLAT * depth
+    top = np.abs(points[:, 2]) < FLAT * depth
     cells = cells[top[cells].any(axis=1)]
     i, j = np.triu_indices(cells.shape[1], 1)
     a, b = cells[:, i].ravel(), cells[:, j].ravel()

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from macro.mesh.facet_nodes import facet_nodes
+from macro.mesh.facets import facet_nodes
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 
@@ -23,33 +23,35 @@ _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""
 
 
-class Held(Protocol):
-    """A surface with prescribed displacements, such as a `Support`."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Support:
+    """A surface whose displacement is prescribed.
 
-    @property
-    def tag(self) -> int:
-        """Tag of its facets."""
+    Args:
+        tag: Marker of its facets.
+        displacement: Displacement along x, y and z [mm]; None for a component that is free.
+    """
 
-    @property
-    def displacement(self) -> tuple[float | None, float | None, float | None]:
-        """Displacement along x, y and z [mm]; None where it is free."""
+    tag: int
+    displacement: tuple[float | None, float | None, float | None] = (0.0, 0.0, 0.0)
 
 
-class Loaded(Protocol):
-    """A surface under a traction, such as a `Traction`."""
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Traction:
+    """A surface that is loaded.
 
-    @property
-    def tag(self) -> int:
-        """Tag of its facets."""
+    Args:
+        tag: Marker of its facets.
+        stress: Force per area along x, y and z, shape (3,) [MPa].
+    """
 
-    @property
-    def stress(self) -> tuple[float, float, float]:
-        """Force per area along x, y and z [MPa]."""
+    tag: int
+    stress: tuple[float, float, float]
 
 
 def check_supports(
     tagged: TaggedMesh,
-    supports: Sequence[Held],
+    supports: Sequence[Support],
     contact: int | None = None,
     *,
     key: str | None = None,
@@ -92,8 +94,8 @@ def check_supports(
 
 def check_tractions(
     tagged: TaggedMesh,
-    tractions: Sequence[Loaded],
-    supports: Sequence[Held],
+    tractions: Sequence[Traction],
+    supports: Sequence[Support],
     contact: int | None = None,
     *,
     key: str | None = None,
@@ -166,7 +168,7 @@ def _check_common_nodes(
             )
 
 
-def free_motions(tagged: TaggedMesh, supports: Sequence[Held]) -> list[str]:
+def free_motions(tagged: TaggedMesh, supports: Sequence[Support]) -> list[str]:
     """Return in words which rigid motions the supports leave free.
 
     A motion t + ω × r is free when it moves no node of a support along a direction that is held.

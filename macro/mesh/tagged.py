@@ -8,8 +8,12 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
+from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from geometry.face_frame import FaceFrame
+from macro import compat
+from macro.mesh.facets import facet_nodes
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -67,10 +71,7 @@ class TaggedMesh:
         Note:
             Collective.
         """
-        x = self.mesh.geometry.x
-        boxes = self.comm.allgather((x.min(axis=0), x.max(axis=0)) if len(x) else None)
-        lower, upper = (np.array([box[k] for box in boxes if box is not None]) for k in (0, 1))
-        return lower.min(axis=0), upper.max(axis=0)
+        return bounding_box(self.mesh.geometry.x, self.comm)
 
     def facet_tag(self, wanted: str | int, *, key: str | None = None) -> int:
         """Return the tag of facets by its name or number.
@@ -87,6 +88,21 @@ class TaggedMesh:
     def cell_tag(self, wanted: str | int, *, key: str | None = None) -> int:
         """Return the tag of cells by its name or number; see `facet_tag`."""
         return _tag(self.cell_names, wanted, "volume", key)
+
+
+def bounding_box(points: Array, comm: Any) -> tuple[Array, Array]:
+    """Return the lower and the upper corner of the box around the points of all ranks, (n,) each.
+
+    Args:
+        points: This rank's points, shape (m, n); there may be none.
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    ends = comm.allgather((points.min(axis=0), points.max(axis=0)) if len(points) else None)
+    lower, upper = (np.array([end[k] for end in ends if end is not None]) for k in (0, 1))
+    return lower.min(axis=0), upper.max(axis=0)
 
 
 def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None) -> int:
@@ -108,3 +124,129 @@ def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None
         key=key,
         allowed=", ".join(listed) + more if names else "a number",
     )
+
+
+_FLAT = 1e-6
+"""Distance from the plane, relative to the face, that is rounding of coordinates in files."""
+
+_CLOSED = 0.5
+"""Least length of the sum of a face's areas as vectors, relative to its area."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlanarFace:
+    """A face of a body in the coordinates of its plane.
+
+    Attributes:
+        frame: The coordinates; the plane goes through the highest node.
+        lengths: Sides of the bounding rectangle along e1 and e2 [mm].
+        area: Area of the facets of all ranks [mm²].
+        facets: Number of the facets of all ranks.
+        deviation: Half the difference of height between the highest and the lowest node [mm].
+        steepest: Largest slope of a facet against the plane.
+    """
+
+    frame: FaceFrame
+    lengths: tuple[float, float]
+    area: float
+    facets: int
+    deviation: float
+    steepest: float
+
+
+def planar_face(
+    tagged: TaggedMesh,
+    tag: int,
+    *,
+    name: str | None = None,
+    deviation: float = 0.0,
+    key: str | None = None,
+) -> PlanarFace:
+    """Return the plane of a face, of any outline, that need not hang together.
+
+    Args:
+        tagged: The mesh.
+        tag: Tag of the facets.
+        name: Name of the face, for errors; its tag by default.
+        deviation: Largest distance of a node from the plane half-way between the highest and the
+            lowest that is allowed [mm]: half the height of a crown. Rounding of the coordinates
+            always is.
+        key: Key of the scene that the name comes from, for errors.
+
+    Raises:
+        InputError: On all ranks, when the face has no facets, when facets lie inside the body, and
+            when the face is curved or made of planes that face different ways.
+
+    Note:
+        Collective. The results do not depend on the ranks but for rounding.
+    """
+    told = _Words(name=str(tag) if name is None else name, key=key)
+    comm = tagged.comm
+    corners, outward, inner = _facets(tagged, tag)
+    count, inside = comm.allreduce(len(corners) + inner), comm.allreduce(inner)
+    if not count:
+        raise told.error("has no facets that belong to cells")
+    if inside:
+        raise told.error(f"has {inside} of {count} facets inside the body, between two cells")
+    areas = np.linalg.norm(outward, axis=1)
+    area, total = comm.allreduce(float(areas.sum())), comm.allreduce(outward.sum(axis=0))
+    if np.linalg.norm(total) < _CLOSED * area:
+        raise told.error("is not planar: its facets face different ways and close around a body")
+    frame = FaceFrame.across(total)
+    local = corners.reshape(-1, 3) @ frame.axes.T
+    lower, upper = bounding_box(local, comm)
+    upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
+    flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
+    lengths, off = upper[:2] - lower[:2], 0.5 * float(upper[2] - lower[2])
+    if off > max(deviation, _FLAT * float(lengths.max())) or flattest <= 0.0:
+        angle = np.degrees(np.arccos(np.clip(flattest, -1.0, 1.0)))
+        limit = f"at most {deviation:.4g} mm" if deviation else "a planar face"
+        raise told.error(
+            f"is not planar: its nodes are up to {off:.4g} mm off the plane through it, and its "
+            f"facets up to {angle:.2g}° from it",
+            allowed=limit,
+        )
+    return PlanarFace(
+        frame=FaceFrame.through(np.stack([lower, upper]) @ frame.axes, total),
+        lengths=(float(lengths[0]), float(lengths[1])),
+        area=area,
+        facets=count,
+        deviation=off,
+        steepest=float(np.sqrt(1.0 - min(flattest, 1.0) ** 2) / flattest),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Words:
+    """How errors name the face."""
+
+    name: str
+    key: str | None
+
+    def error(self, problem: str, allowed: str | None = None) -> InputError:
+        return InputError(f"the surface {self.name!r} {problem}", key=self.key, allowed=allowed)
+
+
+def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
+    """Return this rank's outer facets of a face.
+
+    Returns:
+        Their corners, shape (n, 3 or 4, 3) [mm]; outward vectors as long as their areas, shape
+        (n, 3) [mm²]; the number of facets between two cells, each counted on one rank.
+    """
+    mesh = tagged.mesh
+    topology = mesh.topology
+    facets = np.asarray(tagged.facet_tags.find(tag))
+    outer = np.isin(facets, dmesh.exterior_facet_indices(topology))
+    own = facets < topology.index_map(2).size_local
+    nodes = facet_nodes(mesh, facets[outer])
+    owned = nodes.cell < topology.index_map(3).size_local
+    corners = mesh.geometry.x[nodes.corners[owned]]
+    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell[owned]]].mean(axis=1)
+    # half the product of the diagonals of a quadrilateral
+    ends = (1, 0, 2, 0) if corners.shape[1] == 3 else (3, 0, 2, 1)
+    u, v = (corners[:, ends[k]] - corners[:, ends[k + 1]] for k in (0, 2))
+    areas = 0.5 * np.cross(u, v)
+    away = np.einsum("ni,ni->n", areas, corners.mean(axis=1) - middle)
+    inner = int((own & ~outer).sum())
+    return corners, areas * np.where(away < 0.0, -1.0, 1.0)[:, None], inner

@@ -24,7 +24,7 @@ from support.checks import process_memory
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape
     from macro import FaceCompliance
-    from macro.block import Sides
+    from macro.bodies import Sides
 
 _BYTES = 190.0
 """Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56

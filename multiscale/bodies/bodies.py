@@ -67,7 +67,7 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import BodyPair, FacePair, FaceRegions, LoadedFace
+        from macro import FacePair, LoadedFace
 
         first = self._first_face()
         if self.counter is None:
@@ -75,14 +75,14 @@ class Bodies:
         second = LoadedFace(self.counter.body, self.counter.facets[0], self.patches)
         if self.regions:
             lengths = self.facts[0].lengths
-            second = FaceRegions.covering(self.counter.body, self.counter.facets, lengths)
-        return FacePair(first, second, BodyPair(first.body, self.counter.body))
+            second = LoadedFace.of_regions(self.counter.body, self.counter.facets, lengths)
+        return FacePair(first, second)
 
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
         from mpi4py import MPI
 
-        from macro import Block, FaceRegions, LoadedFace, block_mesh
+        from macro import Block, LoadedFace, block_mesh
         from macro.mesh.contact_face import top_facets
 
         body: Any
@@ -97,7 +97,7 @@ class Bodies:
                 return LoadedFace.of_block(body, self.patches)
             facets = (top_facets(mesh),)
         if self.regions:
-            return FaceRegions.covering(body, facets, self.facts[0].lengths)
+            return LoadedFace.of_regions(body, facets, self.facts[0].lengths)
         return LoadedFace(body, facets[0], self.patches)
 
     def terms(self, *, side_term: bool) -> FaceTerms:

@@ -165,7 +165,7 @@ class MeshTerms(FaceTerms):
 
     def _key(self, count: int) -> tuple[object, ...]:
         """Return what the compliance in so many modes along a side depends on; collective."""
-        from macro.compliance.mesh_digest import body_digest
+        from macro.compliance.cache import body_digest
         from macro.compliance.mesh_face import raised
 
         frame = self.facets.frame

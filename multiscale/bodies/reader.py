@@ -162,7 +162,7 @@ class _Reader:
 
     def _face(self, mesh: TaggedMesh, tags: Sequence[int]) -> _Face:
         """Return the plane of the contact face with all its regions."""
-        from macro.mesh.planar_face import planar_face
+        from macro.mesh.tagged import planar_face
 
         names = {tag: name for name, tag in mesh.facet_names.items()}
         curved = self._scene.law.representative

@@ -72,7 +72,7 @@ def write_displaced(
 
     def halves(counter: bool) -> Iterator[Field]:
         for number, moved in sorted(states.items()):
-            own = face.bodies.split(moved)[counter] if isinstance(face, FacePair) else moved
+            own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
             yield number, own, pressures(number, counter)
 
     _write(path, face, lambda one: halves(one is getattr(face, "second", None)))

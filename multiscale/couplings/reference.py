@@ -38,7 +38,7 @@ from multiscale.results.reference_record import ReferenceRecord, reference_recor
 from multiscale.scene.scene import Scene
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import MeshQuality, UnilateralContactProblem, UnilateralContactState
+    from macro import ContactState, MeshQuality, UnilateralContactProblem
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class ReferenceCoupling(PressedSurface):
     """
 
     rough_meshes: ReferenceMeshes
-    _last: tuple[UnilateralContactState, ...] = field(default=(), init=False)
+    _last: tuple[ContactState, ...] = field(default=(), init=False)
 
     @classmethod
     def from_scene(
@@ -156,23 +156,24 @@ class ReferenceCoupling(PressedSurface):
         self._last = states = tuple(problem.solve(control) for problem in self._problems)
         finest, nominal = states[-1], self.patches.area * self.patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
-        share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
+        share = (finest.contact_area or 0.0) / finest.nodal_area if finest.nodal_area else 0.0
         return LoadStep.of_patches(
             self.patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
             closure=finest.patch_closure,
-            pressure=finest.patch_force / self.patches.area,
+            pressure=finest.patch_pressure,
             area_fraction=share * finest.patch_area / self.patches.area,
             separation=finest.mean_separation,
             contacts=finest.contacts,
-            newton_iterations=sum(state.active_sets for state in states),
+            newton_iterations=sum(state.iterations for state in states),
             linear_iterations=sum(state.linear_iterations for state in states),
             reason=finest.reason,
             imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
             peak_pressure_MPa=finest.peak_pressure,
             meshes=tuple(
-                (state.approach, state.force, state.contact_area_fine / nominal) for state in states
+                (state.approach, state.force, (state.contact_area or 0.0) / nominal)
+                for state in states
             ),
         )
 
@@ -184,12 +185,12 @@ class ReferenceCoupling(PressedSurface):
         """
         from macro import nodal_contact
 
-        latest: UnilateralContactState = state
+        latest: ContactState = state
 
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)
         region, count = nodes.region[touching], latest.contacts
-        share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
+        share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > _NO_AREA * nodes.area.max()
         spots = Spots(

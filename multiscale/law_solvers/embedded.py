@@ -17,7 +17,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
+    from macro import ContactState, FacePair, LawContactProblem, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class EmbeddedLaws:
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
         self._problem, self.table, self.face = problem, table, face
-        self._last: LawContactState | None = None
+        self._last: ContactState | None = None
 
     @property
     def displacement(self) -> Array:
@@ -57,7 +57,9 @@ class EmbeddedLaws:
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        pressure, face = self._problem.pressures, self.face
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        pressure, face = self._last.sample_pressure, self.face
         if not hasattr(face, "on_both"):
             return pressure
         whole = np.zeros(len(face.on_both))
@@ -102,7 +104,7 @@ class EmbeddedLaws:
     def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return None if last is None else (last.approach, last.tilt, last.pressure)
+        return None if last is None else (last.approach, last.tilt, last.patch_pressure)
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -115,7 +117,7 @@ class EmbeddedLaws:
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, state: LawContactState) -> LoadStep:
+    def _step(self, control: Control, state: ContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
         laws = self.table.laws
 
@@ -133,19 +135,19 @@ class EmbeddedLaws:
             self.table.patches,
             plane=(state.approach, *state.tilt),
             load=(state.force, *state.moment),
-            closure=state.closure,
-            pressure=state.pressure,
+            closure=state.patch_closure,
+            pressure=state.patch_pressure,
             area_fraction=area_fraction,
             separation=separation,
             stiffness=stiffness,
             **self._of_contacts(state),
-            newton_iterations=state.newton_iterations,
+            newton_iterations=state.iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_contacts(self, state: LawContactState) -> dict[str, Any]:
+    def _of_contacts(self, state: ContactState) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.
 
         Where laws are those of samples, contacts are counted on the area of the samples, and the
@@ -153,7 +155,7 @@ class EmbeddedLaws:
         """
         laws = self.table.laws
         if isinstance(self.table.patches, PatchGrid):
-            mean_closures = zip(laws, state.closure, strict=True)
+            mean_closures = zip(laws, state.patch_closure, strict=True)
             return {"contacts": [law.at(c, extend=True).contacts for law, c in mean_closures]}
         areas = self.face.areas
         density = [

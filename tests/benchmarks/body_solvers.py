@@ -34,7 +34,7 @@ from macro import LawContactProblem, LoadedFace, Material, compat
 from macro.linear_solvers.options import PREFIX
 from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import planar_face
+from macro.mesh.tagged import planar_face
 
 COMM = MPI.COMM_WORLD
 LINING, SOFT, RUBBERY = (
@@ -165,7 +165,7 @@ def press(name, tagged, body, steps):
         print(f"{name}, {body.dofs} unknowns")
         for phase, (_, cpu, wall, used) in lines:
             print(f"  {phase:16s} {cpu:7.2f} s CPU {wall:7.2f} s   {used / 1e9} GB")
-        newton = [state.newton_iterations for state in states]
+        newton = [state.iterations for state in states]
         linear = [state.linear_iterations for state in states]
         print(f"  whole {whole / 1e9} GB, {whole.sum() / body.dofs:.0f} B per unknown")
         print(f"  Newton {newton}, linear {linear}, force {states[-1].force:.3f} N")

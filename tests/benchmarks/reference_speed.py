@@ -80,8 +80,8 @@ def curve(surface, shape, approaches):
         total += wall
         forces.append(state.force)
         say(
-            f"{1e3 * approach:4.1f} {state.force:12.6f} {100 * state.contact_area_fine:10.4f} "
-            f"{state.nodes:6d} {state.active_sets:12d}  {counts!s:26s} {wall:8.1f}"
+            f"{1e3 * approach:4.1f} {state.force:12.6f} {100 * state.contact_area:10.4f} "
+            f"{state.nodes:6d} {state.iterations:12d}  {counts!s:26s} {wall:8.1f}"
         )
     say(f"  {total:.1f} s in all, peak {memory():.2f} GB on {COMM.size} ranks")
     return np.array(forces), total

@@ -44,7 +44,7 @@ def report(surface, name, shape, scale):
     forces = [state.force / scale for state in states]
     if COMM.rank == 0:
         told = ", ".join(f"{force:.4f}" for force in forces)
-        sets = [state.active_sets for state in states]
+        sets = [state.iterations for state in states]
         cycles = [state.linear_iterations for state in states]
         print(
             f"{name}, {1e3 * characteristic_size(shape):5.2f} µm, {block.body.dofs:7d} unknowns, "

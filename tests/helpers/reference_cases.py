@@ -131,7 +131,7 @@ def semi_axes(block, state):
 
     They weigh all of the contact, and know its size better than the nodes at its border.
     """
-    share = state.nodal_force / state.force
+    share = state.nodal.force / state.force
     x, y = (
         np.average((place - np.average(place, weights=share)) ** 2, weights=share)
         for place in (block.top.x, block.top.y)
@@ -143,4 +143,4 @@ def peak_pressure(block, state):
     """Return the largest pressure of a node, of those that have an area of their own [MPa]."""
     area = block.top.area
     own = area > 1e-3 * area.max()
-    return float((state.nodal_force[own] / area[own]).max())
+    return float((state.nodal.force[own] / area[own]).max())

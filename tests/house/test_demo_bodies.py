@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from macro import compat
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import planar_face
+from macro.mesh.tagged import planar_face
 from multiscale import Scene, run
 
 BODIES = Path(__file__).parents[2] / "demos" / "bodies"

@@ -42,8 +42,8 @@ def run(case, mode):
     numbers = {
         "force": [state.force for state in states],
         "plane": [states[-1].approach, *states[-1].tilt],
-        "closure": states[-1].closure.tolist(),
-        "pressure": states[-1].pressure.tolist(),
+        "closure": states[-1].patch_closure.tolist(),
+        "pressure": states[-1].patch_pressure.tolist(),
     }
     reaction = [state.reaction for state in states]
     everyone = COMM.allgather((numbers, reaction))

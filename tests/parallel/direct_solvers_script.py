@@ -67,6 +67,6 @@ if __name__ == "__main__":
             problem = LawContactProblem(face, LAWS, mode)
             pressed = problem.solve(Control(approach=6e-3))
             free = problem.solve(Control(force=4.0, tilt=None))
-            found[f"{kind} {mode}"] = [pressed.force, *pressed.pressure, *free.pressure]
+            found[f"{kind} {mode}"] = [pressed.force, *pressed.patch_pressure, *free.patch_pressure]
     if COMM.rank == 0:
         sys.stdout.write(json.dumps(found) + "\n")

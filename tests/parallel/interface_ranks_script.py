@@ -61,7 +61,7 @@ def cube(element, mode):
         found[f"{element} {mode} {name}"] = [
             rough.force,
             rough.force / state.force - 1.0,
-            float(np.abs(rough.patch_pressure - state.pressure).max()),
+            float(np.abs(rough.patch_pressure - state.patch_pressure).max()),
         ]
     return found
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import BodyPair, FacePair, LawContactProblem, Material
+from macro import FacePair, LawContactProblem, Material
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.body_meshes import box, hanging, standing
@@ -37,12 +37,12 @@ def pressed(mode, order):
     soft, hard = (Material(young_modulus=e, poisson_ratio=0.3) for e in (2e3, 5e3))
     first = standing(below, soft, PATCHES, order)
     second = hanging(above, hard, PATCHES, order)
-    faces = FacePair(first, second, BodyPair(first.body, second.body))
+    faces = FacePair(first, second)
     problem = LawContactProblem(faces, [Square(1e7 * (1 + i)) for i in range(4)], mode)
     found = []
     for control in (Control(approach=2e-3, tilt=(1e-3, 0.0)), Control(force=3.0, tilt=None)):
         state = problem.solve(control)
-        found += [state.force, state.reaction, state.approach, *state.pressure]
+        found += [state.force, state.reaction, state.approach, *state.patch_pressure]
     return found
 
 

@@ -32,7 +32,7 @@ def main():
         "moment": [state.moment.tolist() for state in states],
         "balance": [state.reaction / state.force - 1.0 for state in states],
         "nodes": [state.nodes for state in states],
-        "area": [state.contact_area_fine for state in states],
+        "area": [state.contact_area for state in states],
         "top_nodes_of_ranks": COMM.allgather(len(problem.top.dofs)),
         "largest": COMM.allreduce(float(np.abs(states[-1].displacement).max()), op=MPI.MAX),
     }

@@ -69,8 +69,8 @@ def run(shape, surface, sides, method, controls):
     numbers = {
         "force": [state.force for state in states],
         "approach": [state.approach for state in states],
-        "area": [state.contact_area for state in states],
-        "fine area": [state.contact_area_fine for state in states],
+        "area": [state.nodal_area for state in states],
+        "fine area": [state.contact_area for state in states],
         "nodes": [state.nodes for state in states],
         "contacts": [state.contacts for state in states],
         "separation": [state.mean_separation for state in states],

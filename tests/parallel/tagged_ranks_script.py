@@ -17,12 +17,11 @@ from helpers.mesh_files import tagged_box, write_boxes, write_msh2
 
 from macro import compat
 from macro.mesh.checks import check_cells
+from macro.mesh.facets import parts
 from macro.mesh.from_file import read_mesh
-from macro.mesh.neighbours import parts
-from macro.mesh.planar_face import planar_face
 from macro.mesh.supports import free_motions
-from macro.mesh.tagged import TaggedMesh
-from macro.mesh.to_file import write_mesh
+from macro.mesh.tagged import TaggedMesh, planar_face
+from macro.mesh.xdmf import write_mesh
 from support.collective import on_root
 from support.errors import InputError
 

@@ -29,7 +29,7 @@ def test_bottom_bears_the_force_of_the_interface(mode, element):
         # residuals of 1e-9 of the load, added up over the nodes
         assert state.reaction == pytest.approx(state.force, rel=1e-9)
         assert state.force == pytest.approx(
-            state.pressure.sum() * interface.patches.area, rel=1e-12
+            state.patch_pressure.sum() * interface.patches.area, rel=1e-12
         )
 
 
@@ -42,8 +42,8 @@ def test_confined_block_under_one_law_solves_a_scalar_equation(mode):
     stiffness = block.material.confined_modulus / 0.6
     pressure = brentq(lambda p: law.pressure(9e-3 - p / stiffness) - p, 0.0, 100.0, xtol=1e-13)
     # uniform strain is exact; what is left is the tolerance of Newton's method
-    np.testing.assert_allclose(state.pressure, pressure, rtol=1e-8)
-    np.testing.assert_allclose(state.closure, 9e-3 - pressure / stiffness, rtol=1e-8)
+    np.testing.assert_allclose(state.patch_pressure, pressure, rtol=1e-8)
+    np.testing.assert_allclose(state.patch_closure, 9e-3 - pressure / stiffness, rtol=1e-8)
 
 
 def test_pointwise_and_patchwise_agree_where_the_closure_is_uniform():
@@ -104,11 +104,11 @@ def test_default_tolerances_take_few_steps_and_give_the_same_answer(mode):
     laws = uneven_laws(16)
     pressed = LawContactProblem(interface, laws, mode)
     states = [pressed.solve(Control(approach=1e-3 * k)) for k in range(1, 9)]
-    assert max(state.newton_iterations for state in states) <= 6
+    assert max(state.iterations for state in states) <= 6
     assert all(state.residuals[-1] <= 1e-9 for state in states)
     alone = LawContactProblem(interface, laws, mode).solve(Control(approach=8e-3))
     # the answer does not depend on the path: laws without hysteresis, residuals below 1e-9
-    np.testing.assert_allclose(states[-1].pressure, alone.pressure, rtol=1e-8)
+    np.testing.assert_allclose(states[-1].patch_pressure, alone.patch_pressure, rtol=1e-8)
 
 
 def test_unloading_opens_the_interface_again():
@@ -138,7 +138,7 @@ def test_nearly_rigid_laws_still_converge(mode):
     for approach in (2e-3, 4e-3, 8e-3):
         state = pressed.solve(Control(approach=approach))
     # what a rigid plane would do: closures stay at the touch, 4 orders stiffer than the block
-    assert state.closure.max() < 6.2e-3
+    assert state.patch_closure.max() < 6.2e-3
     assert state.residuals[-1] <= 1e-9
 
 
@@ -161,4 +161,4 @@ def test_patchwise_pressures_solve_the_condensed_problem():
 
     expected = root(mismatch, np.zeros(6), tol=1e-13).x
     state = LawContactProblem(interface, laws).solve(Control(approach=8e-3, tilt=(1e-3, 2e-3)))
-    np.testing.assert_allclose(state.pressure, expected, rtol=1e-8)  # two solves of 1e-9
+    np.testing.assert_allclose(state.patch_pressure, expected, rtol=1e-8)  # two solves of 1e-9

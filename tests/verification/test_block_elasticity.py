@@ -9,7 +9,7 @@ from helpers.block_cases import block_of, interface_of
 
 from macro import Material, compat
 from macro.elasticity import stiffness_form, stress
-from macro.linear_solvers.options import linear_solver, solve_linear
+from macro.linear_solvers.solvers import linear_solver, solve_linear
 
 MATERIAL = Material(young_modulus=2.0, poisson_ratio=0.3)
 ELEMENTS = ["Q1", "Q2", "P1", "P2"]
@@ -23,7 +23,7 @@ def dirichlet_solution(block, boundary_values, load=None):
     dofs = fem.locate_dofs_topological(space, 2, facets)
     fixed = fem.dirichletbc(np.zeros(3), dofs, space)
     degree = 2 * block.degree if block.mesh.shape.hexahedral else 2 * block.degree - 2
-    form = compat.compile_form(stiffness_form(space, MATERIAL, degree))
+    form = compat.compile_form(stiffness_form(space, MATERIAL.lame, degree))
     whole, constrained = compat.assemble_matrix(form, []), compat.assemble_matrix(form, [fixed])
     given = fem.Function(space)
     given.interpolate(boundary_values)

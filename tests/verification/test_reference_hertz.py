@@ -98,7 +98,7 @@ def test_bias_of_the_areas():
     """Nodes count their whole surroundings; within facets the border lies too far inside."""
     nodal, fine = np.transpose(
         [
-            (state.contact_area, state.contact_area_fine)
+            (state.nodal_area, state.contact_area)
             for _, state in (sphere("P2", "active-set", count) for count in (1.5, 3.0))
         ]
     ) / (np.pi * float(CONTACT.semi_major) ** 2)
@@ -114,8 +114,8 @@ def test_bias_of_the_areas_at_quadrature_points():
     exact = np.pi * float(CONTACT.semi_major) ** 2
     _, state = sphere("P2", "augmented-lagrangian", 3.0)
     # measured +19 % by nodes, +4 % within facets
-    assert 0.08 < state.contact_area / exact - 1.0 < 0.3
-    assert abs(state.contact_area_fine / exact - 1.0) < 0.08
+    assert 0.08 < state.nodal_area / exact - 1.0 < 0.3
+    assert abs(state.contact_area / exact - 1.0) < 0.08
 
 
 def towards_a_punch(exponent, approach):

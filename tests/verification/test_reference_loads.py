@@ -78,8 +78,8 @@ def test_a_flat_top_between_rollers_is_compressed_evenly(shape, method):
     rel = 1e-8 if method == "active-set" or shape is CUBES else 2e-5
     assert state.force == pytest.approx(force, rel=rel)
     assert state.reaction == pytest.approx(force, rel=rel)
+    assert state.nodal_area == pytest.approx(1.0, rel=1e-12)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
-    assert state.contact_area_fine == pytest.approx(1.0, rel=1e-12)
     assert state.contacts == 1
     if shape is CUBES:  # whose nodes on borders share their area as the patches do
         assert state.patch_force == pytest.approx(np.full(8, force / 8.0), rel=rel)

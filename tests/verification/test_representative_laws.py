@@ -172,5 +172,5 @@ def test_a_column_in_series_with_the_law(mode):
 
         closure = brentq(lacking, 0.0, min(approach, law.range[1]), xtol=1e-18)
         assert law.pressure(closure) / column > 0.02 * approach  # both give way
-        np.testing.assert_allclose(state.closure, closure, rtol=1e-10)
-        np.testing.assert_allclose(state.pressure, law.pressure(closure), rtol=1e-10)
+        np.testing.assert_allclose(state.patch_closure, closure, rtol=1e-10)
+        np.testing.assert_allclose(state.patch_pressure, law.pressure(closure), rtol=1e-10)

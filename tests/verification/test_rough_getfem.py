@@ -85,6 +85,6 @@ def test_getfem_finds_the_same_contact(kind):
     # the same discrete problem; 1e-9 is the tolerance of our linear solver. Measured 3e-11
     assert ours.force == pytest.approx(forces.sum(), rel=1e-9)
     assert ours.nodes == np.count_nonzero(forces > 1e-9)
-    assert np.sort(ours.nodal_force)[::-1][: ours.nodes] == pytest.approx(
+    assert np.sort(ours.nodal.force)[::-1][: ours.nodes] == pytest.approx(
         np.sort(forces)[::-1][: ours.nodes], rel=1e-6
     )

@@ -103,7 +103,7 @@ def forces_on_strips(mu, alpha, heights, cells, beyond):
     force = exact.load * ALONG**2 * PRESSURE
     state = pressed.solve(Control(force=force))
     assert state.force == pytest.approx(force, rel=1e-9)
-    found = state.pressure / PRESSURE * (2.0 * half) ** 2 / cells
+    found = state.patch_pressure / PRESSURE * (2.0 * half) ** 2 / cells
     return found, exact.strips(np.linspace(-half, half, cells + 1), half)
 
 

@@ -69,8 +69,10 @@ def test_the_papers_cube_as_user_code_is_the_block(element, mode):
         assert 0 < user.solve() < 8
         state = problem.solve(control)
         assert rough.force == pytest.approx(state.force, rel=1e-10)
-        np.testing.assert_allclose(rough.patch_pressure, state.pressure, rtol=1e-8, atol=1e-10)
-        np.testing.assert_allclose(rough.patch_closure, state.closure, rtol=1e-8)
+        np.testing.assert_allclose(
+            rough.patch_pressure, state.patch_pressure, rtol=1e-8, atol=1e-10
+        )
+        np.testing.assert_allclose(rough.patch_closure, state.patch_closure, rtol=1e-8)
         assert rough.plane.approach == pytest.approx(state.approach, rel=1e-9)
         np.testing.assert_allclose(rough.plane.tilt, state.tilt, rtol=1e-7, atol=1e-12)
         np.testing.assert_allclose(rough.moment, state.moment, atol=1e-9)

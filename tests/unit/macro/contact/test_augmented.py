@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 from geometry import BlockShape, Control, Spectrum, Surface, synthesise
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
-from macro.contact.augmented_lagrangian import PENETRATION
+from macro.contact.augmented_lagrangian import INTERFERENCE
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 X = (np.arange(65) + 0.5) / 65 - 0.5
@@ -53,11 +53,11 @@ LIMIT = {"Q1": 1e-5, "P1": 1e-7, "Q2": 2e-3, "P2": 1e-2}
 
 
 @pytest.mark.parametrize("element", ["Q1", "P2"])
-def test_no_point_penetrates_and_none_is_pulled(element):
+def test_no_point_interferes_and_none_is_pulled(element):
     found = problem(replace(SHAPE, cells=(5, 5, 2), element=element), "augmented-lagrangian")
     state = found.solve(Control(force=30.0, tilt=None))
     depth, pressure = at_points(found, state)
-    assert depth.max() <= PENETRATION[int(element[1])] * np.abs(state.displacement).max()
+    assert depth.max() <= INTERFERENCE[int(element[1])] * np.abs(state.displacement).max()
     assert pressure.min() == 0.0 < pressure.max()
     assert state.force == pytest.approx(30.0, rel=1e-9)
     assert state.reaction == pytest.approx(30.0, rel=1e-9)
@@ -71,7 +71,7 @@ def test_no_point_presses_across_a_gap(element):
     state = found.solve(Control(approach=0.012))
     depth, pressure = at_points(found, state)
     widest = -depth[pressure > 0.0].min()
-    assert widest <= PENETRATION[1] * np.abs(state.displacement).max()
+    assert widest <= INTERFERENCE[1] * np.abs(state.displacement).max()
 
 
 @pytest.mark.parametrize("element", ["Q1", "P1"])
@@ -87,7 +87,7 @@ def test_without_force_nothing_touches(element):
 def test_flat_top_on_rollers_is_a_column(element):
     shape = replace(SHAPE, cells=(4, 4, 2), element=element)
     state = problem(shape, "augmented-lagrangian", FLAT, "roller").solve(Control(approach=1e-3))
-    # uniform strain on every mesh; the last penetration is 1e-8 of the approach
+    # uniform strain on every mesh; the last interference is 1e-8 of the approach
     assert state.force == pytest.approx(MATERIAL.confined_modulus * 1e-3 / 0.5, rel=1e-7)
     assert state.contact_area == pytest.approx(1.0, rel=1e-12)
     assert state.contacts == 1
@@ -98,4 +98,4 @@ def test_history_does_not_matter():
     for approach in (0.01, 0.02, 0.04, 0.015):
         state = found.solve(Control(approach=approach))
     direct = problem(SHAPE, "augmented-lagrangian").solve(Control(force=state.force))
-    assert direct.approach == pytest.approx(0.015, rel=1e-6)  # penetration of 1e-8 on both sides
+    assert direct.approach == pytest.approx(0.015, rel=1e-6)  # interference of 1e-8 on both sides

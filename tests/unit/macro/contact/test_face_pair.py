@@ -9,7 +9,6 @@ from helpers.body_meshes import HIGH, box, hanging, standing
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, Material, MeshedBody, Support, Traction
-from macro.body_pair import BodyPair
 from macro.contact.face_pair import FacePair
 from support.errors import InputError
 
@@ -47,7 +46,7 @@ class Spring:
 
 
 def pair(first, second):
-    return FacePair(first, second, BodyPair(first.body, second.body))
+    return FacePair(first, second)
 
 
 def laws_of(patches):
@@ -64,8 +63,8 @@ def test_two_equal_bodies_are_one_of_half_the_modulus(order, mode):
     single = LawContactProblem(standing(below, SOFT, PATCHES, order), laws_of(PATCHES), mode)
     expected = single.solve(control)
     assert found.force == pytest.approx(expected.force, rel=1e-9)
-    np.testing.assert_allclose(found.pressure, expected.pressure, rtol=1e-8)
-    np.testing.assert_allclose(found.closure, expected.closure, rtol=1e-8)
+    np.testing.assert_allclose(found.patch_pressure, expected.patch_pressure, rtol=1e-8)
+    np.testing.assert_allclose(found.patch_closure, expected.patch_closure, rtol=1e-8)
     assert found.reaction == pytest.approx(found.force, rel=1e-8)
 
 

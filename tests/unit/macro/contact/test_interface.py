@@ -259,7 +259,7 @@ def test_area_and_range_of_laws(body):
     space = body.space
     laws = Tabulated(3e3)
     rough = Interface(space, body.tags, TOP, laws=laws, indenter=RigidPlane(approach=4e-3))
-    assert rough.evaluate(fem.Function(space)).area == pytest.approx(0.4)
+    assert rough.evaluate(fem.Function(space)).contact_area == pytest.approx(0.4)
     rough.check_range()
     u = fem.Function(space)
     problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
@@ -269,7 +269,7 @@ def test_area_and_range_of_laws(body):
         problem.solve()
     assert rough.closure.max() > 5e-3
     plain = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
-    assert plain.evaluate(u).area is None
+    assert plain.evaluate(u).contact_area is None
 
 
 def test_failure_is_named_and_keeps_the_displacement(body):

@@ -13,7 +13,7 @@ from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, LawContactProblem, LoadedFace, Material, block_mesh, compat, write_fields
-from macro.contact.newton import DisplacementBasis
+from macro.contact.initial_guess import DisplacementBasis
 from support.errors import InputError, NotConverged
 
 
@@ -55,9 +55,9 @@ def test_every_patch_needs_a_law(interface):
 
 def test_open_interface_is_solved_at_once(interface):
     state = LawContactProblem(interface, [Spring(touch=1.0)] * 4).solve(Control(approach=5e-3))
-    assert (state.newton_iterations, state.force, state.reaction) == (0, 0.0, 0.0)
+    assert (state.iterations, state.force, state.reaction) == (0, 0.0, 0.0)
     assert np.abs(state.displacement).max() == 0.0
-    np.testing.assert_allclose(state.closure, 5e-3, rtol=1e-14)
+    np.testing.assert_allclose(state.patch_closure, 5e-3, rtol=1e-14)
     assert state.reason == "CONVERGED_FNORM_RELATIVE"
 
 
@@ -66,14 +66,16 @@ def test_linear_laws_take_one_newton_step(interface, mode):
     pressed = LawContactProblem(interface, [Spring()] * 4, mode)
     pressed.newton.snes.ksp.setTolerances(rtol=1e-12)
     pressed.newton.forcing = False
-    assert pressed.solve(Control(approach=5e-3)).newton_iterations == 1
+    assert pressed.solve(Control(approach=5e-3)).iterations == 1
 
 
 def test_tilt_is_about_the_middle(interface):
     press = LawContactProblem(interface, [Spring()] * 4).solve
     level, tilted = press(Control(approach=5e-3)), press(Control(approach=5e-3, tilt=(2e-3, 0.0)))
     assert tilted.force == pytest.approx(level.force, rel=1e-7)  # exact for linear laws
-    np.testing.assert_array_equal(tilted.pressure > level.pressure, [False, False, True, True])
+    np.testing.assert_array_equal(
+        tilted.patch_pressure > level.patch_pressure, [False, False, True, True]
+    )
 
 
 def test_failure_is_named_and_keeps_what_was_known(interface):
@@ -155,13 +157,13 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     )
     interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
     state = LawContactProblem(interface, [Spring(), Spring(k=5e3)]).solve(Control(approach=1e-3))
-    step = (0, state.displacement, state.pressure)
+    step = (0, state.displacement, state.patch_pressure)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()
         displacement = file["Function/displacement/0"][...]
-    assert set(found.round(12)) == {0.0, *state.pressure.round(12)}
+    assert set(found.round(12)) == {0.0, *state.patch_pressure.round(12)}
     assert displacement.shape[1] == 3
     # vertices carry the same displacements in both degrees
     assert displacement[:, 2].min() == pytest.approx(

@@ -7,7 +7,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from macro import Material
-from macro.linear_solvers.multigrid_degrees import vertex_transfer
+from macro.linear_solvers.selection import vertex_transfer
 
 LINING, SOFT, RUBBERY, RUBBER = (
     Material(young_modulus=modulus, poisson_ratio=ratio)

@@ -7,7 +7,8 @@ from petsc4py import PETSc
 
 from geometry import BlockShape
 from macro import Block, Material, block_mesh
-from macro.linear_solvers.options import DIRECT_DEFAULTS, default_options, set_up, solve_linear
+from macro.linear_solvers.options import DIRECT_DEFAULTS, default_options
+from macro.linear_solvers.solvers import set_up, solve_linear
 from support.errors import NotConverged
 
 SHAPE = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(5, 5, 4), element="Q2")

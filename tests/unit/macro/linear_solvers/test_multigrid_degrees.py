@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from geometry import RefinedShape, Surface
 from macro import Block, Material, block_mesh, rough_block_mesh
-from macro.linear_solvers.multigrid_degrees import vertex_transfer
+from macro.linear_solvers.selection import vertex_transfer
 
 CUBE = {"interface": (1.0, 1.0), "height": 1.0}
 CENTRE = np.array([[0.5, 0.5]])

@@ -3,7 +3,8 @@
 import pytest
 from petsc4py import PETSc
 
-from macro.linear_solvers.options import default_options, linear_solver, reason_name
+from macro.linear_solvers.options import default_options, reason_name
+from macro.linear_solvers.solvers import linear_solver
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from geometry.patches import PatchGrid
 from macro import Material
-from macro.linear_solvers.stiffened import Stiffened
+from macro.linear_solvers.node_matrices import Stiffened
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))

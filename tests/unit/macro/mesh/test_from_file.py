@@ -10,9 +10,8 @@ from mpi4py import MPI
 
 from macro import compat
 from macro.mesh.from_file import read_mesh
-from macro.mesh.planar_face import planar_face
-from macro.mesh.tagged import TaggedMesh
-from macro.mesh.to_file import write_mesh
+from macro.mesh.tagged import TaggedMesh, planar_face
+from macro.mesh.xdmf import write_mesh
 from support.errors import InputError
 
 COMM = MPI.COMM_SELF

@@ -6,8 +6,7 @@ from dolfinx import mesh as dmesh
 from helpers.mesh_files import SIDES, tagged_box
 from mpi4py import MPI
 
-from macro.mesh.planar_face import planar_face
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.tagged import TaggedMesh, planar_face
 from support.errors import InputError
 
 COMM = MPI.COMM_SELF

@@ -7,9 +7,8 @@ from mpi4py import MPI
 from geometry import InputError, RefinedShape, Spectrum, Surface, synthesise
 from geometry.face_frame import FaceFrame
 from geometry.meshes.stepped import SteppedShape
-from macro import contact_facets
+from macro import contact_facets, rough_stepped_mesh, stepped_mesh
 from macro.mesh.rough_surface import move_onto
-from macro.mesh.stepped import rough_stepped_mesh, stepped_mesh
 
 COMM = MPI.COMM_SELF
 SHAPE = SteppedShape(

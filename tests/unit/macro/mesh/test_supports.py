@@ -71,7 +71,7 @@ def test_stiffness_agrees():
 
     box = tagged_box(COMM, cells=(2, 2, 1))
     space = compat.vector_space(box.mesh, 1)
-    form = stiffness_form(space, Material(young_modulus=1.0, poisson_ratio=0.3), 0)
+    form = stiffness_form(space, Material(young_modulus=1.0, poisson_ratio=0.3).lame, 0)
     whole = compat.assemble_matrix(compat.compile_form(form), [])
     whole = csr_array(whole.getValuesCSR()[::-1]).toarray()
     x = space.tabulate_dof_coordinates()

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from geometry.face_frame import FaceFrame
+from geometry.patches import PatchGrid
 from macro import compat
+from macro.contact.contact_forces import ContactLaw
+from macro.contact.loaded_face import Mode
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.facet_nodes import facet_indices
-from macro.mesh.planar_face import planar_face
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.facets import facet_indices
+from macro.mesh.tagged import TaggedMesh, bounding_box, planar_face
 from support.collective import together
 from support.errors import InputError
 
@@ -107,21 +109,18 @@ def chosen_face(
         given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
     facets = _on_all_ranks(mesh, given)
     marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
-    found = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
+    plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
-        placed = contact_facets(mesh, facets, found.frame)
-        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=found.lengths)
-    if np.abs(frame.normal - found.frame.normal).max() > _PARALLEL:
+        placed = contact_facets(mesh, facets, plane.frame)
+        return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
+    if np.abs(frame.normal - plane.frame.normal).max() > _PARALLEL:
         raise InputError(
             "the frame's normal is not that of the face",
             value=frame.normal.tolist(),
-            allowed=f"{found.frame.normal.tolist()}, out of the body",
+            allowed=f"{plane.frame.normal.tolist()}, out of the body",
         )
     placed = contact_facets(mesh, facets, frame)
-    corners = placed.corners.reshape(-1, 2)
-    ends = mesh.comm.allgather((corners.min(axis=0), corners.max(axis=0)) if len(corners) else None)
-    lower, upper = (np.array([end[k] for end in ends if end is not None]) for k in (0, 1))
-    corner, other = lower.min(axis=0), upper.max(axis=0)
+    corner, other = bounding_box(placed.corners.reshape(-1, 2), mesh.comm)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
     return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
 
@@ -149,3 +148,94 @@ def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
     chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
     local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
+
+
+_ROUNDING = 1e-12
+"""Shift of patches, relative to the face, that is rounding."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class InterfaceLaws:
+    """Laws of patches on a face.
+
+    Args:
+        laws: One law per patch.
+        patches: The patches.
+        mode: Where the laws are evaluated.
+        shift: Where the patches' coordinates begin in those of the face, shape (2,) [mm].
+    """
+
+    laws: tuple[ContactLaw, ...]
+    patches: PatchGrid
+    mode: Mode
+    shift: Array
+
+
+def laws_on_face(
+    laws: Any,
+    patches: PatchGrid | None,
+    mode: Mode | None,
+    lower: Array,
+    lengths: tuple[float, float],
+) -> InterfaceLaws:
+    """Return laws per patch from whatever a user gives.
+
+    Args:
+        laws: A table with ``patches`` and ``laws``, a law, or a law per patch.
+        patches: Patches on the face; None: those of the table in the middle of the face, or one
+            patch on its bounding rectangle.
+        mode: Where laws are evaluated; None: the default of such laws.
+        lower: Lower corner of the face's bounding rectangle, shape (2,) [mm].
+        lengths: Sides of that rectangle [mm].
+
+    Raises:
+        InputError: When these are no laws, or not as many as patches, or there is no such mode.
+    """
+    if mode is not None and mode not in get_args(Mode):
+        raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
+    if not isinstance(patches, PatchGrid | None):
+        raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
+    shift = np.zeros(2)
+    if _is_law(laws):
+        corner = (float(lower[0]), float(lower[1]))
+        patches = patches or PatchGrid(grid=(1, 1), lengths=lengths, origin=corner)
+        return InterfaceLaws(
+            laws=(laws,) * patches.count, patches=patches, mode=mode or "pointwise", shift=shift
+        )
+    if hasattr(laws, "patches") and hasattr(laws, "laws"):
+        if not isinstance(laws.patches, PatchGrid):
+            return laws_on_face(_only_region(laws), patches, mode, lower, lengths)
+        if patches is None:
+            patches = laws.patches
+            shift = lower + 0.5 * np.asarray(lengths) - patches.middle
+            shift[np.abs(shift) < _ROUNDING * max(lengths)] = 0.0
+        laws = laws.laws
+    if not isinstance(laws, Sequence) or not laws or not all(map(_is_law, laws)):
+        raise InputError(
+            "the interface has no laws",
+            value=laws,
+            allowed="a law table, a law with pressure() and stiffness(), or a list of such laws",
+        )
+    if patches is None:
+        raise InputError("laws of patches need the patches", key="patches", allowed="a PatchGrid")
+    if len(laws) != patches.count:
+        raise InputError("every patch needs a law", value=len(laws), allowed=f"{patches.count}")
+    return InterfaceLaws(laws=tuple(laws), patches=patches, mode=mode or "patchwise", shift=shift)
+
+
+def _only_region(table: Any) -> Any:
+    """Return the law of a table of regions, which must be one: others need faces of their own."""
+    if len(table.laws) != 1:
+        raise InputError(
+            "a table of several regions holds on no single face",
+            value=len(table.laws),
+            allowed="an Interface for the facets of each region, with that region's law of the "
+            "table, such as laws=table['ring']",
+        )
+    return table.laws[0]
+
+
+def _is_law(candidate: Any) -> bool:
+    return callable(getattr(candidate, "pressure", None)) and callable(
+        getattr(candidate, "stiffness", None)
+    )

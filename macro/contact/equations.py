@@ -1,0 +1,220 @@
+"""Equations that Newton's method solves: equilibrium of a body with laws, or of a user's problem.
+
+Theory: section 11 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import ufl
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from macro import compat
+from macro.contact.contact_forces import ContactForces, ContactTangent
+from macro.contact.interface import Interface
+from macro.elasticity import rigid_body_modes
+from macro.linear_solvers.node_matrices import free_unknowns
+from support.errors import InputError
+
+Array = NDArray[np.float64]
+
+_INNER = 1e-3
+"""Share of the inner forces J u that residuals are compared with where contact forces are less: of
+the largest so far, because a body without any load has none at its solution."""
+
+
+class Equilibrium:
+    """The equations K u = B p(c(u)) of a body in contact with a rigid plane.
+
+    The plane is eliminated by its own nonlinear equilibrium, so that displacements are the only
+    unknowns of Newton's method. The residual K u − B p is the gradient of a convex energy if no law
+    softens. Its derivative K + B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being assembled; it lies
+    between K and the derivative under a fixed plane.
+
+    Args:
+        body: The `ElasticBody`, or a `BodyPair`.
+        forces: Forces of the laws on its contact face.
+
+    Attributes:
+        body: The elastic body.
+        forces: Forces of the laws on its contact face.
+        matrix: K.
+        tangent: The derivative at the displacement last given to ``update_tangent``, a PETSc
+            matrix without entries.
+        scale: Norm of the contact face's load at the displacement last given to ``residual`` [N].
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(self, body: Any, forces: ContactForces) -> None:
+        self.body, self.forces, self.matrix = body, forces, body.stiffness
+        self.scale = 0.0
+        self._load = self.matrix.createVecLeft()
+        self.tangent = ContactTangent([forces]).shell(self.matrix)
+
+    def residual(self, displacement: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write the residual K u − B p(closure(u)) at a displacement u.
+
+        Args:
+            displacement: u [mm].
+            residual: Receives the residual [N].
+        """
+        self.forces.write(displacement, self._load)
+        self.scale = self._load.norm()
+        self.matrix.mult(displacement, residual)
+        residual.axpy(-1.0, self._load)
+
+    def update_tangent(self, displacement: PETSc.Vec) -> None:
+        """Move the tangent to a displacement."""
+        self.forces.update(displacement)
+
+
+class UserEquations:
+    """F(u; v) less the work of contact, assembled.
+
+    Args:
+        residual: F(u; v) as UFL.
+        displacement: u, a Function.
+        bcs: Dirichlet conditions, also set to the interfaces.
+        tangent: Derivative of F as UFL; None: `ufl.derivative`.
+        interfaces: The interfaces.
+        in_matrix: Whether tangents of pointwise interfaces are assembled too.
+
+    Attributes:
+        displacement: u.
+        matrix: The derivative of F, with unit rows for constrained unknowns, rigid body modes
+            attached, and the assembled tangents.
+        tangent: The whole derivative, a PETSc matrix without entries.
+
+    Raises:
+        InputError: When F does not depend on u.
+
+    Note:
+        Collective.
+    """
+
+    def __init__(
+        self,
+        residual: Any,
+        displacement: Any,
+        bcs: Sequence[Any],
+        tangent: Any,
+        interfaces: Sequence[Interface],
+        *,
+        in_matrix: bool,
+    ) -> None:
+        if displacement not in residual.coefficients():
+            raise InputError("the residual does not depend on the displacement")
+        self.displacement, self._bcs = displacement, list(bcs)
+        tangent = ufl.derivative(residual, displacement) if tangent is None else tangent
+        tangent = ufl.algorithms.expand_derivatives(tangent)  # linear ones lose the displacement
+        self._ingredients = [*tangent.coefficients(), *tangent.constants()]
+        self._form, self._slope = compat.compile_form(residual), compat.compile_form(tangent)
+        self._residual = compat.assemble_vector(self._form)
+        self.matrix = compat.assemble_matrix(self._slope, self._bcs)
+        self._known = self._values()
+        space = displacement.function_space
+        nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
+        self.matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
+        self._interfaces, self._assembling = interfaces, in_matrix
+        for interface in interfaces:
+            interface.constrain(self._bcs)
+        self._assembled = list[Interface]()
+        self._applied = ContactTangent(interfaces)
+        self.tangent = self._applied.shell(self.matrix)
+        self._contact = self.matrix.createVecRight()
+        self._inner, self._largest = self._contact.duplicate(), 0.0
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of the mesh."""
+        return self.displacement.function_space.mesh.comm
+
+    @property
+    def vector(self) -> PETSc.Vec:
+        """The displacements as a vector of PETSc, ghosts included."""
+        return compat.petsc_vector(self.displacement)
+
+    def begin(self) -> None:
+        """Decide which tangents are assembled: those that can be, under their indenters now."""
+        self._largest = 0.0
+        self._assembled = [each for each in self._interfaces if self._assembling and each.assembles]
+        self._applied.follow([each for each in self._interfaces if each not in self._assembled])
+
+    def take(self, x: PETSc.Vec) -> None:
+        """Put a vector of PETSc into the displacement."""
+        self.displacement.x.array[: x.local_size] = x.array_r[: x.local_size]
+        self.displacement.x.scatter_forward()
+
+    def residual(self, x: PETSc.Vec, residual: PETSc.Vec) -> None:
+        """Write F less contact at x, with the step to prescribed values that x misses.
+
+        Args:
+            x: u, which the displacement becomes [mm].
+            residual: Receives the residual [N]; in constrained rows what u misses [mm].
+        """
+        self.take(x)
+        self._write_contact()
+        compat.assemble_vector_into(self._residual, self._form)
+        compat.lift(self._residual, self._slope, self._bcs, self.vector)
+        self._sum_ranks()
+        self._residual.axpy(-1.0, self._contact)
+        compat.write_misfit(self._residual, self._bcs, self.vector)
+        residual.array[:] = self._residual.array_r
+
+    @property
+    def scale(self) -> float:
+        """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
+        self.matrix.mult(self.vector, self._inner)
+        self._largest = max(self._largest, _INNER * self._inner.norm())
+        return max(self._contact.norm(), self._largest)
+
+    def update_tangent(self, _x: PETSc.Vec) -> None:
+        """Move the tangent to the displacement.
+
+        The derivative of F is assembled anew where a function or constant in it has changed, or
+        where tangents of contact were added to it.
+        """
+        values = self._values()
+        same = all(map(np.array_equal, values, self._known))
+        if self._assembling or not self.comm.allreduce(same, min):
+            compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
+            self._known = values
+        for interface in self._interfaces:
+            if interface in self._assembled:
+                interface.add_tangent(self.displacement, self.matrix)
+            else:
+                interface.move_tangent(self.displacement)
+
+    def reaction(self) -> Array:
+        """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""
+        self._write_contact()
+        compat.assemble_vector_into(self._residual, self._form)
+        self._sum_ranks()
+        forces = self._residual.array_r - self._contact.array_r
+        held = free_unknowns(self._bcs, self._contact.duplicate()).array_r == 0.0
+        return np.asarray(
+            self.comm.allreduce(np.where(held, forces, 0.0).reshape(-1, 3).sum(axis=0))
+        )
+
+    def _write_contact(self) -> None:
+        """Write the contact forces of all interfaces, those on constrained unknowns included."""
+        self._contact.set(0.0)
+        for interface in self._interfaces:
+            interface.add_forces(self.displacement, self._contact)
+
+    def _sum_ranks(self) -> None:
+        """Add the contributions of all ranks to the residual."""
+        self._residual.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+
+    def _values(self) -> list[Array]:
+        """Return all that the matrix depends on."""
+        return [
+            np.array(each.x.array if hasattr(each, "x") else each.value)
+            for each in self._ingredients
+        ]

@@ -1,0 +1,277 @@
+"""Cells and corners of facets, and cells that share them, on one rank and across ranks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from macro import compat
+from support.errors import InputError
+
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FacetNodes:
+    """Facets with a cell of each: the only one of outer facets.
+
+    Attributes:
+        cell: Rank-local cells, shape (n,).
+        side: Indices of the facets in them, shape (n,).
+        corners: Rows of ``mesh.geometry.x``, shape (n, 3 or 4); those of a quadrilateral as a
+            tensor product, 0 and 3 being opposite.
+    """
+
+    cell: NDArray[np.int32]
+    side: NDArray[np.intp]
+    corners: NDArray[np.int32]
+
+
+def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
+    """Return facets that a user gives, as indices.
+
+    Args:
+        mesh: dolfinx mesh with facets.
+        facets: Numbers of this rank's facets, or a mask of all of them, shape (n,).
+
+    Raises:
+        InputError: When there are no such facets.
+    """
+    numbers = mesh.topology.index_map(2)
+    count = numbers.size_local + numbers.num_ghosts
+    allowed = f"this rank's facets, 0 … {count - 1}, or a mask of all {count}"
+    given = np.atleast_1d(np.asarray(facets))
+    if given.dtype == np.bool_:
+        if given.shape != (count,):
+            raise InputError("the mask does not fit the facets", value=given.shape, allowed=allowed)
+        return np.flatnonzero(given).astype(np.int32)
+    if given.size and given.dtype.kind not in "iu":
+        raise InputError("facets are no numbers", value=facets, allowed=allowed)
+    absent = given[(given < 0) | (given >= count)]
+    if absent.size:
+        raise InputError("the facets are not in the mesh", value=int(absent[0]), allowed=allowed)
+    return given.astype(np.int32)
+
+
+def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
+    """Return cells and corners of facets.
+
+    Args:
+        mesh: dolfinx mesh of straight cells.
+        facets: Rank-local facets, shape (n,); there may be none.
+    """
+    topology = mesh.topology
+    topology.create_connectivity(2, 3)
+    topology.create_connectivity(3, 2)
+    cells_of, facets_of = topology.connectivity(2, 3), topology.connectivity(3, 2)
+    _, shapes = compat.reference_facets(topology.cell_name())
+    cell = cells_of.array[cells_of.offsets[facets]]
+    sides = facets_of.array.reshape(-1, len(shapes))[cell]
+    side = np.argmax(sides == np.asarray(facets)[:, None], axis=1)
+    corners = np.take_along_axis(compat.cell_vertices(mesh)[cell], shapes[side], axis=1)
+    return FacetNodes(cell=cell, side=side, corners=corners)
+
+
+def parts(mesh: Any) -> list[int]:
+    """Return the numbers of cells of the parts of a mesh that share no facets, largest first.
+
+    Args:
+        mesh: dolfinx mesh.
+
+    Note:
+        Collective. Every rank labels its own cells; the labels are joined over common facets.
+    """
+    cells = mesh.topology.index_map(3).size_local
+    first, second = inner_facets(mesh)[0].T
+    graph = coo_array((np.ones(len(first), np.int8), (first, second)), shape=(cells, cells))
+    count, label = connected_components(graph, directed=False) if cells else (0, np.empty(0, int))
+    facets, cell, _ = facets_between_ranks(mesh)
+    counts = mesh.comm.allgather(count)
+    label = label + sum(counts[: mesh.comm.rank])
+    ends = mesh.comm.allgather((facets, label[cell]))
+    facet, of = (np.concatenate([end[k] for end in ends]) for k in (0, 1))
+    _, row = np.unique(facet, return_inverse=True)
+    size = sum(counts) + (row.max() + 1 if len(row) else 0)
+    joined = coo_array((np.ones(len(of)), (of, sum(counts) + row)), shape=(size, size))
+    _, part = connected_components(joined, directed=False)
+    sizes = np.zeros(size, np.int64)
+    np.add.at(sizes, part[label], 1)
+    total = mesh.comm.allreduce(sizes)
+    return sorted((int(size) for size in total[total > 0]), reverse=True)
+
+
+def inner_facets(mesh: Any) -> tuple[Ints, Ints]:
+    """Return the facets between two cells that this rank owns.
+
+    Args:
+        mesh: dolfinx mesh.
+
+    Returns:
+        The two cells of every facet and its indices in them, shapes (n, 2).
+    """
+    facet, cell, side = _sides(mesh)
+    inner = np.flatnonzero(facet[1:] == facet[:-1])
+    pairs = np.column_stack([inner, inner + 1])
+    return cell[pairs], side[pairs]
+
+
+def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
+    """Return the facets between a cell of this rank and one of another rank.
+
+    Args:
+        mesh: dolfinx mesh.
+
+    Returns:
+        The facets' global numbers, this rank's cells, and the indices in them, shapes (n,).
+
+    Note:
+        Collective.
+    """
+    facet, cell, side, common = _single(mesh)
+    return facet[common], cell[common], side[common]
+
+
+def outer_sides(mesh: Any) -> tuple[Ints, Ints]:
+    """Return the outer facets of the cells that this rank owns.
+
+    Args:
+        mesh: dolfinx mesh.
+
+    Returns:
+        The cell of every facet and its index there, shapes (n,).
+
+    Note:
+        Collective.
+    """
+    _, cell, side, common = _single(mesh)
+    return cell[~common], side[~common]
+
+
+def _single(mesh: Any) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
+    """Return the facets of one owned cell: numbers, cells, places, and if another rank has them."""
+    facet, cell, side = _sides(mesh)
+    single = np.ones(len(facet), dtype=bool)
+    single[1:] &= facet[1:] != facet[:-1]
+    single[:-1] &= facet[:-1] != facet[1:]
+    facet, cell, side = facet[single], cell[single], side[single]
+    numbers = mesh.topology.index_map(2)
+    known = np.asarray(numbers.local_to_global(facet.astype(np.int32)), dtype=np.int64)
+    foreign = known[facet >= numbers.size_local]
+    common = np.isin(known, np.concatenate(mesh.comm.allgather(foreign)))
+    return known, cell, side, common
+
+
+def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
+    """Return the facets of all owned cells by ascending facet, the cells, and the places there."""
+    topology = mesh.topology
+    topology.create_connectivity(3, 2)
+    cells = topology.index_map(3).size_local
+    table = topology.connectivity(3, 2)
+    facet = table.array[: table.offsets[cells]]
+    sides = len(compat.reference_facets(topology.cell_name())[1])
+    order = np.argsort(facet, kind="stable")
+    return facet[order].astype(np.int64), order // sides, order % sides
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OuterFacets:
+    """Outer facets of the cells that this rank owns, and q quadrature points on each.
+
+    Args:
+        cell: Rank-local cell of every facet, shape (f,).
+        side: Index of the facet in its cell, shape (f,).
+        points: Places, shape (f, q, 3) [mm].
+        normals: Outward unit normals, shape (f, q, 3).
+        weights: Weights, whose sum over all ranks is the area of the body, shape (f, q) [mm²].
+        nodes: Rank-local nodes of the cells, shape (f, m).
+        values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
+    """
+
+    cell: NDArray[np.int64]
+    side: NDArray[np.int64]
+    points: Array
+    normals: Array
+    weights: Array
+    nodes: NDArray[np.int32]
+    values: Array
+
+    @property
+    def on_facet(self) -> NDArray[np.bool_]:
+        """Which of the nodes lie on the facet, shape (f, m)."""
+        return self.values.any(axis=1)[self.side]
+
+    def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
+        """Return some of the facets, shape of the choice (f,)."""
+        return OuterFacets(
+            cell=self.cell[chosen],
+            side=self.side[chosen],
+            points=self.points[chosen],
+            normals=self.normals[chosen],
+            weights=self.weights[chosen],
+            nodes=self.nodes[chosen],
+            values=self.values,
+        )
+
+
+def outer_facets(space: Any, exact: int) -> OuterFacets:
+    """Place quadrature points on the outer facets of this rank's cells; there may be none.
+
+    Args:
+        space: Lagrange space of the displacements.
+        exact: Polynomial degree on the reference facet that is integrated exactly.
+
+    Note:
+        Collective.
+    """
+    mesh = space.mesh
+    name, degree = mesh.topology.cell_name(), compat.lagrange_degree(space)
+    vertices, corners = compat.reference_facets(name)
+    cell, side = outer_sides(mesh)
+    shape_nodes = compat.cell_vertices(mesh)[cell]
+    shape = compat.geometry_degree(mesh)
+    rule, weights = _facet_rule(corners.shape[1], exact)
+    first = vertices[corners[:, 0]]
+    tangents = vertices[corners[:, 1:3]] - first[:, None]  # (sides, 2, 3)
+    reference = first[:, None] + rule @ tangents
+    flat = reference.reshape(-1, 3)
+    by_side = (len(corners), len(rule))
+    values, basis = (
+        compat.lagrange_values(name, of, flat).reshape(*by_side, -1) for of in (shape, degree)
+    )
+    slopes = compat.lagrange_gradients(name, shape, flat).reshape(*by_side, -1, 3)
+    outwards = np.cross(*tangents.transpose(1, 0, 2))
+    outwards = np.sign(np.einsum("si,si->s", outwards, first - vertices.mean(axis=0)))
+    places = mesh.geometry.x[shape_nodes]
+    maps = np.einsum("fqak,faj->fqkj", slopes[side], places)  # ∂x_j/∂X_k
+    along = np.einsum("ftk,fqkj->fqtj", tangents[side], maps)
+    areas = np.cross(along[:, :, 0], along[:, :, 1]) * np.sign(np.linalg.det(maps))[..., None]
+    areas *= outwards[side, None, None]
+    sizes = np.linalg.norm(areas, axis=2)
+    return OuterFacets(
+        cell=cell,
+        side=side,
+        points=np.einsum("fqa,faj->fqj", values[side], places),
+        normals=areas / sizes[..., None],
+        weights=sizes * weights,
+        nodes=compat.cell_nodes(space)[cell],
+        values=basis,
+    )
+
+
+def _facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
+    """Return points (q, 2) and weights of the unit triangle or square."""
+    if corners == 3:
+        return compat.triangle_rule(exact)
+    nodes, weights = legendre.leggauss(exact // 2 + 1)
+    nodes, weights = 0.5 * (1.0 + nodes), 0.5 * weights
+    x, y = np.meshgrid(nodes, nodes, indexing="ij")
+    return np.column_stack([x.ravel(), y.ravel()]), np.outer(weights, weights).ravel()
