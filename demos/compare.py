@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from multiscale import Scene
-from multiscale.comparison.compare import compare
 from multiscale.figures.style import COLOURS, ERROR_BAND, FULL_WIDTH, MARKERS, new_figure, use_style
+from multiscale.studies.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -110,6 +111,19 @@ def write_tables(folder: Path, history: History) -> list[Path]:
         values = zip(*columns.values(), strict=True)
         files.append(write_csv(folder / "reference.csv", list(columns), values))
     return files
+
+
+def write_records(path: Path, records: Iterator[Mapping[str, Any]]) -> Path | None:
+    """Write records as rows; the names of the first one's values are the columns.
+
+    Args:
+        path: File to write.
+        records: The records; none make no file.
+    """
+    first = next(records, None)
+    if first is None:
+        return None
+    return write_csv(path, list(first), (list(one.values()) for one in chain([first], records)))
 
 
 def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path]:

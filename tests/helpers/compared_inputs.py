@@ -6,13 +6,13 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from hypothesis import strategies as st
+from multiscale.comparison import AGAINST
+from multiscale.comparison.compare import compare
+from multiscale.comparison.configuration import Curves, RunResult
 
 from geometry.patches import PatchGrid
 from helpers.scene_inputs import scenes, takes_long
 from multiscale.cli.compare import comparison_html
-from multiscale.comparison import AGAINST
-from multiscale.comparison.compare import compare
-from multiscale.comparison.configuration import Curves, RunResult
 from multiscale.scene.scene import Scene
 from multiscale.storage import write_csv
 from support.errors import InputError, NotConverged

@@ -62,7 +62,7 @@ FLOORS = {
         "planning",
         "run",
         "output restart",
-        "comparison sweeps",
+        "studies",
         "cli",
         "__main__",
     ],

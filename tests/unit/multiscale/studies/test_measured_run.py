@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from multiscale.comparison.catalogue import configurations
 from multiscale.comparison.compare import reference_within, run_all
 from multiscale.comparison.configuration import RunResult, read_result, write_result
 from multiscale.comparison.launch import check_launchable, launch_process
 from multiscale.comparison.process import run_here
+
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 from support.errors import InputError, NotConverged

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from multiscale.comparison.configuration import Curves, RunResult
+from multiscale.comparison.process import run_here
+from multiscale.comparison.scene_content import SMALL_SLOPES
 
 from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.compare import compare_scene
 from multiscale.cli.words import wall_time
-from multiscale.comparison.configuration import Curves, RunResult
-from multiscale.comparison.process import run_here
-from multiscale.comparison.scene_content import SMALL_SLOPES
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from support.errors import InputError, NotConverged

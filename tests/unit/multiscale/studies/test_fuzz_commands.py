@@ -4,7 +4,6 @@ from helpers.command_words import called, lines
 from helpers.compared_inputs import asked, compared
 from helpers.scene_inputs import BASE, toml
 from hypothesis import HealthCheck, given, settings
-
 from multiscale.comparison.configuration import Configuration, RunResult, read_result, write_result
 
 few = settings(
