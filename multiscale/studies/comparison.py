@@ -39,8 +39,9 @@ from support.errors import InputError
 BUSY = 0.7
 """A machine is called busy when the processes worked less than this share of their wall time."""
 
-REFERENCE_SHARE = 0.6
-"""Share of a budget that a reference may be predicted to take to be run before all others."""
+REFERENCE_SHARE, REFERENCE_LIMIT = 0.6, 0.8
+"""Shares of a budget: what a reference may be predicted to take to be run before all others, and
+what it may take in fact; the rest is enough for the quick ways."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -180,7 +181,7 @@ def compare(
             why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
             return CaseResult(status="not started", failure=why)
         begin(one)
-        return solve(one, comm, left)
+        return solve(one, comm, (REFERENCE_LIMIT if one is first else 1.0) * left)
 
     def chosen() -> tuple[Scene, list[Configuration]]:
         resolved = resolved_scene(scene)

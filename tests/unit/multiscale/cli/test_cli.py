@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from multiscale.comparison.compare import AGAINST
 
 from multiscale.cli.command_line import main
+from multiscale.studies import AGAINST
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [

@@ -249,7 +249,7 @@ def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path):
     vary = {MODULUS: ["1 GPa", "2 GPa"]}
     first = sweep(base, vary, folder=tmp_path / "out")
     np.save(file.with_name("one.npy"), 2.0 * heights)
-    with pytest.raises(InputError, match="content of surface.file was '.*--overwrite"):
+    with pytest.raises(InputError, match=r"content of surface\.file was '.*--overwrite"):
         sweep(base, vary, folder=tmp_path / "out")
     np.save(file.with_name("one.npy"), heights)
     again = sweep(base, vary, folder=tmp_path / "out", observe=lambda *_: pytest.fail("run again"))
