@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from multiscale.scene.scene import Scene
 from multiscale.studies import AGAINST
 from multiscale.studies.configurations import (
     Configuration,
-    Grid,
     configurations,
     pressure_grid,
 )
@@ -53,9 +52,7 @@ class Comparison:
     Attributes:
         scene: Name of the scene.
         rows: One per configuration, those of the least predicted cost first.
-        quantity: What the load prescribes, ``"approach"`` or ``"force"``.
-        steps: Number of load steps of the load history.
-        grid: Patches that pressures are compared on, along x and y.
+        response: What the load does not prescribe: ``"force"`` under an approach, and the reverse.
         measure: Name of the measure; None when no configuration can be one.
         against: Kind of the measure, as ``--against`` names it.
         uncertainty: Uncertainty of the measure by error; NaN where unknown.
@@ -64,12 +61,10 @@ class Comparison:
 
     scene: str
     rows: tuple[Row, ...]
-    quantity: str
-    steps: int
-    grid: Grid
+    response: str
     measure: str | None = None
     against: str | None = None
-    uncertainty: Mapping[str, float]
+    uncertainty: Mapping[str, float] = field(default_factory=lambda: NO_ERRORS)
     warnings: tuple[str, ...] = ()
 
     def __len__(self) -> int:
@@ -78,11 +73,6 @@ class Comparison:
     def __getitem__(self, name: str) -> Row:
         """Return the row of a configuration."""
         return {row.name: row for row in self.rows}[name]
-
-    @property
-    def response(self) -> str:
-        """What the load does not prescribe: ``"force"`` under an approach, and the reverse."""
-        return "force" if self.quantity == "approach" else "approach"
 
     def records(self) -> list[dict[str, Any]]:
         """Return the rows of ``compare.csv``, each as a dictionary by column."""
@@ -236,24 +226,21 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
     best = {kind: ranked(rows, kind) for kind in AGAINST}
     reached = [kind for kind in AGAINST if best[kind]]
     chosen = against if against in reached else next(iter(reached), None)
-    loads, grid = scene.loading.load_history, pressure_grid(scene)
-    found = Comparison(
+    by_approach, grid = scene.loading.load_history.quantity == "approach", pressure_grid(scene)
+    alone = Comparison(
         scene=scene.name,
         rows=tuple(rows),
-        quantity=loads.quantity,
-        steps=loads.count,
-        grid=grid,
+        response="force" if by_approach else "approach",
         against=chosen,
-        uncertainty=NO_ERRORS,
         warnings=tuple(_warnings(rows, against, chosen)),
     )
     if chosen is None:
-        return found
+        return alone
     measure, tops = best[chosen][0], {AGAINST[kind]: best[kind][0] for kind in reached}
     pairs = [(coarse.curves, fine.curves) for coarse, fine in refinements(best[chosen])]
     own = uncertainty(measure.curves, pairs, grid)
-    causes = ErrorCauses(rows, tops, measure, found.response)
-    with_errors = tuple(
+    causes = ErrorCauses(rows, tops, measure, alone.response)
+    with_errors = (
         replace(
             row,
             errors=own if row is measure else error_measures(row.curves, measure.curves, grid),
@@ -262,12 +249,11 @@ def compared(scene: Scene, rows: Sequence[Row], against: str | None = None) -> C
         )
         for row in rows
     )
-    warnings = found.warnings
-    if not math.isfinite(own[f"{found.response}_max"]):
-        exact = f"{measure.name} has no error bar of its own: it is taken as exact"
-        warnings = (*warnings, exact)
+    exact = f"{measure.name} has no error bar of its own: it is taken as exact"
+    unknown = not math.isfinite(own[f"{alone.response}_max"])
+    warnings = (*alone.warnings, exact) if unknown else alone.warnings
     return replace(
-        found, rows=with_errors, measure=measure.name, uncertainty=own, warnings=warnings
+        alone, rows=tuple(with_errors), measure=measure.name, uncertainty=own, warnings=warnings
     )
 
 

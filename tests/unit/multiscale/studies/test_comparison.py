@@ -22,9 +22,9 @@ def row(name, seconds, error, status="done"):
     return Row(name=name, scene=SCENE, result=result, errors=errors)
 
 
-def comparison(rows, bar=float("nan"), quantity="approach"):
+def comparison(rows, bar=float("nan"), response="force"):
     return Comparison(
-        scene="some", rows=tuple(rows), quantity=quantity, steps=2, grid=(2, 2), measure="best",
+        scene="some", rows=tuple(rows), response=response, measure="best",
         uncertainty=NO_ERRORS | {"force_max": bar},
     )  # fmt: skip
 
@@ -69,7 +69,7 @@ def test_an_error_that_is_unknown_is_not_the_uncertainty():
 def test_response_is_what_the_load_does_not_prescribe():
     rows = [row("one", 1.0, 0.1)]
     assert comparison(rows).error(rows[0]) == 0.1
-    assert comparison(rows, quantity="force").error(rows[0]) == 0.2
+    assert comparison(rows, response="approach").error(rows[0]) == 0.2
 
 
 def test_unknown_measure_is_refused():

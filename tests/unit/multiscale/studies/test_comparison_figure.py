@@ -37,9 +37,7 @@ def comparison(rows, bar=1e-3):
     return Comparison(
         scene="made up",
         rows=(*rows, measure),
-        quantity="approach",
-        steps=8,
-        grid=(1, 1),
+        response="force",
         measure="measure",
         uncertainty=errors(bar),
     )
