@@ -13,8 +13,8 @@ costs no more than the cases that were under way.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,10 @@ class CaseResult:
     @classmethod
     def of(cls, record: Record) -> CaseResult:
         """Return the result that a record of a file holds."""
-        return cls(**record.facts, arrays=record.arrays)
+        try:
+            return cls(**record.facts, arrays=record.arrays)
+        except TypeError:
+            raise InputError("holds cases as another version of patchlaw wrote them") from None
 
     def record(self) -> Record:
         """Return the record of a file that holds the result."""
@@ -138,17 +141,17 @@ def run_cases(
     ahead = [number for number in range(which - 1, len(cases), parts) if number not in done]
     counter = TaskCounter(None if one_by_one else comm, len(ahead))
     own = journal if rank == 0 or not one_by_one else Journal(None, {})
+    store = together(comm, lambda: own.writer(part, rank))
 
     def work() -> None:
-        with own.appending(part, rank) as store:
-            for task in counter:
-                case = cases[ahead[task]]
-                result = replace(solve(case, counter.progress), case=case.key)
-                if result.status in REPEATABLE:
-                    store(result)
-                mine[ahead[task]] = result
-                if observe is not None:
-                    observe(case, result)
+        for task in counter:
+            case = cases[ahead[task]]
+            result = replace(solve(case, counter.progress), case=case.key)
+            if result.status in REPEATABLE:
+                together(comm if one_by_one else None, partial(store, result))
+            mine[ahead[task]] = result
+            if observe is not None:
+                observe(case, result)
 
     try:
         together(comm, work)
@@ -199,20 +202,15 @@ class Journal:
                 f"{error.problem}; remove it, and its cases are computed again", file=str(path)
             ) from None
 
-    @contextmanager
-    def appending(self, part: tuple[int, int], rank: int) -> Iterator[Callable[[CaseResult], None]]:
-        """Open the file of a process.
+    def writer(self, part: tuple[int, int], rank: int) -> Callable[[CaseResult], None]:
+        """Return the function that appends results to the file of a process.
 
         Args:
             part: The part of the study, the k-th of n.
             rank: Its rank among those that work on the part.
-
-        Yields:
-            The function that stores a result.
         """
         if self._folder is None:
-            yield lambda result: None
-            return
+            return lambda result: None
         path = self._folder / part_name(part) / f"rank-{rank}{_SUFFIX}"
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -223,7 +221,7 @@ class Journal:
             head = [Record(self._identity)] if mark == START else []
             mark = append(path, [*head, result.record()], mark)
 
-        yield store
+        return store
 
 
 class TaskCounter:

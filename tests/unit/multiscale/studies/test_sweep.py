@@ -15,7 +15,7 @@ from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import sweep_cases, values_from_text
-from support.checked_store import START, unsealed
+from support.checked_store import START, Record, sealed, unsealed
 from support.errors import InputError, NotConverged
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
@@ -269,6 +269,15 @@ def test_cases_of_a_map_that_has_changed_are_run_again(file, tmp_path):
     np.testing.assert_array_equal(found.force_N[0], first[0])
     alone = run(base.with_({"surface.file": "other.npy"}))
     np.testing.assert_array_equal(found.force_N[1], alone.force_N)
+
+
+def test_cases_of_another_version_are_refused(scene, tmp_path):
+    sweep(scene, {SEED: [1]}, folder=tmp_path)
+    journal = tmp_path / "cases" / "1-of-1" / "rank-0.cases"
+    (head, _), (case, _) = unsealed(journal.read_bytes())
+    journal.write_bytes(sealed([head, Record({**case.facts, "files": {}})])[0])
+    with pytest.raises(InputError, match=r"another version .* its cases are computed again"):
+        sweep(scene, {SEED: [1]}, folder=tmp_path)
 
 
 def test_cases_of_another_scene_are_not_mixed_in(scene, tmp_path):
