@@ -2,13 +2,14 @@
 # # How fine a block has to be
 #
 # What one learns: under the same patch laws, a block of plain finite elements converges slowly,
-# for it has to resolve the near field of every loaded patch; a block that is the half-space
-# exactly, and in smooth modes of its face what a finite body adds to it, needs no mesh.
+# because it has to resolve the near field of every loaded patch. A block that consists of the
+# exact half-space and of what the finite body adds to it, in smooth modes of its face, needs no
+# mesh.
 #
 #     plain          u from finite elements, tractions p on the patches
 #     decomposed     u = u_half-space (Love 1929) + Φ D Φᵀ p,  few smooth modes Φ
 #
-# Run time: five minutes, nearly all for the finest plain mesh; compliances are kept on disk.
+# Run time: five minutes, nearly all for the finest plain mesh; compliances are cached on disk.
 # `--quick` for coarse meshes, `--out DIR` for the folder of the figure.
 
 # %%
@@ -32,7 +33,7 @@ MESHES += [] if choice.quick else [(32, 32, 16), (64, 64, 24)]
 
 
 # %% [markdown]
-# Isolated laws of 4 × 4 patches do not depend on the block: what differs is its compliance alone.
+# Isolated laws of 4 × 4 patches do not depend on the block: only its compliance differs.
 
 
 # %%

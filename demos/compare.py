@@ -1,10 +1,10 @@
 # %% [markdown]
 # # Which way to compute a scene?
 #
-# What one learns: how much error is left after how much time, in every sensible way to compute the
-# paper's scene and a surface that is rich in waves. `patchlaw compare` runs them all, each from
-# nothing, and takes the best one, three meshes of the roughness, as the truth; that
-# knows its own error, and nobody can say which of two ways is the better one below it.
+# What one learns: which error remains after which time, in every sensible way to compute the
+# paper's scene and a surface with many waves. `patchlaw compare` runs them all, each from nothing,
+# and takes the best one, three meshes of the roughness, as the reference. That one knows its own
+# error; below it, no two ways can be ranked.
 #
 #     error of the force: the largest of the curve, over its largest force, at least the truth's own
 #

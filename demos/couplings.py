@@ -69,7 +69,7 @@ def forces(seed: int, tilt: float, patches: int, *more: str) -> np.ndarray:
 
 
 # %% [markdown]
-# The measure: concurrent, which knows of no patches and needs no mesh under them.
+# The reference: concurrent, which has no patches and needs no mesh below them.
 def errors():
     """Return the errors, one of each coupling, plane and partition per row, written as a table."""
     planes, alone = product(SEEDS, TILTS.items()), "coupling.kind=concurrent"
@@ -119,8 +119,8 @@ left.text(1.0, 0.08, text, color=GREEN)
 figure.savefig(choice.out / "couplings.png")
 
 # %% [markdown]
-# Consistent laws find the concurrent solution again with any number of patches and on any mesh, as
-# their closures count in the compliance of the macro model that they are for.
+# Consistent laws reproduce the concurrent solution with any number of patches and on any mesh,
+# because their closures are calculated with the compliance of the macro model that uses them.
 
 # %%
 # at 4 and 8 µm: forces at 2 µm are less than a tenth of the largest

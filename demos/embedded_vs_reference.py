@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Embedded roughness against the meshed one
 #
-# What one learns: how far models whose mesh knows nothing of the roughness are from finite elements
-# of the rough surface itself, and why. This is Fig. 14 and 15 of Waddad et al. 2016 (doi
+# What one learns: how far models whose mesh does not resolve the roughness are from finite
+# elements of the rough surface itself, and why. This is Fig. 14 and 15 of Waddad et al. 2016 (doi
 # 10.1016/j.triboint.2015.12.023), with a reference that states its own discretisation error.
 #
 #     F(embedded) / F(reference) = finite slopes × finite block × coupling × what is left

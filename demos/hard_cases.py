@@ -1,11 +1,11 @@
 # %% [markdown]
 # # Hard cases
 #
-# What one learns: what contact of rough surfaces finds hard, what is right then and how nearly it
-# is met, and how many iterations it takes. Every row is a scene far from the usual one (a 1 mm
-# cube, 4 × 4 patches, 8 µm), a pair of summits or a law; the witness is a closed form, another
-# coupling or another way to the same load. The same is asserted, for more couplings, in
-# `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
+# What one learns: which cases of rough contact are numerically difficult, what the right result is,
+# how large the error is and how many iterations it takes. Every row is a scene far from the usual
+# one (a 1 mm cube, 4 × 4 patches, 8 µm), a pair of summits or a law; it is compared with a closed
+# form, another coupling or another way to the same load. The same is asserted, for more couplings,
+# in `tests/verification/test_hard_cases_*.py` and `test_interaction_merging.py`.
 #
 # Run time: two minutes. `--quick` for one case of each kind, `--out DIR` for the folder of
 # table and figure.
@@ -33,7 +33,7 @@ if choice.quick:
 assert surfaces.CELLS == 32
 
 # %% [markdown]
-# Each case tells how far it is off, and what was solved for it. An error beyond its bound, or an
+# Each case returns its error and what was solved for it. An error beyond its bound, or an
 # iteration that does not converge, ends the demo.
 
 # %%
@@ -57,7 +57,9 @@ for case in sorted(CASES, key=lambda one: one.number):
     if error > case.bound:
         errors.append(f"case {case.number}, {case.hard}: off by {error:.1e}")
 
-HEAD = "| | what is hard | what must hold | off by | at most | load steps | Newton | linear | CG |"
+HEAD = (
+    "| | what is difficult | what must hold | error | bound | load steps | Newton | linear | CG |"
+)
 table = [HEAD, "|--:|---|---|--:|--:|--:|--:|--:|--:|"]
 for case, error, work, _ in rows:
     off = "0" if error == 0.0 else f"{error:.1e}"
@@ -71,8 +73,8 @@ print("\n".join(table))
 print(f"{len(rows)} cases in {sum(row[-1] for row in rows):.0f} s")
 
 # %% [markdown]
-# Left how many iterations a load step takes: of Newton's method, or, without laws, of conjugate
-# gradients for the contacts. Right how far from its bound each case stays.
+# Left the iterations of a load step: of Newton's method, or, without laws, of conjugate gradients
+# for the contacts. Right the error of each case beside its bound.
 
 # %%
 use_style()

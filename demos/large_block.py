@@ -2,10 +2,10 @@
 # # From a half-space to a block, and back
 #
 # What one learns: the contact law of one patch, put on the flat interface of an elastic block,
-# gives back the micro model that made it when the block is large against the interface. This is
-# the consistency that Love's correction of the closure is there for (Waddad et al. 2016, eq. 31,
-# doi 10.1016/j.triboint.2015.12.023); and a cube of the interface's own size comes close to it
-# only by a coincidence of its free sides and its clamped bottom.
+# reproduces the micro model that made it when the block is large compared with the interface.
+# Love's correction of the closure exists for this consistency (Waddad et al. 2016, eq. 31, doi
+# 10.1016/j.triboint.2015.12.023). A cube of the interface's own size comes close to it only by a
+# coincidence of its free sides and its clamped bottom.
 #
 #     ╔═ rigid plane ═╗          find u:  ∫ σ(u) : ε(v) dx = −∫ p(c) v_z ds   on the interface,
 #       ┌┄┄┄┄┄┄┄┄┄┄┄┐              c = δ − ū,  ū = mean of −u_z over the patch,  p(c) the law

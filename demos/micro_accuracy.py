@@ -113,7 +113,7 @@ draw_accuracy(
 )
 
 # %% [markdown]
-# Without interaction models are far too stiff; with it too soft.
+# Without interaction the models are far too stiff; with interaction they are too soft.
 
 # %%
 assert size["half-space, 64²"][0] < min(0.03, size[f"elliptic, {ASPERITY_GRID}²"][0])

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # A rough interface as one term of your own dolfinx problem
 #
-# What one learns: mesh, material, thermal strain and supports are written in dolfinx as ever; a
-# rough face is one object beside them. Here a brake pad is hot in front and cold at its back,
-# where it is stiffer, too. Heat bows it towards the disc, and the middle bears more than the edges.
+# What one learns: mesh, material, thermal strain and supports are written in dolfinx as usual; a
+# rough face is one more object. Here a brake pad is hot in front and cold at its back, where it
+# is also stiffer. Heat bows it towards the disc, and its middle carries more than its edges.
 #
 #      ─────────────── held, cold, 8 GPa
 #     │      pad      │  40 × 20 × 10 mm
@@ -97,7 +97,7 @@ if pad.comm.rank == 0:
     figure.savefig(choice.out / "own_problem.png")
 
 # %% [markdown]
-# The supports bear what the laws give. The real area hardly depends on how the force is spread.
+# The supports carry the force of the laws. The real area hardly depends on how it is distributed.
 
 # %%
 assert abs(abs(balance) - 1.0) < 1e-8

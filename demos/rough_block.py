@@ -1,9 +1,9 @@
 # %% [markdown]
 # # A rough block, pressed
 #
-# What one learns: what this package is about, in one picture. A rigid plane presses a rough block;
-# it touches a few spots alone, and stresses below them spread into the block. Patch laws carry the
-# same force on a flat block, whose mesh knows nothing of the roughness.
+# What one learns: what this package is about, in one picture. A rigid plane presses a rough
+# block. It is in contact on a few spots only, and the stresses below them spread into the block.
+# Patch laws carry the same force on a flat block, whose mesh does not resolve the roughness.
 #
 #      δ │ rigid plane                    rough: p ≥ 0, gap ≥ 0, p · gap = 0 in every cell of the
 #     ═══╧══════════════                  surface, on the block (concurrent)

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # A thousand rough surfaces on one block
 #
-# What one learns: how much the force at a given approach scatters between surfaces that are equal
-# in everything that is usually told of a rough surface (spectrum, rms gradient, size), and differ
-# in their phases alone. One deterministic curve, such as the paper's, is one draw.
+# What one learns: how much the force at a given approach scatters between surfaces that agree in
+# everything that is usually stated of a rough surface (spectrum, rms gradient, size) and differ
+# only in their phases. One deterministic curve, such as the paper's, is one sample.
 #
 #     block, sides, kernels: once a rank              1000 × { surface → contact problem on the
 #                                                       block → 8 load steps → measured error }
@@ -29,6 +29,7 @@ parser.add_argument("--quick", action="store_true")
 parser.add_argument("--out", type=Path, default=Path("results/scatter"))
 parser.add_argument("--data", type=Path)
 choice = parser.parse_args()
+choice.out.mkdir(parents=True, exist_ok=True)
 comm = MPI.COMM_WORLD
 SURFACES = 6 if choice.quick else 1000
 PAPER = Path(__file__).parent / "scenes" / "paper.toml"
@@ -56,7 +57,6 @@ def curves():
         alone = run(scene.with_({"surface.spectrum.seed": 0}))
         np.testing.assert_array_equal(forces[0], alone.force_N)  # to the last bit
         print(f"measured error at the last step, median: {np.median(errors / forces[:, -1]):.1%}")
-        choice.out.mkdir(parents=True, exist_ok=True)
         text = "approaches [um] in the first row, forces [N] of a surface in every other"
         np.savetxt(choice.out / "scatter.csv", table, "%.6g", ",", header=text)
     return table

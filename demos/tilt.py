@@ -1,9 +1,9 @@
 # %% [markdown]
 # # A tilted plane and the laws that know of it
 #
-# What one learns: patch laws made by a level plane do not know how a tilted one shares the load
-# among the summits of a patch; they need small patches. Laws made under the tilt itself give the
-# whole surface's force back on any partition, and cost the same.
+# What one learns: patch laws made for a level plane do not know how a tilted one distributes the
+# load among the summits of a patch; they need small patches. Laws made for the tilted plane
+# itself reproduce the force of the whole surface on any partition, at the same cost.
 #
 #       ╲___ plane, 10 µm higher on one side of each millimetre
 #     ▁▂▃▂▁▂▄▃▂▁▃▅▃▂      c_i = s_i − Σ_j Λ_ij p_j / (π E*),  s_i the approach at patch i
@@ -83,7 +83,7 @@ axes.set(xlabel="number of patches", ylabel="largest error of the force [%]", ym
 figure.savefig(choice.out / "tilt.png")
 
 # %% [markdown]
-# Under the tilt's own laws not even one patch for the whole surface does harm.
+# With laws made for the tilt, even one patch for the whole surface is accurate.
 
 # %%
 worst = {key: np.abs(values[:, 0]).max() for key, values in found.items()}

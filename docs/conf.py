@@ -1,7 +1,7 @@
 """How Sphinx makes the site: of the pages in ``docs``, the README and the changelog.
 
-The project's folder is the source, so that all pages keep their places and their links. What the
-project itself says (keys, columns, pictures, names) is written to ``docs/_generated`` first:
+The project's folder is the source, so that all pages keep their places and their links. Tables that
+are made from the project (keys, columns, public names) are written to ``docs/_generated`` first:
 
     .venv/bin/python -m sphinx -W -c docs . docs/_build
 """

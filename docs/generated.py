@@ -1,14 +1,12 @@
-"""Pages that the project itself has the words for: keys, columns, pictures, public names."""
+"""Tables of the site that are made from the project: keys, columns, public names."""
 
 from __future__ import annotations
 
 import inspect
-import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 from multiscale.results.history import COLUMNS
 from multiscale.scene.keys import Key, scene_keys
@@ -34,7 +32,6 @@ def write(folder: Path) -> None:
     pages = {
         "scene_keys.md": scene_key_tables(),
         "history_columns.md": history_columns(),
-        "gallery.md": gallery(),
         **{f"{package}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
@@ -93,68 +90,6 @@ def history_columns() -> str:
     """Return the table of the columns of ``history.csv``, from where they are declared."""
     rows = ((f"`{one.name}`", one.meaning, one.unit or "–") for one in COLUMNS)
     return _table(("column", "meaning", "unit"), rows)
-
-
-class Picture(NamedTuple):
-    """A picture on a page, with the heading above it, its caption, and what made it."""
-
-    path: Path
-    page: Path
-    title: str
-    caption: str
-    source: Path | None
-
-
-_PICTURE = re.compile(
-    r"(?:^#+ (?P<title>[^\n]+)\n\n)?!\[(?P<alt>[^\]]*)\]\((?P<path>[^)]+)\)"
-    r"(?:\n\n\*(?!\*)(?P<caption>(?:(?!\n\n).)+?[^\\])\*(?=\s))?",
-    re.DOTALL | re.MULTILINE,
-)
-_LINK = re.compile(r"\[([^\]]*)\]\([^)]*\)")
-_SENTENCE = re.compile(r"(?<=[^.\d][.:])\s+(?=[A-Z])")
-
-
-def pictures() -> list[Picture]:
-    """Return the pictures of all pages, each once: those of the demos' index first."""
-    index = ROOT / "docs" / "demos.md"
-    others = [ROOT / "README.md", *sorted({*index.parent.glob("*.md")} - {index})]
-    found: dict[Path, Picture] = {}
-    for page in (index, *others):
-        for match in _PICTURE.finditer(page.read_text(encoding="utf-8")):
-            path = (page.parent / match["path"]).resolve()
-            caption = _LINK.sub(r"\1", " ".join((match["caption"] or match["alt"]).split()))
-            picture = Picture(path, page, match["title"] or "", caption, _source(path, caption))
-            found.setdefault(path, picture)
-    return list(found.values())
-
-
-def _source(picture: Path, caption: str) -> Path | None:
-    """Return the script or scene of a picture: of its name, or the first that its caption names."""
-    named = re.findall(r"[\w/]+\.(?:py|toml)\b", caption)
-    folder = picture.parent
-    places = [
-        *(near / f"{picture.stem}.py" for near in (folder, folder.parent)),
-        *(near / name for name in named for near in (ROOT, ROOT / "demos", folder)),
-    ]
-    return next((place for place in places if place.is_file()), None)
-
-
-def gallery() -> str:
-    """Return all pictures as cards: what each says, the page it stands on, what made it."""
-    cards = []
-    for one in pictures():
-        page, says = _from_docs(one.page), _SENTENCE.split(one.caption)[0]
-        made = f" · [`{one.source.name}`]({_from_docs(one.source)})" if one.source else ""
-        cards.append(
-            f":::{{grid-item-card}} {one.title}\n[![{says}]({_from_docs(one.path)})]({page})\n\n"
-            f"{says}\n\n[page]({page}){made}\n:::\n"
-        )
-    return "::::{grid} 1 1 2 2\n:gutter: 3\n\n" + "\n".join(cards) + "::::\n"
-
-
-def _from_docs(path: Path) -> str:
-    """Return the address of a file of the project from a page in ``docs``."""
-    return f"../{path.relative_to(ROOT).as_posix()}"
 
 
 def public_names(package: str) -> list[str]:

@@ -96,7 +96,7 @@ class Control:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RigidPlane:
-    """Approach δ(x, y) = δ + tx (x − xc) + ty (y − yc), counted from first touch when level.
+    """A rigid plane with the approach δ + tx (x − xc) + ty (y − yc), from first touch when level.
 
     Args:
         approach: δ at the centre of the rectangle [mm].

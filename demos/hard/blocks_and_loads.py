@@ -36,7 +36,7 @@ for nu, element, cells, bound in (
     (0.4999, "Q2", [8, 8, 8], 0.03), (0.0, "Q2", [6, 6, 4], 5e-3), (-0.5, "Q2", [6, 6, 4], 5e-3),
 ):  # fmt: skip
     name = f"ν = {nu:g}, {element}, {' × '.join(map(str, cells))} cells".replace("-", "−")
-    locks = "locks, and is warned of" if (element, nu) == ("Q1", 0.4999) else "as decomposed"
+    locks = "locks, with a warning" if (element, nu) == ("Q1", 0.4999) else "as decomposed"
     case(6, name, locks, bound)(
         lambda nu=nu, element=element, cells=cells: stiff_block(nu, element, cells)
     )
@@ -155,7 +155,7 @@ for name, points in LAWS.items():
     )
 
 
-@case(16, "force from 1e-9 N through first touch, and none", "the force asked for", 1e-5)
+@case(16, "force from 1e-9 N through first touch, and none", "the prescribed force", 1e-5)
 def small_forces() -> tuple[Any, ...]:
     wanted = [1e-9, 1e-6, 1e-3, 1.0, 0.0]
     found = solved("consistent", load__approach=None, load__force=wanted)
@@ -196,7 +196,12 @@ def bad_cell() -> tuple[Any, ...]:
     return error, Count(newton=0, linear=block.solver.its)
 
 
-@case(20, "reference meshed too coarsely for a contact node", "none, told; the force asked", 1e-10)
+@case(
+    20,
+    "reference meshed too coarsely for a contact node",
+    "no force, and a note; the prescribed force",
+    1e-10,
+)
 def too_coarse() -> tuple[Any, ...]:
     coarse = {"reference__cells": [4, 4, 2], "reference__meshes": 1}
     found = solved("reference", load__approach="0.2 um", **coarse)

@@ -129,7 +129,12 @@ for name, heights in {
     case(13, name, "as without laws", 0.02)(lambda heights=heights: couplings_agree(heights))
 
 
-@case(14, "49 of 1024 heights missing, filled on request; small slopes", "as with them", 1e-6)
+@case(
+    14,
+    "49 of 1024 heights missing, filled on request; small slopes",
+    "as without missing heights",
+    1e-6,
+)
 def holes() -> tuple[Any, ...]:
     """Fill heights that nothing touches: they count in finite slopes alone, there by 1e-4."""
     small: dict[str, Any] = {"micro__finite_slopes": False}
@@ -137,7 +142,7 @@ def holes() -> tuple[Any, ...]:
     return off(found, solved("consistent", **small, **of_heights(DOME))), found
 
 
-@case(15, "one patch, wider than the block is high: warned of", "off as an approximation", 0.5)
+@case(15, "one patch, wider than the block is high: warned of", "rough approximation", 0.5)
 def wide_patch() -> tuple[Any, ...]:
     wide = {"patches__grid": [1, 1], "block__height": "0.2 mm"}
     found, right = (solved(kind, **wide) for kind in ("isolated", "concurrent"))

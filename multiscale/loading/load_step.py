@@ -43,7 +43,7 @@ class LoadStep:
         mean_pressure_MPa: Force over nominal contact area [MPa].
         contact_area_fraction: Real over nominal contact area.
         mean_separation_mm: Mean gap between the plane and the deformed surface [mm].
-        contacts: Number of asperities in contact.
+        contacts: Number of contacts.
         newton_iterations: Newton steps, those of failed and halved steps included; without laws
             (analytic, concurrent) the iterations of the contact problem.
         linear_iterations: Iterations of the linear solver.
@@ -67,21 +67,21 @@ class LoadStep:
         stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
             approach, under fixed slopes or, where the plane turns, without moment, on the side
             that the plane came from [N/mm]; None where it was not found.
-        stiffness_error_N_per_mm: What the stiffness may be off by where cells yield anew; 0 where a
+        stiffness_error_N_per_mm: Error bound of the stiffness where cells yield further; 0 where a
             linear solution gives it [N/mm].
         elastic_energy_mJ: Energy of the elastic deformation of all bodies; None where it is not
             known [mJ].
         plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
             it is not known.
-        yielding_area_fraction: Area that bears the hardness over nominal contact area; None without
-            a hardness.
+        yielding_area_fraction: Area that carries the hardness over nominal contact area; None
+            without a hardness.
         plastic_depth_mm: Largest plastic depth that the loads so far have left [mm]; None without a
             hardness.
         work_mJ: Work of the forces on the plane, since the start [mJ]; None where no energy is
             known.
         thermal_conductance_W_per_K: Conductance of contacts and gaps [W/K]; None where the scene
             asks for none.
-        gap_conductance_W_per_K: What of it passes through gas and radiation [W/K].
+        gap_conductance_W_per_K: Part of it through gas and radiation [W/K].
         electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
             none.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].

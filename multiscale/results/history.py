@@ -140,7 +140,7 @@ class History:
     mean_separation_mm = Column(
         "Mean gap between the plane and the deformed surface", "mm", heading="separation"
     )
-    contacts = Column("Number of asperities in contact", heading="contacts")
+    contacts = Column("Number of contacts", heading="contacts")
     newton_iterations = Column(
         "Newton steps, those of halved load steps too", heading="Newton", table="solver"
     )
@@ -168,7 +168,7 @@ class History:
     )
     work_mJ = Column("Work of the forces on the plane", "mJ")
     yielding_area_fraction = Column(
-        "Area that bears the hardness over nominal contact area",
+        "Area that carries the hardness over nominal contact area",
         heading="yielding area", table="more",
     )  # fmt: skip
     plastic_depth_mm = Column(
@@ -180,14 +180,14 @@ class History:
         heading="thermal conductance", table="more",
     )  # fmt: skip
     gap_conductance_W_per_K = Column(
-        "What of it passes through gas and radiation", "W/K",
+        "Part of it through gas and radiation", "W/K",
         heading="of it through gaps", table="more",
     )  # fmt: skip
     electrical_conductance_S = Column(
         "Electrical conductance of the contacts", "S",
         heading="electrical conductance", table="more",
     )  # fmt: skip
-    stiffness_error_N_per_mm = Column("Error of the stiffness, where cells yield anew", "N/mm")
+    stiffness_error_N_per_mm = Column("Error of the stiffness, where cells yield further", "N/mm")
     first_touch_approach_mm = Column(
         "Approach counted from first touch, where approach_mm counts from another height", "mm",
         heading="from first touch", table="more",

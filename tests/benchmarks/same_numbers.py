@@ -1,0 +1,248 @@
+"""Compare the histories of forty scenes between two checkouts, number by number.
+
+    python tests/benchmarks/same_numbers.py store before.json CHECKOUT   # with its own .venv
+    python tests/benchmarks/same_numbers.py store after.json .
+    python tests/benchmarks/same_numbers.py compare before.json after.json
+
+The scenes cover all couplings, micro models, bodies, controls, hardness, conductance,
+counter-bodies and laws. Numbers are all of `LoadStep` but times and iterations, those of patches
+included. The cache is off.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+SCENES_FOLDER = "demos/scenes"
+SURFACE = {
+    "spectrum": {"hurst": 0.9, "waves": [2, 5], "rms_slope": 0.2, "seed": 3},
+    "grid": [32, 32],
+    "lengths": ["1 mm", "1 mm"],
+}
+COUNTER = {"spectrum": {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 5}}
+CONSTANTS = {"young_modulus": "4 GPa", "poisson_ratio": 0.15}
+BLOCK = {**CONSTANTS, "cells": [8, 8, 5]}
+HALF = {"model": "half-space"}
+SLOPES = {"model": "half-space", "finite_slopes": True}
+PATCHES = {"grid": [2, 4]}
+APPROACH = {"approach": "8.013 um", "steps": 2}
+FORCE = {"force": "4.117 N", "steps": 2}
+FREE = {**FORCE, "tilt": "free"}
+TILTED = {**APPROACH, "tilt": ["2.13 um/mm", "-1.07 um/mm"]}
+CYCLE = {"approach": ["8.013 um", "3.1 um", "9.2 um"], "steps": 2}
+CHECKED = {"check": "all"}
+HEAT = {
+    "conductivity": ["50 W/m/K"], "resistivity": ["1.7e-7 ohm m"], "gas": "0.026 W/m/K",
+    "temperature_jump": "0.4 um",
+}  # fmt: skip
+LAW = {"kind": "representative"}
+SAMPLE = {**SURFACE, "grid": [16, 16], "lengths": ["0.1 mm", "0.1 mm"]}
+
+
+def scene(kind, micro=HALF, load=APPROACH, output=None, coupling=None, **sections):
+    """Return the sections of a scene; a None takes one out."""
+    whole = {
+        "surface": SURFACE,
+        "block": BLOCK,
+        "patches": PATCHES,
+        "micro": micro,
+        "coupling": {"kind": kind, **(coupling or {})},
+        "load": load,
+        "output": {"figures": False, "report": False, "check": "none", **(output or {})},
+        **sections,
+    }
+    return {name: section for name, section in whole.items() if section is not None}
+
+
+def sampled(**sections):
+    """Return the sections of a scene with a law of samples."""
+    block = {**BLOCK, "lengths": ["1 mm", "1 mm"], "height": "1 mm"}
+    given = {"surface": SAMPLE, "law": LAW, "patches": None, "block": block, **sections}
+    whole = scene("", **given)
+    del whole["coupling"]
+    return whole
+
+
+def scenes(folder):
+    """Yield the names and sections of the scenes; bodies' meshes stand in a folder."""
+    body = {"mesh": f"{folder}/cube.msh", "contact": "top", "supports": [{"surface": "bottom"}]}
+    above = {"mesh": f"{folder}/above.msh", "contact": "bottom", "supports": [{"surface": "top"}]}
+    body, above = {"body": body | CONSTANTS, "block": None}, above | CONSTANTS
+    steel = {"young_modulus": "210 GPa", "poisson_ratio": 0.3}
+    models = ("elliptic", "circular", "elliptic-independent", "circular-independent")
+    fine = {"surface": {**SURFACE, "grid": [64, 64]}}
+    for model in models:
+        yield f"analytic {model}", scene("analytic", {"model": model}, **fine)
+    yield "analytic slopes", scene("analytic", SLOPES, TILTED, CHECKED)
+    yield "analytic hardness", scene("analytic", {**HALF, "hardness": "312.7 MPa"}, CYCLE)
+    yield "analytic periodic", scene("analytic", surface={**SURFACE, "periodic": True}, load=FORCE)
+    yield "analytic free", scene("analytic", load=FREE)
+    yield "analytic heat", scene("analytic", load=FORCE, conductance=HEAT)
+    yield "analytic zero", scene("analytic", load={**APPROACH, "zero": "mean plane"})
+    yield "concurrent", scene("concurrent", output={**CHECKED, "contact": "all"})
+    yield "concurrent hardness", scene("concurrent", {**HALF, "hardness": "312.7 MPa"}, CYCLE)
+    yield "concurrent free", scene("concurrent", load=FREE, output=CHECKED)
+    yield "concurrent roller", scene("concurrent", block={**BLOCK, "sides": "roller"}, load=TILTED)
+    yield "concurrent margin", scene("concurrent", block={**BLOCK, "margin": "0.2 mm"})
+    yield "concurrent elliptic", scene("concurrent", {"model": "elliptic"}, **fine)
+    yield (
+        "concurrent two sides",
+        scene("concurrent", SLOPES, counter_surface={**SURFACE, **COUNTER}, counter_body=steel),
+    )
+    yield "concurrent heat", scene("concurrent", conductance=HEAT, load=CYCLE)
+    yield "consistent", scene("consistent", output={**CHECKED, "contact": "last"})
+    yield "consistent full", scene("consistent", coupling={"newton": "full"}, load=TILTED)
+    yield "consistent points", scene("consistent", coupling={"interface": "pointwise"}, load=FORCE)
+    meshed = {"compliance": "finite-element"}
+    yield "consistent mesh", scene("consistent", coupling=meshed, load=FORCE)
+    yield "consistent free", scene("consistent", load=FREE)
+    yield "consistent circular", scene("consistent", {"model": "circular"}, load=FORCE, **fine)
+    yield "consistent hardness", scene("consistent", {**HALF, "hardness": "312.7 MPa"})
+    yield "consistent counter-body", scene("consistent", counter_body=steel, conductance=HEAT)
+    yield "isolated", scene("isolated", {"model": "circular"}, **fine)
+    yield "isolated cells", scene("isolated", coupling={"love": "centre"}, load=FORCE)
+    yield "isolated condensed", scene("isolated", coupling={"newton": "condensed"}, load=FREE)
+    meshes = {"fine": "60 um", "meshes": 2}
+    yield "reference", scene("reference", reference=meshes, output={"contact": "last"})
+    lagrangian = {**meshes, "method": "augmented-lagrangian"}
+    yield "reference Lagrangian", scene("reference", reference=lagrangian)
+    bricks = {"mesh": "hexahedra", "cells": [12, 12, 6], "meshes": 1}
+    yield "reference bricks", scene("reference", reference=bricks, load=FREE)
+    yield "representative", sampled(load={**FORCE, "force": "40.3 N"}, conductance=HEAT)
+    yield "representative crown", sampled(load=APPROACH, law={**LAW, "crown": ["50 mm", "80 mm"]})
+    yield "representative seeds", sampled(load=FREE, law={**LAW, "seeds": [1, 2]})
+    yield "representative body", sampled(load={**FREE, "force": "41.7 N"}, **body)
+    yield "representative pair", sampled(load=FORCE, counter_body=above, **body)
+    yield "body concurrent", scene("concurrent", SLOPES, output=CHECKED, **body)
+    yield "body full", scene("consistent", coupling={"newton": "full"}, load=TILTED, **body)
+    yield "body pair", scene("concurrent", load=FORCE, counter_body=above, **body)
+    auto = scene("", accuracy=0.05, micro=None, block=CONSTANTS, patches=None, load=FORCE)
+    del auto["coupling"]
+    yield "accuracy", auto
+
+
+def write_meshes(folder):
+    """Write a cube below and one above the contact, by gmsh."""
+    import gmsh
+
+    for name, z in (("cube", 0.0), ("above", 1.0)):
+        gmsh.initialize()
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.model.occ.addBox(0, 0, z, 1, 1, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.model.setPhysicalName(3, gmsh.model.addPhysicalGroup(3, [1]), "body")
+        for side, height in (("bottom", z), ("top", z + 1.0)):
+            box = (-1, -1, height - 0.1, 2, 2, height + 0.1)
+            faces = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, dim=2)]
+            gmsh.model.setPhysicalName(2, gmsh.model.addPhysicalGroup(2, faces), side)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 0.25)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(f"{folder}/{name}.msh")
+        gmsh.finalize()
+
+
+def numbers(history):
+    """Return all numbers of a history by name."""
+    import dataclasses
+
+    import numpy as np
+
+    values = {}
+    for step in history.steps:
+        for field in dataclasses.fields(step):
+            value = getattr(step, field.name)
+            if field.name in ("wall_s", "reason", "warnings", "newton_iterations",
+                              "linear_iterations"):  # fmt: skip
+                continue
+            if field.name == "errors":
+                value = dict(value)
+            elif field.name == "patches":
+                value = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
+            parts = value if isinstance(value, dict) else {"": value}
+            for part, content in parts.items():
+                if content is not None:
+                    flat = np.ravel(np.asarray(content, dtype=float)).tolist()
+                    values[f"{step.step} {field.name} {part}".strip()] = flat
+    return values
+
+
+def computed(checkout, only):
+    """Print the numbers of the scenes, made by the packages of a checkout."""
+    sys.path.insert(0, str(checkout))
+    import tempfile
+
+    from multiscale import Scene, run
+
+    with tempfile.TemporaryDirectory() as folder:
+        write_meshes(folder)
+        for name, sections in scenes(folder):
+            if only and only not in name:
+                continue
+            began = time.perf_counter()
+            try:
+                history = run(Scene.from_dict(sections))
+                result = {"numbers": numbers(history), "notes": list(map(str, history.notes))}
+            except Exception as error:
+                result = {"error": f"{type(error).__name__}: {error}"}
+            result["seconds"] = time.perf_counter() - began
+            print(json.dumps([name, result]), flush=True)
+
+
+def store(path, checkout, only=""):
+    """Write the numbers of the scenes to a file."""
+    checkout = Path(checkout).resolve()
+    environment = os.environ | {"PATCHLAW_CACHE": "off", "PYTHONPATH": str(checkout)}
+    words = [checkout / ".venv" / "bin" / "python", Path(__file__).resolve(), "run", checkout, only]
+    found = {}
+    with subprocess.Popen(
+        list(map(str, words)), env=environment, stdout=subprocess.PIPE, text=True, cwd=checkout
+    ) as process:
+        for line in process.stdout:
+            if not line.startswith('["'):
+                continue
+            name, result = json.loads(line)
+            found[name] = result
+            told = result.get("error", f"{len(result.get('numbers', ()))} numbers")
+            print(f"{name:28} {result['seconds']:6.1f} s  {told}", flush=True)
+    Path(path).write_text(json.dumps(found))
+
+
+def compare(before, after):
+    """Print the largest relative difference of every scene, and where it is."""
+    before, after = (json.loads(Path(path).read_text()) for path in (before, after))
+    worst = 0.0
+    for name, was in before.items():
+        now = after.get(name)
+        if now is None:
+            continue
+        if "error" in was or "error" in now:
+            print(f"{name:28} {was.get('error')} | {now.get('error')}")
+            worst = max(worst, float(was.get("error") != now.get("error")))
+            continue
+        largest, place = 0.0, ""
+        for key in was["numbers"].keys() | now["numbers"].keys():
+            a, b = was["numbers"].get(key), now["numbers"].get(key)
+            if a is None or b is None or len(a) != len(b):
+                largest, place = float("inf"), key
+                continue
+            scale = max(map(abs, a), default=0.0) or 1.0
+            apart = max((abs(x - y) / scale for x, y in zip(a, b, strict=True)), default=0.0)
+            if apart > largest:
+                largest, place = apart, key
+        worst = max(worst, largest)
+        same = "" if was["notes"] == now["notes"] else "  notes differ"
+        print(f"{name:28} {largest:8.1e}  {place}{same}")
+    print(f"{len(before)} scenes; largest difference {worst:.1e}")
+
+
+if __name__ == "__main__":
+    command, *words = sys.argv[1:]
+    if command == "run":
+        computed(Path(words[0]), words[1])
+    elif command == "store":
+        store(*words)
+    else:
+        compare(*words)

@@ -1,0 +1,240 @@
+"""A figure has one home, a table or a file of data; pages that repeat it have the same digits."""
+
+import csv
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+from statistics import median
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "demos" / "data"
+TEXTS = {
+    path.stem: path.read_text(encoding="utf-8")
+    for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
+}
+
+
+def says(page, *texts):
+    """Check that a page has texts, wherever its lines break."""
+    whole = " ".join(TEXTS[page].split())
+    for text in texts:
+        assert text in whole, f"{page} does not say {text!r}"
+
+
+def cells(page, after, start):
+    """Return the cells of the first row that begins with a text, after another text of a page."""
+    rest = TEXTS[page].split(after, maxsplit=1)[1]
+    line = next(line for line in rest.splitlines() if line.startswith(f"| {start}"))
+    return [cell.strip() for cell in line.strip("| ").split(" | ")][1:]
+
+
+def numbers(text):
+    return [float(one.replace("−", "-")) for one in re.findall(r"[−-]?\d+(?:\.\d+)?", text)]
+
+
+def rounded(value):
+    """Return a value as tables show it: no decimals from ten on, one from one on, else two."""
+    return f"{value:.{0 if value >= 10.0 else 1 if value >= 1.0 else 2}f}"
+
+
+def percent(value):
+    """Return an error as tables show it, in per cent: two digits, but no second decimal."""
+    return f"{100.0 * value:.{0 if value >= 0.095 else 1}f}"
+
+
+def drawn_again(demo, folder):
+    """Return the lines that a demo prints of its stored data."""
+    words = [sys.executable, f"demos/{demo}.py", "--data", DATA / f"{demo}.csv", "--out", folder]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+    return done.stdout.splitlines()
+
+
+def test_configurations_of_the_papers_scene():
+    with (DATA / "compare_paper.csv").open(encoding="utf-8", newline="") as file:
+        found = list(csv.DictReader(file))
+    time = {one["name"]: rounded(float(one["seconds"])) for one in found}
+    error = {one["name"]: percent(float(one["error_force_max"])) for one in found}
+    coarse, fine = (f"concurrent, half-space {n} × {n}" for n in (64, 128))
+    laws = "consistent, 4 × 4 patches, half-space 128 × 128"
+    paper = "the scene as it is: isolated, 4 × 4 patches, circular"
+    mesh, small = "reference, 1 mesh, 10.4 µm", "concurrent, half-space 128 × 128, small slopes"
+    alone = "analytic, circular"
+    says(
+        "README",
+        f"| {time[alone]} s | {error[alone]} % (",
+        f"| {time[coarse]}, {time[fine]} s | {error[coarse]}, {error[fine]} % |",
+        f"| {time[laws]} s | {error[laws]} % |",
+        f"| {time[paper]} s | {error[paper]} % |",
+        f"| {time[mesh]}; 28 s | {error[mesh]} %; – |",
+    )
+    says("speed", f"slopes {error[small]} % are left after {time[small]} s", "takes 28 s on two")
+    early, late = (f"{float(time[one]):.1f}" for one in (coarse, fine))
+    says(
+        "choosing",
+        f"{early} s at 64² heights, {late} s at 128²",
+        f"| {error[paper]} % in the paper's scene",
+        f"| {time[paper]} s on 40 000 hexahedra",
+        f"8 load steps: {time[mesh]} s |",
+    )
+
+
+def test_errors_of_micro_models(tmp_path):
+    row = re.compile(r"\| ([\w-]+, \d+²) \| (.*)% \| (.*)% \|")
+    printed = filter(None, map(row.match, drawn_again("micro_accuracy", tmp_path)))
+    errors = {one[1]: [percent(float(one[k]) / 100.0) for k in (2, 3)] for one in printed}
+    both = ("", "-independent")
+    grids = [f"half-space, {n}²" for n in (32, 64, 128)]
+    pairs = [[f"{shape}{kind}, 256²" for shape in ("elliptic", "circular")] for kind in both]
+    for one in (*grids, *pairs[0], *pairs[1]):
+        model, heights = one.split(", ")
+        shown = f"| `{model}` | {heights} | {errors[one][0]} % | {errors[one][1]} % |"
+        says("accuracy", shown)
+        if one in grids:
+            says("choosing", shown)
+    force, area = (", ".join(errors[one][k] for one in grids) for k in (0, 1))
+    for pair in pairs:
+        shown = [", ".join(errors[one][k] for one in pair) for k in (0, 1)]
+        says("choosing", f"| 256² | {shown[0]} % | {shown[1]} % |")
+    elliptic, circular = (errors[one][0] for one in pairs[0])
+    says("README", f"| {force}; {elliptic}, {circular} % rms |")
+    least, most = sorted(errors[one][0] for one in pairs[1])
+    says(
+        "force_differs", f"| {force} % (of the area {area} %) |", f"and {least} to {most} % without"
+    )
+
+
+def test_errors_of_couplings(tmp_path):
+    rows = [line.strip("| ").split(" | ") for line in drawn_again("couplings", tmp_path)]
+    errors = {tuple(row[:3]): [numbers(one)[0] for one in row[3:]] for row in rows if len(row) == 6}
+    planes = [("level plane", n) for n in (1, 2, 4, 8, 16)]
+    planes += [("plane tilted by 5 µm/mm", n) for n in (1, 4, 16)]
+    shown = {
+        "consistent": "`consistent` |",
+        "consistent, plain mesh": "`consistent`, plain mesh",
+        "isolated": "`isolated` |",
+    }
+    for coupling, start in shown.items():
+        table = [numbers(one)[0] for one in cells("accuracy", "## Couplings", start)]
+        stored = [errors[coupling, plane, f"{n} × {n}"][-1] for plane, n in planes]
+        assert table == [round(one) if one > 10.0 else one for one in stored]
+    worst = max(max(one) for key, one in errors.items() if key[0].startswith("consistent"))
+    turned = max(numbers(" ".join(cells("accuracy", "## Couplings", "the same, the largest of"))))
+    says("accuracy", f"is at most {worst:.2f} % everywhere")
+    says("README", f"≤ {worst:.2f} %; free tilt ≤ {turned:.2f} %")
+    says("choosing", f"≤ {worst:.2f} % against `concurrent`", f"≤ {turned:.2f} % where the plane")
+    tilted = max(numbers(" ".join(cells("accuracy", "## Couplings", "`isolated` |"))))
+    least = re.search(r"it is (\d+) % for seed 1", TEXTS["accuracy"])[1]
+    for page in ("choosing", "force_differs"):
+        says(page, f"{least} to {tilted:.0f} %, depending on")
+
+
+def test_scatter_between_surfaces(tmp_path):
+    shown = [numbers(line) for line in drawn_again("scatter", tmp_path)[2:]]
+    _, mean, deviation, low, high = shown[-1]
+    for page in ("accuracy", "force_differs"):
+        says(page, f"{mean:.1f} N on average", f"between {low:.1f} and {high:.1f} N")
+    says("accuracy", f"from {shown[0][2]:.0f} % of the mean at 1 µm to {deviation:.0f} % at 8 µm")
+
+
+def test_errors_against_meshed_roughness():
+    surfaces = [f"Set 1, seed {n}" for n in range(101, 106)]
+    surfaces += [f"Set 2, seed {n}" for n in range(101, 104)]
+    table = [cells("accuracy", "### Finite slopes", one) for one in surfaces]
+    bars, errors, small = ([numbers(row[k])[-1] for row in table] for k in (0, 1, 2))
+    small = f"{min(small):.1f} to {max(small):.1f} %"
+    error = f"≤ {max(errors):.1f} %, median {median(errors) + 1e-9:.2f} %"
+    bar = f"{min(bars):.2f} to {max(bars):.2f} %"
+    says("README", error, small, f"error bars are {bar}")
+    says("choosing", error, f"its own error bar: {bar}")
+    says("force_differs", f"{small} too large", f"leave at most {max(errors):.1f} %")
+    says("limits", f"which costs {small}")
+
+
+def test_errors_on_bodies():
+    foot, cube = "### A body that is no cuboid", "## Contact problems on meshes"
+    bars, *errors = (
+        numbers(" ".join(cells("accuracy", foot, start)))
+        for start in ("its error bars", "`concurrent` |", "`consistent` |")
+    )
+    sharp = max(one for row in errors for bar, one in zip(bars, row, strict=True) if bar <= 0.1)
+    widest = max(range(len(bars)), key=bars.__getitem__)
+    wide = f"{errors[0][widest]:.1f} % at an error bar of {bars[widest]:.1f} %"
+    for page in ("README", "choosing"):
+        says(page, f"≤ {sharp:.2f} % ", wide)
+    most, least = (numbers(one)[-1] for one in cells("accuracy", foot, "`concurrent` on a block"))
+    says("force_differs", f"is {least:.0f} and {most:.0f} % too stiff")
+    coarse, fine = (max(map(abs, numbers(cells("accuracy", cube, n)[0]))) for n in ("8³", "12³"))
+    table = cells("exports", "## CalculiX", "the laws themselves")[0].strip("≤ ")
+    says("README", f"≤ {fine:.2f} ({coarse:.2f}) %; ≤ {100.0 * float(table):.3f} % |")
+
+
+def test_errors_that_runs_state():
+    counts = [
+        numbers(cells("accuracy", "## Measured errors", f"against {truth}")[0])
+        for truth in ("meshed roughness", "finer cells")
+    ]
+    kept, drawn = map(sum, zip(*counts, strict=True))
+    says("README", f"| in {kept:.0f} of {drawn:.0f} |")
+    says("accuracy", "Of forty scenes", "all kept", "in 1 to 7 s each")
+    says("choosing", "kept in 40 of 40 random scenes | 1 to 7 s |")
+
+
+def test_errors_of_discretisation():
+    for figures in ("4.8, 2.2, 0.75{} 0.35 %", "1.8, 0.9, 0.2{} 0.06 %", "10, 3.9{} 1.2 %"):
+        says("accuracy", figures.format(" and"))
+        says("force_differs", figures.format(","))
+    says("limits", "4 edges along the contact radius they are 38 % too stiff")
+    says("force_differs", "4 edges along the contact radius | 38 % too stiff |")
+
+
+def test_times_beside_peers():
+    def ratios(*rows):
+        columns = zip(*rows, strict=True)
+        return [[re.search(r"\(([\d.]+) ×\)", one)[1] for one in column] for column in columns]
+
+    section = "## The half-space model compared"
+    one = [cells("speed", section, f"{n}² |") for n in (128, 256, 512)]
+    kinds = ("periodic | 2", "periodic | 11", "free | 2", "free | 10")
+    two = [cells("speed", section, f"512² | {kind}")[-2:] for kind in kinds]
+    large = cells("speed", section, "2048² | periodic | 2 %")[-2:]
+    tamaas, mechanics = ratios(*(row[1:3] for row in one))
+    says(
+        "peers", f"{tamaas[0]} to {tamaas[-1]} times as", f"{mechanics[0]} to {mechanics[-1]} times"
+    )
+    spans = [(min(map(int, column)), max(map(int, column))) for column in ratios(*two)]
+    says("peers", "it is {} to {} and {} to {} times as long".format(*spans[0], *spans[1]))
+    huge = " and ".join(column[0] for column in ratios(large))
+    says("peers", f"cells {huge} times")
+    least, most = round(float(tamaas[0])), spans[1][1]
+    says("README", f"{least} to {most} times as fast", f"{huge} times as fast on 2048²")
+    says("choosing", ", ".join(row[0] for row in one) + " |")
+
+
+def test_other_times():
+    pad = re.compile(r"pad of (\d+ \d+) unknowns with a law at every point takes (\d+ s)")
+    unknowns, time = pad.search(TEXTS["speed"]).groups()
+    says("README", f"{unknowns} unknowns with a law takes {time} for 8 load steps on 2 ranks")
+    says("choosing", f"brake pad of {unknowns} unknowns, 8 load steps, 2 ranks: {time} |")
+    laws = cells("speed", "## Couplings", "consistent laws on the block")[0]
+    steps = numbers(cells("speed", "## Couplings", "100 load steps")[0])[0]
+    says("choosing", f"once, {laws} at 256² heights; then {10.0 * steps:.1f} ms a load step")
+
+
+def test_effect_of_a_hardness():
+    row = cells("engineering", "## Hardness", "4, first at 200 N")
+    approach, area = (numbers(one) for one in row[1:3])
+    says(
+        "force_differs",
+        "{:.1f} µm with a hardness of 2 GPa and {:.1f} µm without".format(*approach),
+        "contact area is {:.1f} and {:.1f} %".format(*area),
+    )
+
+
+def test_every_hard_case_is_in_the_table(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "demos")
+    for module in ("hard.blocks_and_loads", "hard.surfaces"):
+        import_module(module)  # which fills the list
+    for case in import_module("hard.bench").CASES:
+        says("hard_cases", f"| {case.number} | {case.hard} | {case.holds} |")
