@@ -7,6 +7,7 @@ import difflib
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from multiscale.exports.export import export_texts, remove_exports
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures
+from multiscale.output.results import pictures_of, surface_picture, write_pictures
 from multiscale.planning import plan
 from multiscale.planning.block_plan import memory_warnings
 from multiscale.planning.memory_costs import Launch
@@ -87,7 +88,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         assert table is not None
 
         def draw() -> Figure:
-            from multiscale.output.figures import law_figure
+            from multiscale.figures.curves import law_figure
 
             return law_figure(table)
 
@@ -127,13 +128,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         setup = _setup(scene, comm)
         terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
 
-        def draw() -> Figure:
-            from multiscale.output.figures import surface_figure_of
-
-            return surface_figure_of(setup)
-
         def write() -> list[Path]:
-            pictures = pictures_of("surface", draw)
+            pictures = pictures_of("surface", partial(surface_picture, setup))
             if pictures.problem:
                 terminal.say(None, pictures.problem)
             return write_pictures(folder, pictures.files)

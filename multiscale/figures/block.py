@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry import Surface
 from geometry.materials import von_mises
 from micro.half_space.stresses_below import stresses_below
+from multiscale.figures.contact import record_text
 from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
 
 Array = NDArray[np.float64]
@@ -59,6 +60,18 @@ def block_figure(
     said = f"cut along the row that carries most, half-space stresses; undeformed, {drawn}"
     figure.text(0.03, 0.905, said, fontsize=8, color="0.35")
     return figure
+
+
+def contact_block(surface: Surface, record: Any, poisson_ratio: float) -> Figure:
+    """Draw a rough surface with the contact of a load step, see `block_figure`.
+
+    Args:
+        surface: The surface.
+        record: A `multiscale.results.contact_record.ContactRecord` with pressures of its cells.
+        poisson_ratio: Poisson's ratio of the body.
+    """
+    pressure = np.asarray(record.pressure_MPa)
+    return block_figure(surface, pressure, poisson_ratio, title=record_text(record))
 
 
 class BlockView:

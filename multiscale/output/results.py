@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -17,6 +19,7 @@ from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
+from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 from support.collective import on_root, shared
 from support.errors import NotInstalled
@@ -56,17 +59,9 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     """
     drawn: list[Pictures] = []
     if run.scene.output.figures and run.steps:
-        names = ["overview", "surface", "curves"] + ["pressures"] * (not run.setup.samples)
-        face = _face_pressures(run)
-        names += ["face"] * (face is not None)
-        names += ["block"] * (run.scene.output.figures == "all" and has_block_figure(run))
-        names += ["contact"] * bool(run.contacts) + ["laws"] * (run.table is not None)
+        figures = list(_figures(run).items())
         with run.phase("output"):
-            drawn = shared(
-                run.comm,
-                len(names),
-                lambda index: pictures_of(names[index], lambda: _figure(run, names[index], face)),
-            )
+            drawn = shared(run.comm, len(figures), lambda index: pictures_of(*figures[index]))
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = {name: content for one in drawn for name, content in one.files.items()}
     with run.phase("writing"):
@@ -213,24 +208,45 @@ def _face_pressures(run: Run) -> NDArray[np.float64] | None:
     return None
 
 
-def _figure(run: Run, name: str, face: NDArray[np.float64] | None) -> Figure:
-    """Draw one figure; matplotlib is loaded only by ranks that draw."""
-    from multiscale.output import figures
+def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
+    """Return the functions that draw the figures of a run, by their names.
 
-    setup = run.setup
-    if name == "overview":
-        return figures.overview_figure(setup, run.history(), face)
-    if name == "surface":
-        return figures.surface_figure_of(setup)
-    if name == "curves":
-        return run.history().plot(run.scene.kind)
-    if name == "block":
-        return figures.block_figure_of(setup, run.contacts[-1])
-    if name == "contact":
-        return run.contacts[-1].plot()
-    if name == "face" and face is not None:
-        return figures.face_figure(face, run.history().steps[-1])
-    if name == "pressures":
-        return figures.pressure_figure(run.history())
-    assert run.laws is not None
-    return figures.law_figure(run.laws)
+    Note:
+        Collective; drawing is not.
+    """
+    setup, history, face = run.setup, run.history(), _face_pressures(run)
+    of_samples = bool(setup.samples)
+    figures: dict[str, Callable[[], Figure]] = {
+        "overview": _from("contact", "overview_figure", setup.surface, of_samples, history, face),
+        "surface": partial(surface_picture, setup),
+        "curves": partial(history.plot, run.scene.kind),
+    }
+    if not of_samples:
+        figures["pressures"] = _from("contact", "pressure_figure", history)
+    if face is not None:
+        figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
+    if run.scene.output.figures == "all" and has_block_figure(run):
+        ratio = setup.materials.first.poisson_ratio
+        figures["block"] = _from("block", "contact_block", setup.surface, run.contacts[-1], ratio)
+    if run.contacts:
+        figures["contact"] = run.contacts[-1].plot
+    if run.table is not None:
+        figures["laws"] = _from("curves", "law_figure", run.laws)
+    return figures
+
+
+def surface_picture(setup: ProblemSetup) -> Figure:
+    """Draw the surface of a scene, with its summits where the micro model uses them.
+
+    Args:
+        setup: The problem set up from the scene.
+    """
+    from multiscale.figures.surface import surface_figure  # loads matplotlib
+
+    summits = setup.asperities if setup.uses_summits else None
+    return surface_figure(setup.surface, summits, setup.patches, setup.scene.surface.spectrum)
+
+
+def _from(module: str, function: str, *arguments: Any) -> Callable[[], Figure]:
+    """Return what draws a figure; matplotlib is loaded only when it is called."""
+    return lambda: getattr(import_module(f"multiscale.figures.{module}"), function)(*arguments)
