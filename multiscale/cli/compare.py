@@ -49,10 +49,14 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
                 why = f": {result.failure}" if result.failure else ""
                 ended(f"{spent}  {one.name}: {result.status}{why}")
 
-            done = compare(
-                scene, comm, against=choice.against, budget_s=choice.budget, folder=folder,
-                begin=lambda one: begun(one.name), observe=observe,
-            )  # fmt: skip
+            try:
+                done = compare(
+                    scene, comm, against=choice.against, budget_s=choice.budget, folder=folder,
+                    begin=lambda one: begun(one.name), observe=observe,
+                )  # fmt: skip
+            except KeyboardInterrupt:
+                ended(f"interrupted: what is finished is in {folder}; the same call goes on")
+                raise
         files = on_root(comm, lambda: write_comparison(folder, done))
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
             terminal.say(comm, text)

@@ -155,6 +155,9 @@ def compare(
     Note:
         Collective.
     """
+    if any(one and one.heights is not None for one in (scene.surface, scene.counter_surface)):
+        allowed = "surface.file: save them, as by numpy.save"
+        raise InputError("are not compared in memory", key="surface.heights", allowed=allowed)
     if scene.body is not None:
         raise InputError("is a mesh, and a comparison makes its own", key="body", allowed="[block]")
     if against is not None and against not in AGAINST:

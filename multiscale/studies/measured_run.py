@@ -23,7 +23,7 @@ from multiscale.setup.memory import MemoryLacking
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.running import CaseResult, run_case
 from support.collective import on_root
-from support.errors import InputError, NotConverged, OutOfMemory, PatchlawError
+from support.errors import InputError, NotConverged, PatchlawError
 
 _CACHE = "PATCHLAW_CACHE"
 _SMALL = {"spectrum": {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
@@ -67,10 +67,12 @@ def measured_run(one: Configuration, comm: Any = None, seconds: float = math.inf
             return CaseResult(status="over budget", failure=why)
         except MemoryLacking as error:
             return CaseResult(status="not started", failure=str(error))
-        except (PatchlawError, MemoryError) as error:  # raised on all ranks
-            code = getattr(error, "exit_code", OutOfMemory.exit_code)
-            status = "refused" if code == InputError.exit_code else "failed"
-            result = CaseResult(status=status, failure=str(error))
+        except Exception as error:
+            if comm is not None and not isinstance(error, PatchlawError):
+                raise  # it need not be raised on all ranks
+            code = getattr(error, "exit_code", 1)
+            status = "refused" if isinstance(error, InputError) else "failed"
+            result = CaseResult(status=status, failure=str(error) or type(error).__name__)
     cpu = time.process_time() - start
     more = {"cpu_s": cpu if comm is None else comm.allreduce(cpu), "exit_code": code}
     result = replace(result, measured={**result.measured, **more})
@@ -86,7 +88,7 @@ def _fresh(scene: Scene, comm: Any) -> Iterator[None]:
     before, kind = os.environ.get(_CACHE), type(lru_cache(_small))
     os.environ[_CACHE] = "off"
     for one in gc.get_objects():
-        if isinstance(one, kind) and one.__module__.startswith(("micro", "macro")):
+        if isinstance(one, kind) and str(one.__module__).startswith(("micro", "macro")):
             one.cache_clear()
     try:
         with suppress(PatchlawError):  # the scene itself will report its error

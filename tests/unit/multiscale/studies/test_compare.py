@@ -166,6 +166,12 @@ def test_wrong_arguments(arguments, text):
         compare(Scene.load(PAPER, TINY), solve=solved, **arguments)
 
 
+def test_heights_in_memory_are_refused():
+    heights = {"heights": np.eye(8), "lengths": [1.0, 1.0]}
+    with pytest.raises(InputError, match=r"surface\.heights: are not compared in memory"):
+        compare(Scene.load(PAPER, TINY).with_({"surface": heights}))
+
+
 @pytest.mark.parametrize(
     ("text", "seconds"), [("5min", 300.0), ("90 s", 90.0), ("0.5 h", 1800.0), ("1e3 ms", 1.0)]
 )

@@ -209,6 +209,16 @@ def test_configuration_ends_with_the_load_step_in_which_its_time_is_over(some):
     assert result.failure.endswith("which was what the budget left")
 
 
+def test_a_crash_is_recorded_with_its_last_words(some, monkeypatch):
+    def crashing(self):
+        raise RuntimeError("out of luck")
+
+    monkeypatch.setattr(Run, "load_steps", crashing)
+    result = measured_run(some[0])
+    assert (result.status, result.measured["exit_code"]) == ("failed", 1)
+    assert result.failure == "out of luck"
+
+
 def test_refused_configuration_tells_why():
     scene = Scene.load(PAPER, ["patches.grid=[64, 64]", "block.cells=[8, 8, 4]"])
     result = measured_run(Configuration(name="", scene=scene))
