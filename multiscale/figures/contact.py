@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from multiscale.figures.maps import coarsened, colour_bar, draw_pressures, map_axes
+from multiscale.figures.maps import coarsened, colour_bar, draw_face, draw_pressures, map_axes
 from multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -32,8 +32,6 @@ _PER_DECADE = 8
 """Bars of the histogram per factor of ten in the area."""
 _MOST_OUTLINED = 500
 """Spots that have outlines; those of more would hide their colours."""
-MOST_POINTS = 40_000
-"""Points of a face that are drawn at most."""
 
 
 def load_text(step: Any) -> str:
@@ -231,28 +229,3 @@ def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
     mean = quantity(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")
     return figure
-
-
-def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
-    """Draw the pressures on a contact face of any outline.
-
-    What bears no pressure is pale grey, so that the outline is seen.
-
-    Args:
-        axes: Axes to draw into.
-        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
-    """
-    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
-    lengths = float(np.ptp(x)), float(np.ptp(y))
-    scale = map_axes(axes, lengths)
-    axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
-    inches = axes.get_position().width * axes.figure.get_figwidth()
-    size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
-    look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
-    loaded = pressure > 0.0
-    axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
-    place = scale * x[loaded], scale * y[loaded]
-    name, unit = usual_unit([float(pressure.max())], "MPa")
-    dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)
-    dots.set_clim(0.0, float(pressure.max()) / unit or 1.0)
-    colour_bar(dots, axes, f"contact pressure [{name}]")
