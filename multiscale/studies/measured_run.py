@@ -67,7 +67,9 @@ def measured_run(one: Configuration, comm: Any = None, seconds: float = math.inf
             return CaseResult(status="over budget", failure=why)
         except MemoryLacking as error:
             return CaseResult(status="not started", failure=str(error))
-        except _expected(comm) as error:
+        except Exception as error:
+            if comm is not None and not isinstance(error, PatchlawError):
+                raise  # it need not be raised on all ranks
             code = getattr(error, "exit_code", 1)
             status = "refused" if isinstance(error, InputError) else "failed"
             result = CaseResult(status=status, failure=str(error) or type(error).__name__)
@@ -75,11 +77,6 @@ def measured_run(one: Configuration, comm: Any = None, seconds: float = math.inf
     more = {"cpu_s": cpu if comm is None else comm.allreduce(cpu), "exit_code": code}
     result = replace(result, measured={**result.measured, **more})
     return result if comm is None else comm.bcast(result, root=0)
-
-
-def _expected(comm: Any) -> type[Exception]:
-    """Return the errors of a run that are raised on all its ranks alike."""
-    return Exception if comm is None else PatchlawError
 
 
 @contextmanager
@@ -94,7 +91,7 @@ def _fresh(scene: Scene, comm: Any) -> Iterator[None]:
         if isinstance(one, kind) and str(one.__module__).startswith(("micro", "macro")):
             one.cache_clear()
     try:
-        with suppress(_expected(comm)):  # the scene itself will report its error
+        with suppress(PatchlawError):  # the scene itself will report its error
             run_case(_small(scene), comm)
         yield
     finally:
