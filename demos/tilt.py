@@ -20,7 +20,7 @@ import numpy as np
 
 from geometry import Control, Material, PatchGrid, Spectrum, patch_means, synthesise
 from micro import HalfSpaceModel, influence_matrix
-from multiscale import CondensedCoupling, consistent_laws
+from multiscale import CondensedLaws, consistent_laws
 from multiscale.figures.style import GREEN, ONE_COLUMN, VERMILLION, new_figure, use_style
 
 parser = argparse.ArgumentParser()
@@ -46,7 +46,7 @@ def errors(seed: int, count: int, tilt: tuple[float, float]) -> tuple[float, flo
     largest = Control(approach=end, tilt=tilt)
     laws = consistent_laws(model, patches, mean_heights=means, largest=largest)
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
-    step = CondensedCoupling(laws, half_space).press(Control(approach=APPROACH, tilt=TILT))
+    step = CondensedLaws(laws, half_space).press(Control(approach=APPROACH, tilt=TILT))
     whole = model.respond([APPROACH], patches=patches, mean_heights=means, tilt=TILT)
     pressure = whole.patch_pressure[0]
     missed = np.abs(step.patches.pressure_MPa - pressure).max() / pressure.max()

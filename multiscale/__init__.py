@@ -1,8 +1,8 @@
 """Puts the scales together.
 
-A `Scene` becomes a problem setup: surface, summits, patches and micro model. The micro model gives
-every patch its law, and the laws act on the flat interface of an elastic block. The load steps
-become a `History`. A reference meshes the rough surface itself instead, and measures its own error.
+A `Scene` becomes its coupling: surface, bodies, micro model, and how they are put together. The
+coupling finds load steps: from contact problems, from patch laws on the flat interface of an
+elastic body, or on meshes of the rough surface itself. The load steps become a `History`.
 
 The public names and their modules stand in the stub ``__init__.pyi``, which editors and type
 checkers read too. A module is imported with the first use of one of its names, for speed.

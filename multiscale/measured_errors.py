@@ -30,10 +30,10 @@ from typing import Any
 
 from geometry import Control
 from micro import BodyModes, HalfSpaceModel, HalfSpaceState
-from multiscale.couplings.contact import SLOPES, OnBody
+from multiscale.bodies.on_body import SLOPES, OnBody
 from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import LoadHistory
 from multiscale.readable import Caution, percent, quantity
-from multiscale.setup.problem import ProblemSetup
 from support.collective import on_root_alone
 from support.errors import InputError
 
@@ -247,31 +247,13 @@ class _Problems:
         return replace(self._probe.on_body(model, order), tolerance=_RESIDUAL)
 
 
-def error_probe(setup: ProblemSetup, body: OnBody) -> ErrorProbe:
-    """Return what measures the errors of a scene's load steps.
-
-    Args:
-        setup: The problem, with a half-space model.
-        body: Puts this model on the scene's body, see `on_body`.
-    """
-    model, order = setup.model, SLOPES if setup.finite_slopes else 0
-    assert isinstance(model, HalfSpaceModel)
-    return ErrorProbe(
-        model=model,
-        on_body=body,
-        order=order,
-        by_laws=setup.uses_laws,
-        zero=setup.zero_error,
-    )
-
-
-def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> LoadStep:
+def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: Any) -> LoadStep:
     """Return a load step with its errors measured; rank 0 solves for all.
 
     Args:
         step: The load step.
-        setup: The problem, with a half-space model.
-        body: Puts this model on the scene's body, see `on_body`.
+        probe: Measures the errors.
+        load_history: The loads.
         comm: MPI communicator; None for this process alone.
 
     Raises:
@@ -280,7 +262,6 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
     Note:
         Collective.
     """
-    load_history, probe = setup.load_history, error_probe(setup, body)
     by_force, turns = load_history.quantity == "force", load_history.tilt is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
@@ -293,22 +274,6 @@ def checked(step: LoadStep, setup: ProblemSetup, body: OnBody, comm: Any) -> Loa
         approach_error_mm=approach if by_force else 0.0,
         errors=tuple(found.parts.items()),
     )
-
-
-def unmeasured(setup: ProblemSetup) -> str:
-    """Return why a run does not measure the errors of its load steps; empty where it does.
-
-    Args:
-        setup: The problem.
-    """
-    if setup.samples:
-        return "laws of samples have no measure of it, but for errors between rows and scatter"
-    if setup.meshes is not None:
-        several = len(setup.meshes.shapes) > 1
-        return "" if several else "one mesh has no error bar (reference.meshes = 2)"
-    if not isinstance(setup.micro, HalfSpaceModel):
-        return f"{setup.model.name} contacts have no measure of it, half-space has"
-    return "output.check = 'none'" if setup.scene.output.check == "none" else ""
 
 
 def error_notes(steps: list[LoadStep]) -> Iterator[str]:

@@ -144,3 +144,13 @@ def _fitting(value: float, unit: str) -> tuple[str, float]:
     if not value:
         return plain
     return next((one for one in prefixes if abs(value) >= one[1] * (1.0 - 1e-12)), prefixes[-1])
+
+
+def listed(parts: Iterable[str]) -> str:
+    """Return parts as a list in words.
+
+    Args:
+        parts: The parts, at least one.
+    """
+    *first, last = parts
+    return f"{', '.join(first)} and {last}" if first else last

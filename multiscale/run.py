@@ -1,53 +1,45 @@
-"""Runs a scene: problem setup, laws, coupling, load steps, history."""
+"""Runs a scene: its coupling, load steps, what is made of them, the history."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
-from micro import HalfSpaceModel, MicroModel
-from multiscale.contact_recorder import ContactRecorder
-from multiscale.couplings import assembly
-from multiscale.couplings.contact import OnBody, contact_model, on_body
-from multiscale.couplings.fields import FieldRecord
-from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.auto.keys import resolved_sections
+from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
+from multiscale.loading.clock import Clock
 from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import Coupling, LoadPosition, LoadStepper, Restorable
+from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
-from multiscale.measured_errors import checked, error_notes, unmeasured
-from multiscale.planning.auto_keys import resolved_sections
-from multiscale.planning.set_up import set_up
-from multiscale.readable import Observer
-from multiscale.readable import number as readable_number
+from multiscale.measured_errors import error_notes
+from multiscale.observers.contacts import ContactRecorder, StiffnessObserver
+from multiscale.observers.error_check import ErrorCheck
+from multiscale.observers.fields import FieldRecorder
+from multiscale.observers.observer import StepObserver
 from multiscale.results.accuracy_verdict import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.yielding_notes import energy_notes, yielding_notes
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import ProblemSetup
+from multiscale.setup import make_setup
 from multiscale.storage import digest
 from support.checked_store import Arrays
 from support.collective import on_root
 from support.packages import optional_packages
 
-_AFTER_UNLOADING = (
-    "errors of load steps after unloading are not measured: the plastic depth there is that of the "
-    "load steps before"
-)
-
 
 class Run:
-    """One scene, from its problem setup to its history.
+    """One scene, from its coupling to its history.
 
     All methods are collective over the communicator, and results are the same on every rank.
 
@@ -57,14 +49,11 @@ class Run:
         resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
-        observe: Called with what the run is at, once it is set.
+        clock: Measures the phases of the run, and tells an observer of them.
         given: The scene as the user wrote it.
         identity: All that its numbers depend on, see `multiscale.scene.identity`.
-        setup: The problem set up from it: surface, summits, patches, micro model.
+        coupling: What was made of the scene, and finds the load steps.
         scene: The scene with values for its auto keys.
-        seconds: Wall time of each phase so far [s].
-        table: The patch laws, once made, counted from first touch.
-        coupling: What finds the load steps, once made.
         steps: The load steps accepted so far, counted from first touch.
         fields: The states that the fields of chosen load steps are written from.
         position: Position in the load history after them.
@@ -73,63 +62,49 @@ class Run:
     def __init__(
         self, scene: Scene, comm: Any = None, resolved: Mapping[str, Any] | None = None
     ) -> None:
-        self._began = time.perf_counter()
+        self.clock = Clock()
         self.given, self.comm = scene, comm
-        self.observe: Observer | None = None
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
-        self.table: LawTable | None = None
-        self.coupling: Coupling | None = None
         self._start: Arrays = {}
         self._notes: list[str] = []
-        self._on_body: OnBody | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
-        assembly.load_finite_elements(scene, comm)
+        load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
-        self.setup: ProblemSetup = set_up(scene, comm, resolved=resolved, nodes=nodes)
-        self.scene, self.seconds = self.setup.scene, dict(self.setup.seconds)
-        self.fields = FieldRecord(self.setup, comm)
-        self._recorder = ContactRecorder(self.setup, comm)
-        self._until = time.perf_counter()
+        self.coupling: Coupling = make_setup(scene, comm, resolved=resolved, nodes=nodes)
+        self.clock.add(self.coupling.seconds)
+        self.coupling.clock = self.clock
+        self.scene = self.coupling.scene
+        self.fields = FieldRecorder(self.coupling)
+        self._contacts = ContactRecorder(self.coupling)
+        self._observers: list[StepObserver] = [self.fields]
+        if self.scene.output.contact != "none":
+            self._observers.append(StiffnessObserver(self.coupling))
+        self._observers.append(WorkObserver())
+        if self.scene.conductance is not None:
+            from multiscale.observers.conductance import ConductanceObserver  # others do without
 
-    def make_body(self) -> OnBody | None:
-        """Make what puts the half-space model on its body, once; None for other micro models."""
-        on_cells = isinstance(self.setup.micro, HalfSpaceModel) and not self.setup.samples
-        if self._on_body is None and on_cells:
-            with self.phase("block"):
-                self._on_body = on_body(self.setup, self.comm)
-        return self._on_body
+            self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
+        self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
-    def make_model(self) -> MicroModel:
-        """Make the micro model that contacts are solved with, on the body unless isolated."""
-        body = None if self.scene.kind == "isolated" else self.make_body()
-        with self.phase("block"):
-            return contact_model(self.setup, self.comm, body)
+    def phase(self, name: str) -> AbstractContextManager[None]:
+        """Measure the wall time of a phase, without that of phases within it.
 
-    def _model_on_body(self) -> MicroModel:
-        """Return the micro model on the body, of isolated laws too where it is half-space."""
-        return contact_model(self.setup, self.comm, self.make_body())
+        Args:
+            name: Its name.
+        """
+        return self.clock.phase(name)
 
     def make_laws(self) -> LawTable:
-        """Tabulate the laws of all patches, once."""
-        if self.table is None:
-            model = None if self.setup.samples else self.make_model()
-            with self.phase("laws"):
-                self.table = assembly.make_table(self.setup, model, self.comm, self.observe)
-        return self.table
+        """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
+        return self.coupling.make_laws()
 
-    def make_coupling(self) -> Coupling:
-        """Make what finds the load steps, once, and what it needs."""
-        if self.coupling is None:
-            with self.phase("block"):
-                made: LawTable | MicroModel | None = None
-                if self.setup.micro is not None:
-                    made = self.make_laws() if self.setup.uses_laws else self.make_model()
-                coupling = assembly.assemble(self.setup, made, self.comm)
-                if self._start and isinstance(coupling, Restorable):
-                    coupling.restore(self._start)
-                self.coupling = coupling
-        return self.coupling
+    def prepare(self) -> None:
+        """Make what load steps need, once: laws, bodies, a start from the steps so far."""
+        self.coupling.prepare()
+        if self._start:
+            self.coupling.restore(self._start)
+            self._start = {}
 
     def load_steps(self) -> Iterator[LoadStep]:
         """Yield the load steps as they are accepted, after making what they need.
@@ -137,92 +112,43 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        coupling = self.make_coupling()
-        stepper = LoadStepper(coupling, self.setup.load_history, self.position)
+        self.prepare()
+        stepper = LoadStepper(self.coupling, self.coupling.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
-                self._take_longer_laws(coupling)
-                self.fields.keep(coupling, step)
+                before = self.steps[-1] if self.steps else None
                 with self.phase("contact"):
-                    step = self._recorder.with_stiffness(step, coupling)
-                    step = with_work(step, self.steps[-1] if self.steps else None)
-                    if self.scene.conductance is not None:
-                        from multiscale.conductances import conducting  # others do without
+                    for observer in self._observers:
+                        step = observer.observe(step, before, last=self.finished)
+                self.steps.append(step)
+                yield step.counted_from(self.coupling.zero)
 
-                        step = conducting(step, coupling, self.setup)
-                self.steps.append(self._checked(step))
-                self.make_contact(last=self.finished)
-                yield self.steps[-1].counted_from(self.setup.zero)
-
-    def _take_longer_laws(self, coupling: Coupling) -> None:
-        """Take the laws of the coupling, which a load step may have extended."""
-        if isinstance(coupling, EmbeddedCoupling) and coupling.table is not self.table:
-            self.table = coupling.table
-            end = readable_number(self.table.largest_pressure)
-            self.remark([f"the laws were extended to {end} MPa, which a load step needed"])
-
-    def make_contact(self, *, last: bool = True) -> None:
-        """Record the contact of the last load step if the scene asks for it, once.
-
-        Args:
-            last: Whether no load step follows.
-
-        Note:
-            Collective.
-        """
-        if not self.steps:
-            return
-        with self.phase("contact"):
-            try:
-                made = self._recorder.record(self.steps[-1], self._model_on_body, last=last)
-                self.steps[-1] = made
-            except NotConverged as error:
-                step = self.steps[-1].step
-                self._notes.append(f"contact of load step {step} not found: {error}")
+    def finish(self) -> None:
+        """Let all that sees load steps know that none follows, also where the run ended early."""
+        if self.steps:
+            with self.phase("contact"):
+                for observer in self._observers:
+                    self.steps[-1] = observer.finish(self.steps[-1])
 
     @property
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
-        return tuple(self._recorder.records)
-
-    def _checked(self, step: LoadStep) -> LoadStep:
-        """Return a load step with its errors, where they are to be measured."""
-        check = self.scene.output.check
-        wanted = check == "all" or (check == "last" and self.finished)
-        if wanted and self._has_unloaded():
-            if _AFTER_UNLOADING not in self._notes:
-                self._notes.append(_AFTER_UNLOADING)
-            return step
-        if not wanted or (body := self.make_body()) is None:
-            return step
-        with self.phase("check"):
-            try:
-                return checked(step, self.setup, body, self.comm)
-            except NotConverged as error:
-                self._notes.append(f"errors of load step {step.step} not measured: {error}")
-                return step
+        return tuple(self._contacts.records)
 
     def _has_unloaded(self) -> bool:
-        """Tell whether the plastic depth at the last load step is not that of rising loads."""
-        history = self.setup.load_history
-        return self.scene.micro.hardness is not None and self.position.is_below_past(history)
-
-    @property
-    def times(self) -> dict[str, float]:
-        """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
-        rest = self._until - self._began - sum(self.seconds.values())
-        return {**self.seconds, "other": max(rest, 0.0)}
+        """Tell whether the load was larger at an earlier load step."""
+        return self.position.is_below_past(self.coupling.load_history)
 
     @property
     def finished(self) -> bool:
         """Whether the load history has come to its end."""
-        return self.position.is_at_end(self.setup.load_history)
+        return self.position.is_at_end(self.coupling.load_history)
 
     @cached_property
     def resolved(self) -> dict[str, Any]:
         """Values of the scene's auto keys."""
-        return resolved_sections(self.setup, self.given)
+        return resolved_sections(self.coupling, self.given)
 
     def state(self) -> Arrays:
         """Return what the coupling's next load step starts from.
@@ -230,7 +156,7 @@ class Run:
         Note:
             Collective.
         """
-        return self.coupling.state() if isinstance(self.coupling, Restorable) else self._start
+        return self._start or self.coupling.state()
 
     def resume(
         self,
@@ -250,60 +176,63 @@ class Run:
             contacts: What `contacts` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
-        self._recorder.resume(contacts)
+        self._contacts.records = list(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
         if laws:
-            self.table = read_laws(BytesIO(laws))
+            self.coupling.table = read_laws(BytesIO(laws))
 
     @cached_property
     def heights(self) -> str:
         """SHA-256 of the surface's heights, or of those of all samples."""
-        arrays = {"heights": self.setup.surface.heights}
-        for k, region in enumerate(self.setup.samples):
-            arrays |= {f"{k} {j}": one.heights for j, one in enumerate(region.surfaces)}
+        arrays = {"heights": self.coupling.surface.heights}
+        if self.coupling.regions is not None:
+            surfaces = enumerate(self.coupling.rough_surfaces)
+            arrays |= {f"{number}": surface.heights for number, surface in surfaces}
         return digest(arrays)
 
     @property
     def laws(self) -> LawTable | None:
         """The patch laws as they are shown, counted from the zero of the load; None without any."""
-        zero = self.setup.zero
-        if self.table is None or not zero:
-            return self.table
-        return self.table.counted_from(self.scene.loading.zero, zero)
+        zero, table = self.coupling.zero, self.coupling.table
+        if table is None or not zero:
+            return table
+        return table.counted_from(self.scene.loading.zero, zero)
 
     @property
     def law_bytes(self) -> bytes:
         """The law file's bytes; empty as long as there are no laws."""
-        return b"" if self.table is None else law_bytes(self.table)
+        return b"" if self.coupling.table is None else law_bytes(self.coupling.table)
 
     def history(self) -> History:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
-        steps, record, mesh_notes = assembly.with_mesh_errors(self.coupling, self.steps)
-        notes = [*assembly.approximation_notes(self.setup, self.table, self.steps), *self._notes]
-        notes += self._recorder.notes
-        hardness = self.scene.micro.hardness
-        if hardness is not None or not self.setup.samples:  # whose peaks are those of means
-            notes += yielding_notes(self.steps, hardness)
-        notes += energy_notes(self.steps)
-        if self.scene.conductance is not None:
-            from multiscale.conductances import conductance_notes  # other scenes do without
-
-            notes += conductance_notes(
-                self.steps, self.scene.conductance, with_laws=self.setup.uses_laws
-            )
-        by_force = self.setup.load_history.quantity == "force"
-        accuracy = verdict(steps, self.given.accuracy, unmeasured(self.setup), by_force=by_force)
-        kept = [] if accuracy is None else [accuracy.sentence]
-        zero = self.setup.zero
+        coupling, zero = self.coupling, self.coupling.zero
+        steps, record = coupling.with_mesh_errors(self.steps)
+        by_force = coupling.load_history.quantity == "force"
+        unmeasured = coupling.unmeasured()
+        accuracy = verdict(steps, self.given.accuracy, unmeasured, by_force=by_force)
         return History(
             steps=tuple(step.counted_from(zero) for step in steps),
-            patches=self.setup.regions or self.setup.patches,
-            seconds=self.times,
-            notes=(*kept, *notes, *error_notes(self.steps), *mesh_notes),
+            patches=coupling.regions or coupling.patches,
+            seconds=self.clock.times,
+            notes=(*([] if accuracy is None else [accuracy.sentence]), *self._all_notes()),
             accuracy=accuracy,
             reference=None if record is None else record.counted_from(zero),
             contact_records=self.contacts,
         )
+
+    def _all_notes(self) -> Iterator[str]:
+        """Yield what a report says, after the accuracy."""
+        coupling, hardness = self.coupling, self.scene.micro.hardness
+        yield from coupling.notes(self.steps)
+        yield from self._notes
+        for observer in self._observers:
+            yield from observer.notes(self.steps)
+        if hardness is not None or coupling.regions is None:  # whose peaks are those of means
+            yield from yielding_notes(self.steps, hardness)
+        yield from energy_notes(self.steps)
+        yield from error_notes(self.steps)
+        if self.steps:
+            yield from coupling.error_notes(self.steps)
 
     def remark(self, notes: Iterable[str]) -> None:
         """Add notes to the history, each once."""
@@ -312,48 +241,36 @@ class Run:
     @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        return assembly.unknowns(self.coupling)
+        return self.coupling.unknowns
 
     def write_fields(self, path: Path) -> None:
-        """Write the fields of the load steps that the scene names, see `FieldRecord.write`.
-
-        Those that an earlier run has found are pressed to again once the run is finished.
+        """Write the fields of the load steps that the scene names, see `FieldRecorder.write`.
 
         Args:
             path: File to write, ending in ``.xdmf``.
         """
         if self.finished:
-            self.fields.complete(self.make_coupling(), self.steps)
+            self.prepare()
         with self.phase("field"):
-            self.fields.write(path, self.coupling, self.steps)
+            self.fields.write(path, self.steps, finished=self.finished)
 
     def close(self) -> None:
-        """Free the blocks. Accepted load steps stay, fields are gone.
+        """Free the bodies. Accepted load steps stay, fields are gone.
 
         Note:
             Collective.
         """
-        meshed, self.coupling = assembly.meshed_blocks(self.coupling), None
-        self._recorder.release()
-        self.setup.bodies.release()
-        assembly.free_blocks(meshed)
+        for observer in self._observers:
+            observer.release()
+        self.coupling.release()
 
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        """Measure the wall time of a phase, without that of phases within it.
 
-        Args:
-            name: Its name in `seconds`.
-        """
-        if self.observe is not None:
-            self.observe(name, 0, 0)
-        start = time.perf_counter() - sum(self.seconds.values())
-        try:
-            yield
-        finally:
-            self._until = time.perf_counter()
-            spent = self._until - sum(self.seconds.values()) - start
-            self.seconds[name] = self.seconds.get(name, 0.0) + spent
+class WorkObserver(StepObserver):
+    """Adds the work of the plane since the start to load steps."""
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with the work of the plane."""
+        return with_work(step, before)
 
 
 @optional_packages()

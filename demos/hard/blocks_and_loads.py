@@ -13,7 +13,7 @@ from geometry import BlockShape, PatchGrid
 from geometry.rigid_plane import Control
 from macro import Block, Material, block_mesh
 from micro import influence_matrix
-from multiscale.couplings.condensed import equilibrium
+from multiscale.law_solvers.condensed import equilibrium
 from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from multiscale.laws.rows import LawRows
 

@@ -13,24 +13,22 @@ from typing import TYPE_CHECKING, Any
 
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
-from multiscale.couplings.assembly import check_has_laws, load_finite_elements
-from multiscale.couplings.body import scene_body
+from multiscale.couplings import describe
+from multiscale.couplings.cost import cost_statements
+from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.dispatch import coupling_class, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
+from multiscale.inputs.memory import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, surface_picture, write_pictures
-from multiscale.planning import plan
-from multiscale.planning.block_plan import memory_warnings
-from multiscale.planning.memory_costs import Launch
-from multiscale.planning.set_up import set_up
-from multiscale.planning.work import work_of
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
-from multiscale.setup.problem import ProblemSetup
+from multiscale.setup import make_setup
 from multiscale.storage import write_text
 from support.collective import on_root, on_root_alone
 from support.errors import InputError
@@ -51,17 +49,15 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     scene, _ = scene_and_folder(choice, comm)
     memory, ranks = peak_memory(), 1 if comm is None else comm.size
     load_finite_elements(scene, comm)
-    setup = _setup(scene, comm)
-    known = setup.bodies.first is None or bool(setup.samples) or scene_body(setup).is_cached()
-    launch = Launch.anew(memory, ranks, solves_face=not known)
-    work = on_root_alone(comm, lambda: work_of(setup, launch))
-    shortages = list(memory_warnings(setup, cluster_nodes(comm)))
-    terminal.show_plan(comm, setup, work, shortages)
+    coupling = _coupling(scene, comm)
+    cost = on_root_alone(comm, lambda: list(cost_statements(coupling, memory, ranks)))
+    shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
+    terminal.show_plan(comm, coupling, cost, shortages)
 
 
-def _setup(scene: Scene, comm: Any) -> ProblemSetup:
-    """Set the problem up, as if these nodes had any memory that it may take."""
-    return set_up(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
+def _coupling(scene: Scene, comm: Any) -> Coupling:
+    """Make the coupling of a scene, as if these nodes had any memory that it may take."""
+    return make_setup(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -78,11 +74,11 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     with locked(folder, comm):
         if not choice.overwrite:
             on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
-        check_has_laws(scene)
+        coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
-        terminal.show_plan(comm, run.setup)
+        terminal.show_plan(comm, run.coupling)
         with terminal.following(comm) as (begun, _):
-            run.observe = terminal.counting(begun)
+            run.clock.observe = terminal.counting(begun)
             run.make_laws()
         table = run.laws
         assert table is not None
@@ -93,9 +89,9 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             return law_figure(table)
 
         def write() -> list[Path]:
-            from multiscale.conductances import conducts_of
+            from multiscale.observers.conductance import conducts_of
 
-            conducts = conducts_of(run.setup)
+            conducts = conducts_of(run.coupling)
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
@@ -125,11 +121,11 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     with locked(folder, comm):
         if not choice.overwrite:
             on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
-        setup = _setup(scene, comm)
-        terminal.show_pairs(comm, _surface_facts(setup), setup.surface.notes)
+        coupling = _coupling(scene, comm)
+        terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
 
         def write() -> list[Path]:
-            pictures = pictures_of("surface", partial(surface_picture, setup))
+            pictures = pictures_of("surface", partial(surface_picture, coupling))
             if pictures.problem:
                 terminal.say(None, pictures.problem)
             return write_pictures(folder, pictures.files)
@@ -137,16 +133,16 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         terminal.show_files(comm, on_root(comm, write))
 
 
-def _surface_facts(setup: ProblemSetup) -> list[tuple[str, str]]:
+def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
     """Return statistics of a surface, each with its topic."""
-    rough, summits = roughness(setup.surface), setup.asperities
+    rough, summits = roughness(coupling.surface), coupling.asperities
     return [
-        ("surface", plan.surface_statement(setup)),
+        ("surface", describe.surface(coupling)),
         ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
         ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
         ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
         ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
-        ("highest point", f"{1e3 * setup.surface.highest:.6g} µm"),
+        ("highest point", f"{1e3 * coupling.surface.highest:.6g} µm"),
         ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
     ]
 

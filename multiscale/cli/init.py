@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from geometry.surface import Surface
+from multiscale.inputs.block import block_material, block_section
+from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import refuse_detached_processes
 from multiscale.output import terminal
 from multiscale.readable import quantity
@@ -21,7 +23,6 @@ from multiscale.scene.new_scene import (
 )
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
-from multiscale.setup.surface_and_block import block_material, block_section, make_surface
 from multiscale.storage import write_text
 from support.collective import on_root
 from support.errors import InputError

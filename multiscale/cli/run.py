@@ -74,7 +74,7 @@ def _announce(
         notice = f"nothing to resume in {folder}: begins with the first load step"
     elif on_root(comm, checkpoints.path.exists):
         notice = f"replaces the interrupted run in {folder}"
-    terminal.show_plan(comm, run.setup)
+    terminal.show_plan(comm, run.coupling)
     if notice:
         terminal.say(comm, notice)
     return True
@@ -91,12 +91,12 @@ def _run(
     if failure is not None and on_root(comm, lambda: is_finished(folder, run.identity)):
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
-        run.make_contact()
+        run.finish()
         files = write_results(folder, run, options=options)
         if run.scene.output.fields:
             files += write_fields(folder, run)
         terminal.show_history(comm, run.history())
-        terminal.show_times(comm, run.times)
+        terminal.show_times(comm, run.clock.times)
         terminal.show_files(comm, files)
     if isinstance(failure, NotConverged):
         raise failure.advised(f"a changed scene needs --overwrite, or another folder than {folder}")
@@ -110,14 +110,14 @@ def _make_load_steps(
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
     load_history = run.scene.loading.load_history
-    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.observe):
+    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
-            if run.setup.uses_laws:
+            if run.coupling.has_laws:
                 run.make_laws()
             checkpoints.write()
             interruption.check("before the block was made")
             with optional_packages():
-                run.make_coupling()
+                run.prepare()
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
                 checkpoints.accept()

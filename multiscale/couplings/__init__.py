@@ -1,11 +1,10 @@
-"""Couplings: from what is prescribed of the rigid plane to a load step.
+"""One class for each coupling: all that a scene is used for, from its sections to its fields.
 
-    analytic, concurrent     one contact problem per load step             `contact`
-    consistent, isolated     patch laws on the mesh of a block             `law_couplings`
-                             patch laws on the compliance of its patches,
-                             by a dense Newton's method                    `condensed`
-    reference                the rough surface meshed                      `reference`
+    analytic, concurrent     one contact problem per load step              `contact`
+    consistent, isolated     a law for every patch                          `patch_laws`
+    representative           laws of periodic samples at points             `representative`
+    reference                the rough surface meshed                       `reference`
 
-`body` makes what the block of a scene is in each of them. `assembly` puts laws, block and coupling
-together, and chooses between mesh and patches.
+`dispatch` is the only place that asks which coupling a scene has. `coupling` has what all share,
+`scene_parts` what is known of the scene alone.
 """

@@ -5,90 +5,166 @@ Theory: docs/theory.md, section 12.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
+from micro import HalfSpaceModel
 from micro.contact_detail import ContactDetail, peaks_of
+from multiscale.couplings import describe
+from multiscale.couplings.coupling import Coupling, Facts
+from multiscale.couplings.estimate import estimated_plane
+from multiscale.couplings.pressed_surface import PressedSurface
+from multiscale.couplings.work import SET_UP_CYCLES, Work
+from multiscale.inputs.block import block_material, block_section
+from multiscale.inputs.reference_meshes import (
+    ReferenceMeshes,
+    reference_meshes,
+    reference_requests,
+)
+from multiscale.inputs.surfaces import located
 from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import step_count
+from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.results.reference_record import ReferenceRecord, reference_record
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import block_material, block_section, located
+from multiscale.scene.scene import Scene
 from multiscale.storage import packed, unpacked
 from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, MeshQuality, UnilateralContactProblem, UnilateralContactState
+    from macro import MeshQuality, UnilateralContactProblem, UnilateralContactState
 
 Array = NDArray[np.float64]
 
+_CYCLES = {1: 30.0, 2: 60.0}
+"""Multigrid cycles of a load step by degree: 15 to 44, and 51 to 90."""
 _NO_AREA = 1e-9
 """Area of a node, relative to the largest, that counts as none."""
 
 
-class ReferenceCoupling:
+class RoughMesh(NamedTuple):
+    """A meshed rough block.
+
+    Attributes:
+        problem: Its contact problem.
+        quality: How far the roughness has deformed its cells.
+    """
+
+    problem: UnilateralContactProblem
+    quality: MeshQuality
+
+
+@dataclass(kw_only=True, eq=False)
+class ReferenceCoupling(PressedSurface):
     """The rough surface of a block, meshed ever finer and pressed alike at every load step.
 
     All meshes see the same loads, halved steps included, and every accepted step has its error bar.
-
-    Args:
-        setup: The problem set up from a scene, of a reference. Its patches are what results are
-            summed over; they do not change the solution.
-        problems: The contact problems of the meshes, the finest last, with the patches on its top.
-        qualities: How far the roughness has deformed the cells of every mesh.
+    The patches are what results are summed over; they do not change the solution.
 
     Attributes:
-        qualities: The same.
+        rough_meshes: The meshes, from coarse to fine.
     """
 
-    def __init__(
-        self,
-        setup: ProblemSetup,
-        problems: Sequence[UnilateralContactProblem],
-        qualities: Sequence[MeshQuality],
-    ) -> None:
-        assert setup.meshes is not None
-        self._surface, self._patches, self._meshes = setup.surface, setup.patches, setup.meshes
-        self._problems, self.qualities = tuple(problems), tuple(qualities)
-        self._last: tuple[UnilateralContactState, ...] = ()
+    rough_meshes: ReferenceMeshes
+    _last: tuple[UnilateralContactState, ...] = field(default=(), init=False)
+
+    @classmethod
+    def from_scene(
+        cls,
+        scene: Scene,
+        facts: Facts,
+        nodes: ClusterNodes,
+        *,
+        like: Coupling | None = None,
+        cells: tuple[int, int] | None = None,
+    ) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
+        parts = cls._parts(scene, facts, nodes, like)
+        began, surface = time.perf_counter(), parts["surface"]
+        model = HalfSpaceModel(
+            surface,
+            contact_modulus=parts["materials"].contact_modulus,
+            periodic=scene.surface.periodic,
+            hardness=scene.micro.hardness,
+        )
+        plane = estimated_plane(parts["load_history"], model)
+        parts["seconds"]["load estimate"] = time.perf_counter() - began
+        meshes = reference_meshes(scene, surface, plane, nodes)
+        return cls(plane_at_largest_load=plane, rough_meshes=meshes, **parts)
+
+    @classmethod
+    def meshes_block(cls, scene: Scene) -> bool:
+        """Tell whether a flat block is meshed: never beside the rough ones."""
+        return False
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the meshes that it works on."""
+        size = 1e3 * float(self.rough_meshes.sizes[-1])
+        return f"reference, meshed with edges of {size:.3g} µm"
+
+    # --- load steps
+
+    @cached_property
+    def _made(self) -> list[RoughMesh]:
+        """The rough blocks, meshed when first needed; collective."""
+        from mpi4py import MPI
+
+        from macro import Block, UnilateralContactProblem, rough_block_mesh
+
+        made, surface = [], self.surface
+        material, sides = block_material(self.scene), block_section(self.scene).sides
+        for shape in self.rough_meshes.shapes:
+            finest = shape is self.rough_meshes.shapes[-1]
+            with located(self.scene, "surface"):
+                mesh, quality = rough_block_mesh(shape, surface, self.comm or MPI.COMM_SELF)
+            problem = UnilateralContactProblem(
+                Block(mesh, material, sides=sides),
+                surface.highest - surface.mean_height,
+                method=self.scene.reference.method,
+                patches=self.patches if finest else None,
+            )
+            made.append(RoughMesh(problem, quality))
+        return made
+
+    @property
+    def _problems(self) -> list[UnilateralContactProblem]:
+        return [one.problem for one in self._made]
 
     @property
     def finest(self) -> UnilateralContactProblem:
         """The contact problem that the load steps are those of."""
-        return self._problems[-1]
+        return self._made[-1].problem
 
-    @property
-    def blocks(self) -> list[ElasticBody]:
-        """The rough blocks, the finest last."""
-        return [problem.body for problem in self._problems]
+    def prepare(self) -> None:
+        """Mesh the rough blocks, once."""
+        with self.clock.phase("block"):
+            _ = self._made
 
-    @property
-    def latest(self) -> UnilateralContactState:
-        """The finest block at the latest load step.
-
-        Raises:
-            ValueError: Before the first load step.
-        """
-        if not self._last:
-            raise ValueError("no load step has been accepted yet")
-        return self._last[-1]
+    def contact_state(self) -> Any:
+        """Return the finest block at the latest load step; None before the first."""
+        return self._last[-1] if self._last else None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step on every mesh; see `Coupling.press`."""
         self._last = states = tuple(problem.solve(control) for problem in self._problems)
-        finest, nominal = states[-1], self._patches.area * self._patches.count
+        finest, nominal = states[-1], self.patches.area * self.patches.count
         # patches count whole nodes; all together they have the area with its border in the facets
         share = finest.contact_area_fine / finest.contact_area if finest.contact_area else 0.0
         return LoadStep.of_patches(
-            self._patches,
+            self.patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
             closure=finest.patch_closure,
-            pressure=finest.patch_force / self._patches.area,
-            area_fraction=share * finest.patch_area / self._patches.area,
+            pressure=finest.patch_force / self.patches.area,
+            area_fraction=share * finest.patch_area / self.patches.area,
             separation=finest.mean_separation,
             contacts=finest.contacts,
             newton_iterations=sum(state.active_sets for state in states),
@@ -101,13 +177,15 @@ class ReferenceCoupling:
             ),
         )
 
-    def detail(self, latest: UnilateralContactState) -> ContactDetail:
-        """Return the contact of a load step in detail; see `HasContact`.
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail]:
+        """Return the spots and fields of the contact of a load step; see `Coupling.contact`.
 
         The area of a spot is that of its nodes times the area with its border in the facets over
         that of all nodes, so that the areas of all spots add up to the load step's.
         """
         from macro import nodal_contact
+
+        latest: UnilateralContactState = state
 
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)
@@ -115,7 +193,7 @@ class ReferenceCoupling:
         share = latest.contact_area_fine / latest.contact_area if latest.contact_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > _NO_AREA * nodes.area.max()
-        return ContactDetail(
+        contact = ContactDetail(
             place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
             area=share * np.bincount(region, nodes.area[touching], minlength=count),
             force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
@@ -125,55 +203,66 @@ class ReferenceCoupling:
             pressure=nodes.pressure[some],
             gap=nodes.gap[some],
         )
+        return step, contact
 
     def state(self) -> Arrays:
-        """Return the plane on every mesh; see `Restorable`."""
+        """Return the plane on every mesh."""
         return packed(tuple((state.approach, *state.tilt) for state in self._last))
 
     def restore(self, state: Arrays) -> None:
-        """Press every mesh by its plane again; see `Restorable`."""
+        """Press every mesh by its plane again."""
         planes = unpacked(state, ()) if state else ()
         self._last = tuple(
             problem.solve(Control(approach=approach, tilt=(tx, ty)))
             for problem, (approach, tx, ty) in zip(self._problems, planes, strict=False)
         )
 
-    def record(self, steps: Sequence[LoadStep]) -> ReferenceRecord:
-        """Return the results of all meshes together, with their error bars.
+    def with_mesh_errors(
+        self, steps: Sequence[LoadStep]
+    ) -> tuple[tuple[LoadStep, ...], ReferenceRecord | None]:
+        """Return load steps with the errors of the meshes, and the results of all meshes.
 
         Where all meshes miss contacts that must exist, their agreement is no error bar.
 
         Args:
             steps: Load steps of this coupling.
         """
-        meshes = self._meshes
+        record = self.all_meshes(steps)
+        return record.with_errors(steps), record
+
+    def all_meshes(self, steps: Sequence[LoadStep]) -> ReferenceRecord:
+        """Return the results of all meshes together, with their error bars.
+
+        Args:
+            steps: Load steps of this coupling.
+        """
+        meshes = self.rough_meshes
         record = reference_record(
             steps,
             meshes.sizes,
-            [block.dofs for block in self.blocks],
+            [one.problem.body.dofs for one in self._made],
             force_order=meshes.force_order,
             area_order=meshes.area_order,
         )
         return record.without_bars(np.array([self._misses(step) for step in steps], dtype=bool))
 
-    def notes(self, record: ReferenceRecord, steps: Sequence[LoadStep]) -> Iterator[str]:
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the errors of the reference.
 
         Args:
-            record: What `record` returned.
             steps: Load steps of this coupling.
         """
-        yield record.sentence
+        yield self.all_meshes(steps).sentence
         missed = [step.step for step in steps if self._misses(step)]
         if missed:
             yield (
                 f"no node of the finest mesh touches in {len(missed)} of {len(steps)} load steps, "
                 f"first in step {missed[0]}, though the plane lies below the surface's highest "
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
-                f"{self._meshes.key}"
+                f"{self.rough_meshes.key}"
             )
-        thinnest = min(quality.thinnest for quality in self.qualities)
-        steepest = max(quality.steepest for quality in self.qualities)
+        thinnest = min(one.quality.thinnest for one in self._made)
+        steepest = max(one.quality.steepest for one in self._made)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
@@ -181,39 +270,90 @@ class ReferenceCoupling:
 
     def _misses(self, step: LoadStep) -> bool:
         """Whether no node touches though the plane lies below the surface's highest point."""
-        arm = np.subtract(self._surface.highest_point, np.multiply(0.5, self._surface.lengths))
+        arm = np.subtract(self.surface.highest_point, np.multiply(0.5, self.surface.lengths))
         return not step.contacts and step.approach_mm + float(arm @ np.asarray(step.tilt)) > 0.0
 
+    def unmeasured(self) -> str:
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        several = len(self.rough_meshes.shapes) > 1
+        return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
-def make_reference(setup: ProblemSetup, comm: Any) -> ReferenceCoupling:
-    """Mesh the rough block of a scene, as often as it asks for.
+    # --- fields and record
 
-    Args:
-        setup: The problem set up from the scene, of a reference.
-        comm: MPI communicator; None for this process alone.
+    def field_state(self, step: LoadStep) -> Any:
+        """Return the finest block at the latest load step."""
+        return self.contact_state()
 
-    Raises:
-        InputError: When the roughness is too steep for a mesh.
+    def write_fields(
+        self, path: Path, states: Mapping[int, Any], steps: Sequence[LoadStep]
+    ) -> None:
+        """Write the fields of the finest rough block."""
+        from macro import write_rough_fields
 
-    Note:
-        Collective.
-    """
-    from mpi4py import MPI
+        write_rough_fields(path, self.finest, sorted(states.items()))
 
-    from macro import Block, UnilateralContactProblem, rough_block_mesh
+    @property
+    def unknowns(self) -> int | None:
+        """Degrees of freedom of the finest mesh, once it is made."""
+        return self.finest.body.dofs if "_made" in self.__dict__ else None
 
-    assert setup.meshes is not None
-    scene, surface, problems, qualities = setup.scene, setup.surface, [], []
-    for shape in setup.meshes.shapes:
-        finest = shape is setup.meshes.shapes[-1]
-        with located(scene, "surface"):
-            mesh, quality = rough_block_mesh(shape, surface, comm or MPI.COMM_SELF)
-        problem = UnilateralContactProblem(
-            Block(mesh, block_material(scene), sides=block_section(scene).sides),
-            surface.highest - surface.mean_height,
-            method=scene.reference.method,
-            patches=setup.patches if finest else None,
+    def meshed_bodies(self) -> list[Any]:
+        """Return the rough blocks, the finest last."""
+        return [one.problem.body for one in self._made] if "_made" in self.__dict__ else []
+
+    def _drop_solvers(self) -> None:
+        self.__dict__.pop("_made", None)
+        self._last = ()
+
+    def record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the coupling alone, by name."""
+        qualities = [one.quality for one in self._made] if "_made" in self.__dict__ else []
+        return {"method": self.scene.reference.method, "mesh_quality": qualities}
+
+    # --- what is known before the run
+
+    def memory_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what a run needs memory for, with its meshes."""
+        yield from super().memory_requests()
+        yield from reference_requests(self.scene, self.rough_meshes)
+
+    def work(self, ranks: int = 1) -> Work:
+        """Count what a run computes; see `Coupling.work`."""
+        unknowns = sum(self.rough_meshes.unknowns)
+        steps = step_count(self.scene.loading.load_history)
+        cycles = SET_UP_CYCLES + steps * _CYCLES[self.rough_meshes.degree]
+        return Work(unknowns=unknowns, cycles=unknowns * cycles, ranks=ranks)
+
+    def model_statement(self) -> str:
+        """Say that there is no micro model."""
+        return "none: contacts are meshed, and the keys of [micro] are not used"
+
+    def coupling_statement(self) -> str:
+        """Say how the rough surface is pressed."""
+        x, y = self.patches.grid
+        return (
+            "reference: the rough surface itself, meshed and pressed by "
+            f"{self.scene.reference.method}; {x} × {y} patches gather the results"
         )
-        problems.append(problem)
-        qualities.append(quality)
-    return ReferenceCoupling(setup, problems, qualities)
+
+    def body_statements(self) -> Iterator[tuple[str, str]]:
+        """Yield what the meshes are."""
+        sides = block_section(self.scene).sides
+        yield "block", f"{self.rough_meshes.statement}; {sides} sides"
+
+    def error_statement(self) -> str:
+        """Say how the run will know its error."""
+        why = self.unmeasured()
+        told = "the meshes of the reference tell it, at every load step"
+        return f"not measured: {why}" if why else told
+
+    def body_warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the block and of its meshes."""
+        yield from describe.proportions(self)
+        yield from self.rough_meshes.warnings()
+        yield from describe.locking(self.materials.first.poisson_ratio, self.rough_meshes.degree)
+
+    @property
+    def shows_cells(self) -> bool:
+        """Whether pressures of cells will be known: those of nodes are."""
+        return False

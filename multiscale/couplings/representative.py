@@ -1,4 +1,4 @@
-"""Laws of periodic samples on the contact face of a scene's body.
+"""The coupling with laws of periodic samples at the points of a contact face.
 
 Theory: docs/theory.md, sections 10 and 11.
 """
@@ -6,221 +6,383 @@ Theory: docs/theory.md, sections 10 and 11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, Surface
-from micro import FiniteSlopes, HalfSpaceModel
-from multiscale.couplings.law_couplings import EmbeddedCoupling
-from multiscale.couplings.patch_compliance import embedding
+from geometry import Control, PatchGrid, Regions, RigidPlane, Surface
+from geometry.plausibility import check_finite_slopes
+from geometry.statistics import roughness
+from micro import HalfSpaceModel
+from multiscale.couplings import describe
+from multiscale.couplings.coupling import Coupling, Facts
+from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
+from multiscale.couplings.sample_laws import SampleLaws
+from multiscale.couplings.work import (
+    BYTES_PER_CELL,
+    PRODUCTS,
+    SET_UP_CYCLES,
+    SLOPES_PRODUCTS,
+    SOLUTIONS_OF_LAWS,
+    Work,
+)
+from multiscale.inputs.block import LAW_BLOCK_CELLS, Cells, make_shape
+from multiscale.inputs.body_facts import BodyFacts, second_material
+from multiscale.inputs.loads import check_load, load_history_on
+from multiscale.inputs.memory import law_requests
+from multiscale.inputs.surfaces import RegionSamples, located, region_samples, sample_surface
+from multiscale.law_solvers.embedded import EmbeddedLaws
 from multiscale.laws.law_table import LawTable
-from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import BeyondLaws
-from multiscale.readable import Observer
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.samples import RegionSamples
+from multiscale.loading.stepper import BeyondLaws, step_count
+from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.readable import Observer, number, quantity
+from multiscale.scene.scene import Scene
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LawContactProblem, LoadedFace
+    from macro import FacePair, LoadedFace
 
 Array = NDArray[np.float64]
 
-_CONCENTRATION = 10.0
-"""Largest local pressure that laws are made for, over the mean one on the face."""
-_CROWNED = 2.0
-"""The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
-_YIELDED = 0.95
-"""Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
-then, and at it the pressure is no function of closure."""
-_EXTENSION = 2.0
-"""Largest pressure of laws that turned out to end too early, over that of the earlier ones."""
-_RESERVE = 0.15
-"""Closure that laws are made for beyond the largest approach on the face, relative to it."""
+_TOLERANCE = 5e-4
+"""Interpolation error of laws by default."""
+_CYCLES_AT_POINTS = 24
+"""Multigrid cycles of a load step with laws at points: 6 to 60 on four parts."""
+_MANY_SAMPLES = 4.0
+"""Sides of a face over those of its sample below which its law is hardly representative."""
+_HALF_SPACE = 0.95
+"""Mean displacement of a square of a half-space by a uniform pressure, times E*, over its side."""
 
 
-def face_laws(
-    setup: ProblemSetup,
-    comm: Any,
-    observe: Observer | None = None,
-    *,
-    before: LawTable | None = None,
-) -> LawTable:
-    """Tabulate the laws of the samples of a scene, one for each region of its face.
+@dataclass(kw_only=True, eq=False)
+class RepresentativeCoupling(LawCoupling):
+    """Laws of samples on the contact face of a body; they are extended where a step needs it.
 
-    Args:
-        setup: The problem set up from the scene, with laws of samples.
-        comm: MPI communicator; None for this process alone.
-        observe: Called as rows are made.
-        before: Laws that end too early. They are extended to twice their largest pressure, or as
-            far as the material allows; where that is no further they come back as they are.
-
-    Raises:
-        NotConverged: When the micro model does not converge.
-
-    Note:
-        Collective.
-    """
-    hardness = setup.scene.micro.hardness
-    most = math.inf if hardness is None else _YIELDED * hardness
-    if before is None or not (reached := before.largest_pressure):
-        pressure, closure = largest_loads(setup, comm)
-    else:
-        pressure, closure = _EXTENSION * reached, None
-        most = min(most, setup.materials.contact_modulus)
-    pressure = min(pressure, most)
-    models = {
-        id(one): _model(setup, region, one) for region in setup.samples for one in region.surfaces
-    }
-    found = representative_laws(
-        {region.name: region.surfaces for region in setup.samples},
-        setup.materials.contact_modulus,
-        largest_pressure=pressure,
-        largest_closure=closure,
-        tolerance=setup.table_tolerance,
-        most_rows=setup.table_rows,
-        make_model=lambda sample: models[id(sample)],
-        before=before,
-        comm=comm,
-        observe=observe,
-    )
-    if before is not None and found.rows == before.rows:
-        return before
-    return found
-
-
-def _model(setup: ProblemSetup, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
-    """Return the periodic model of a sample, with the slopes of its body where they count."""
-    pair = region.materials
-    assert isinstance(setup.model, HalfSpaceModel)
-    model = replace(setup.model, surface=sample, contact_modulus=pair.contact_modulus)
-    if not setup.finite_slopes:
-        return model
-    return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
-
-
-def largest_loads(setup: ProblemSetup, comm: Any) -> tuple[float, float | None]:
-    """Return the largest local pressure that laws are made for [MPa], and closure [mm].
-
-    The closure is None where only a force, or other loads of the body, would tell it.
-
-    Args:
-        setup: The problem set up from the scene, with laws of samples.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    assert setup.face is not None
-    stated, face = setup.scene.law.largest_pressure, setup.face
-    history, body = setup.load_history, setup.bodies.first
-    if history.quantity == "force":
-        force = history.largest
-        mean = force / face.area
-        return stated or max(_CONCENTRATION * mean, _hertz(setup, force=force)), None
-    tilt = history.tilt or (0.0, 0.0)
-    approach = history.largest + 0.5 * float(np.abs(np.multiply(face.lengths, tilt)).sum())
-    mean = approach / mean_compliance(setup, comm)
-    pressure = stated or max(_CONCENTRATION * mean, _hertz(setup, approach=approach))
-    preloaded = body is not None and body.body.preload is not None
-    return pressure, None if preloaded else (1.0 + _RESERVE) * approach
-
-
-def mean_compliance(setup: ProblemSetup, comm: Any) -> float:
-    """Return the mean displacement of a face by a uniform unit pressure [mm/MPa].
-
-    Args:
-        setup: The problem set up from the scene, with laws of samples.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Collective.
-    """
-    from macro import FacePair, displacements_under
-
-    face = embedding(setup, comm)
-    total = 0.0
-    for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
-        found = displacements_under(one, np.ones((1, one.patches.count)))[0]
-        total += float(found @ one.areas / one.areas.sum())
-    return total
-
-
-def _hertz(setup: ProblemSetup, *, force: float = 0.0, approach: float = 0.0) -> float:
-    """Return a bound of the pressure between smooth crowned bodies; 0 without a crown [MPa].
-
-    Source:
-        Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
-    """
-    radii = [one for one in setup.scene.law.crown or () if one != "inf"]
-    if not radii:
-        return 0.0
-    assert setup.face is not None
-    modulus, radius = setup.materials.contact_modulus, math.sqrt(math.prod(radii))
-    if len(radii) == 1:
-        radius, length = radii[0], min(setup.face.lengths)
-        line = math.sqrt(force / length * modulus / (math.pi * radius))
-        return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
-    point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
-    return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
-
-
-class FaceCoupling(EmbeddedCoupling):
-    """Laws of samples on the contact face of a body; they are extended where a load step needs it.
-
-    Args:
-        setup: The problem set up from the scene, with laws of samples.
-        table: The laws.
-        comm: MPI communicator; None for this process alone.
-
-    Note:
-        Construction and all methods are collective.
+    Attributes:
+        samples: The samples of every region of the face.
+        model: Micro model of the first sample, the periodic half-space.
     """
 
-    def __init__(self, setup: ProblemSetup, table: LawTable, comm: Any) -> None:
-        self._setup, self._comm = setup, comm
-        face = embedding(setup, comm)
-        super().__init__(self._problem_with(table, face), table, face)
+    samples: tuple[RegionSamples, ...]
+    model: HalfSpaceModel
+    _extensions: list[str] = field(default_factory=list, init=False)
+
+    @classmethod
+    def from_scene(
+        cls,
+        scene: Scene,
+        facts: Facts,
+        nodes: ClusterNodes,
+        *,
+        like: Coupling | None = None,
+        cells: tuple[int, int] | None = None,
+    ) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
+        began = time.perf_counter()
+        cls.check_memory(scene, nodes)
+        face, counter = facts
+        if face is None:
+            sample = sample_surface(scene, scene.surface, "surface")
+            face = BodyFacts.of_block(scene, make_shape(scene, sample, cls.cells_unstated(scene)))
+        samples = region_samples(scene, face.materials, second_material(scene, counter))
+        surface, materials = samples[0].surfaces[0], samples[0].materials
+        surfaces = tuple(one for region in samples for one in region.surfaces)
+        check_load(scene, surfaces, face.area, face)
+        model = HalfSpaceModel(
+            surface,
+            contact_modulus=materials.contact_modulus,
+            periodic=True,
+            hardness=scene.micro.hardness,
+        )
+        return cls(
+            scene=scene,
+            surface=surface,
+            patches=PatchGrid(grid=(1, 1), lengths=surface.lengths),
+            materials=materials,
+            body=face,
+            counter=counter,
+            load_history=load_history_on(scene, surfaces),
+            seconds={"surface": time.perf_counter() - began},
+            samples=samples,
+            model=model,
+        )
+
+    @classmethod
+    def cells_unstated(cls, scene: Scene) -> Cells:
+        """Return the cells of a block that a scene states none for."""
+        return LAW_BLOCK_CELLS
+
+    def __post_init__(self) -> None:
+        """Refuse finite slopes of samples that are too steep for them."""
+        if self.finite_slopes:
+            with located(self.scene, "micro.finite_slopes"):
+                for surface in self.rough_surfaces:
+                    check_finite_slopes(surface)
+
+    @classmethod
+    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that a scene needs."""
+        yield from super().requests(scene)
+        yield from law_requests(scene)
+
+    # --- what is known before the run
+
+    @property
+    def regions(self) -> Regions:
+        """The regions of the face."""
+        return Regions(tuple(region.name for region in self.samples))
+
+    @property
+    def area(self) -> float:
+        """Nominal contact area [mm²]."""
+        return self.body.area
+
+    @property
+    def rough_surfaces(self) -> tuple[Surface, ...]:
+        """All samples of all regions."""
+        return tuple(one for region in self.samples for one in region.surfaces)
+
+    @property
+    def finite_slopes(self) -> bool:
+        """Whether finite slopes of the samples count: where the scene says so."""
+        return bool(self.scene.micro.finite_slopes)
+
+    @property
+    def shown_bodies(self) -> list[BodyFacts]:
+        """What is known of the bodies that the record of a run tells."""
+        return [self.body] if self.counter is None else [self.body, self.counter]
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the cells that it works on."""
+        x, y = self.surface.grid
+        return f"representative on {x} × {y} cells"
+
+    @property
+    def table_tolerance(self) -> float:
+        """Interpolation error that laws are tabulated to."""
+        return self.scene.coupling.table_tolerance or _TOLERANCE
+
+    @property
+    def sample_plane(self) -> RigidPlane | None:
+        """The plane on a sample at the largest approach; None under a force.
+
+        The body takes part of the approach, and the plane is an upper bound.
+        """
+        if self.load_history.quantity == "force":
+            return None
+        mean = self.model.reference_height - self.surface.mean_height
+        return RigidPlane.above(self.surface, min(self.load_history.largest, mean))
+
+    def newton(self, table: LawTable | None = None) -> NewtonChoice:
+        """Choose the Newton that load steps are found with."""
+        return NewtonChoice(False, "laws of samples hold at the points of the mesh")
+
+    def work(self, ranks: int = 1) -> Work:
+        """Count what a run computes; see `Coupling.work`."""
+        steps, size = step_count(self.scene.loading.load_history), self.surface.heights.size
+        rows = SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
+        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
+        return Work(
+            size=int(size),
+            solutions=float(rows),
+            rows=rows,
+            products=rows * size * PRODUCTS * (SLOPES_PRODUCTS if self.finite_slopes else 1.0),
+            unknowns=unknowns,
+            cycles=unknowns * (SET_UP_CYCLES + steps * _CYCLES_AT_POINTS),
+            ranks=ranks,
+            memory=BYTES_PER_CELL * size,
+        )
+
+    def unmeasured(self) -> str:
+        """Return why a run does not measure the errors of its load steps."""
+        return "laws of samples have no measure of it, but for errors between rows and scatter"
+
+    # --- laws
+
+    @cached_property
+    def _laws(self) -> SampleLaws:
+        return SampleLaws(
+            scene=self.scene,
+            bodies=self.bodies,
+            samples=self.samples,
+            model=self.model,
+            load_history=self.load_history,
+            finite_slopes=self.finite_slopes,
+            tolerance=self.table_tolerance,
+        )
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        """Tabulate the laws; collective."""
+        return self._laws.table(observe)
+
+    # --- load steps
+
+    def _make_solver(self, table: LawTable) -> LawSolver:
+        """Make what finds load steps from laws at the points of the mesh."""
+        return self._solver_on(self.bodies.contact_face(), table)
+
+    def _solver_on(self, face: LoadedFace | FacePair, table: LawTable) -> EmbeddedLaws:
+        from macro import FacePair, LawContactProblem
+
+        problem = LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
+        if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
+            problem.start_from(np.ones(face.patches.count))
+        return EmbeddedLaws(problem, table, face)
+
+    def _crown(self) -> Callable[[Array, Array], Array] | None:
+        """Return the depth of a crowned face at points of its plane [mm]; None without a crown."""
+        radii = self.scene.law.crown
+        if radii is None:
+            return None
+        middle = 0.5 * np.asarray(self.body.lengths)
+        curvature = [0.0 if one == "inf" else 1.0 / float(one) for one in radii]
+
+        def depth(x: Array, y: Array) -> Array:
+            along, across = x - middle[0], y - middle[1]
+            return 0.5 * (curvature[0] * along**2 + curvature[1] * across**2)
+
+        return depth
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step, with longer laws where these end too early."""
+        """Find the equilibrium of one load step, with longer laws where these end too early."""
         while True:
             try:
                 return super().press(control)
             except BeyondLaws:
-                longer = face_laws(self._setup, self._comm, before=self.table)
+                longer = self._laws.table(None, before=self.table)
                 if longer is self.table:
                     raise
-                last = self.state()
-                self.table, self._problem = longer, self._problem_with(longer, self.face)
-                self.restore(last)
+                last, face = self._solver.state(), self._solver.face
+                self.table, self._solver = longer, self._solver_on(face, longer)
+                self._solver.restore(last)
+                self._extensions.append(
+                    f"the laws were extended to {number(longer.largest_pressure)} MPa, which a "
+                    "load step needed"
+                )
 
-    def _problem_with(self, table: LawTable, face: LoadedFace | FacePair) -> LawContactProblem:
-        from macro import FacePair, LawContactProblem
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the approximations behind load steps."""
+        if self.table is not None:
+            yield from self.table.notes(self.table_tolerance)
+        yield from super().notes(steps)
+        yield from self._extensions
 
-        problem = LawContactProblem(face, table.laws, mode="pointwise", crown=crown(self._setup))
-        if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
-            problem.start_from(np.ones(face.patches.count))
-        return problem
+    @property
+    def areas(self) -> Array:
+        """Nominal areas of the regions, shape (N,) [mm²]."""
+        return np.asarray(self._solver.face.areas)
 
+    def face_pressures(self) -> Array | None:
+        """Return places on the face and the pressures there; see `Coupling.face_pressures`."""
+        return self._embedded.face_pressures() if "_solver" in self.__dict__ else None
 
-def crown(setup: ProblemSetup) -> Callable[[Array, Array], Array] | None:
-    """Return the depth of a crowned face at points of its plane [mm]; None where it has none.
+    @property
+    def _embedded(self) -> EmbeddedLaws:
+        solver = self._solver
+        assert isinstance(solver, EmbeddedLaws)
+        return solver
 
-    Args:
-        setup: The problem set up from the scene, with laws of samples.
-    """
-    radii = setup.scene.law.crown
-    if radii is None or setup.face is None:
-        return None
-    middle = 0.5 * np.asarray(setup.face.lengths)
-    curvature = [0.0 if one == "inf" else 1.0 / float(one) for one in radii]
+    def field_state(self, step: LoadStep) -> Any:
+        """Return this rank's displacements of the mesh and pressures at its points."""
+        return self._embedded.displacement, self._embedded.point_pressures
 
-    def depth(x: Array, y: Array) -> Array:
-        return 0.5 * (curvature[0] * (x - middle[0]) ** 2 + curvature[1] * (y - middle[1]) ** 2)
+    def write_fields(
+        self, path: Path, states: Mapping[int, Any], steps: Sequence[LoadStep]
+    ) -> None:
+        """Write the fields of the body; the first body alone has the pressures."""
+        from macro import AtPoints
+        from multiscale.couplings.fields import write_displaced
 
-    return depth
+        def pressures(step: int, counter: bool) -> Any:
+            return None if counter else AtPoints(states[step][1])
+
+        moved = {step: state[0] for step, state in states.items()}
+        write_displaced(path, self._solver.face, moved, pressures)
+
+    # --- statements
+
+    def contact_statement(self) -> str:
+        """Say what is in contact."""
+        cells, plane = f"{self.surface.heights.size} cells", self.sample_plane
+        if plane is None:
+            return cells
+        surface = self.surface
+        depth = surface.highest - surface.heights
+        within = plane.at(surface.x[:, None], surface.y) > depth
+        return f"{cells}, {int(within.sum())} within the largest approach"
+
+    def model_statement(self) -> str:
+        """Say which micro model solves contacts, and how."""
+        micro = self.scene.micro
+        unused = micro.solver != type(micro)().solver
+        return f"{self.model.name}; it has no use for micro.solver" if unused else self.model.name
+
+    def coupling_statement(self) -> str:
+        """Say what the laws are made from."""
+        parts = []
+        for region in self.samples:
+            x, y = (quantity(side, "mm") for side in region.surfaces[0].lengths)
+            count = len(region.surfaces)
+            samples = f"{count} periodic samples" if count > 1 else "a periodic sample"
+            parts.append(f"{region.name}: {samples} of {x} × {y}")
+        return f"representative: {'; '.join(parts)}; the law holds at every point of the face"
+
+    def body_statements(self) -> Iterator[tuple[str, str]]:
+        """Yield what the bodies are, with topics."""
+        yield "body", describe.body(self)
+
+    def error_statement(self) -> str:
+        """Say how the run will know its error."""
+        return f"not measured: {self.unmeasured()}"
+
+    @property
+    def size(self) -> float:
+        """Size of the interferences, or of the roughness where these are not known [mm]."""
+        plane, surface = self.sample_plane, self.surface
+        if plane is None:
+            return roughness(surface).sq
+        depth = surface.highest - surface.heights
+        interference = plane.at(surface.x[:, None], surface.y) - depth
+        return max(plane.approach, float(interference.max()))
+
+    @property
+    def shows_cells(self) -> bool:
+        """Whether pressures of cells will be known: never those of the whole face."""
+        return False
+
+    def body_warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
+        yield from describe.mesh_warnings(self)
+        side = math.sqrt(self.body.area)
+        for region in self.samples:
+            largest = max(max(surface.lengths) for surface in region.surfaces)
+            if side < _MANY_SAMPLES * largest:
+                yield (
+                    f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face "
+                    f"about {quantity(side, 'mm')}: a sample stands for faces that are much larger"
+                )
+            if region.mirrored:
+                yield (
+                    f"the heights of {region.name} do not continue periodically: their sample is "
+                    "four mirror images, twice as long and wide"
+                )
+        history, second = self.load_history, self.materials.second
+        if self.both_elastic and second is not None and history.quantity == "force":
+            pressure = history.largest / self.body.area
+            moved = _HALF_SPACE * pressure * side * second.surface_compliance
+            yield (
+                "the compliance of the counter-body, a half-space, counts on the scale of the "
+                f"sample alone; under the whole face it would add about {1e3 * moved:.3g} µm: give "
+                "it a mesh where that matters"
+            )
+
+    def record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the coupling alone, by name."""
+        return {"micro_model": {"name": self.model.name}}

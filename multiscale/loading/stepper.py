@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, Literal, Protocol, runtime_checkable
+from typing import Literal, Protocol
 
 import numpy as np
 
 from geometry import Control, NotConverged
-from micro.contact_detail import ContactDetail
-from micro.model import Stiffness
 from multiscale.loading.load_step import LoadStep
-from support.checked_store import Arrays
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
 
 
-class Coupling(Protocol):
-    """Anything that finds the equilibrium under a rigid plane."""
+class Solver(Protocol):
+    """Anything that finds the equilibrium under a rigid plane.
+
+    Where load steps depend on those before them beyond initial guesses, an attribute ``past`` is
+    what these left behind; setting it takes load steps back.
+    """
 
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step, whose number is still 0.
@@ -33,76 +35,6 @@ class Coupling(Protocol):
             NotConverged: When none is found. Earlier equilibria stay what they were, so that a
                 smaller step can be tried.
         """
-
-
-@runtime_checkable
-class Restorable(Protocol):
-    """A coupling whose load steps depend on those before them, if only by their initial guess.
-
-    Any other coupling finds the same equilibrium without them.
-    """
-
-    def state(self) -> Arrays:
-        """Return what the next load step starts from; it does not depend on the number of ranks.
-
-        Note:
-            Collective.
-        """
-
-    def restore(self, state: Arrays) -> None:
-        """Start from a state, in a coupling newly made from the same scene.
-
-        Args:
-            state: What `state` returned.
-
-        Note:
-            Collective.
-        """
-
-
-@runtime_checkable
-class HasStiffness(Protocol):
-    """A coupling that knows the derivative of the force at its latest load step."""
-
-    def stiffness(self) -> Stiffness:
-        """Return the interfacial stiffness dF/dδ.
-
-        The slopes of the plane stay or, where it turns, its moments stay zero.
-
-        Note:
-            Collective.
-        """
-
-
-@runtime_checkable
-class HasContact(Protocol):
-    """A coupling that solves the contact itself."""
-
-    @property
-    def latest(self) -> Any:
-        """The contact at the latest load step, as `detail` takes it."""
-
-    def detail(self, latest: Any) -> ContactDetail:
-        """Return the spots and fields of a contact, the same on every rank.
-
-        Args:
-            latest: What `latest` was after a load step.
-
-        Note:
-            Collective.
-        """
-
-
-@runtime_checkable
-class PathDependent(Protocol):
-    """A coupling whose next load step depends on those before it, beyond initial guesses."""
-
-    @property
-    def past(self) -> Any:
-        """What the load steps so far left behind; set it to take load steps back."""
-
-    @past.setter
-    def past(self, value: Any) -> None: ...
 
 
 class BeyondLaws(NotConverged):
@@ -219,28 +151,38 @@ class LoadPosition:
         return self.targets == load_history.count and not self.ahead
 
 
-def load_steps(coupling: Coupling, load_history: LoadHistory) -> Iterator[LoadStep]:
+def step_count(load_history: LoadHistory) -> int:
+    """Return the number of load steps, as far as it is known before the run.
+
+    Args:
+        load_history: The loads, whose steps may be halved by a largest change of the force.
+    """
+    change = load_history.force_change or math.inf
+    return max(load_history.count, math.ceil(load_history.legs / change))
+
+
+def load_steps(solver: Solver, load_history: LoadHistory) -> Iterator[LoadStep]:
     """Yield the load steps of a load history as they are accepted.
 
     A step that does not converge is reached through smaller ones, which are not yielded. One that
     changes the force by too much is replaced by two.
 
     Args:
-        coupling: What finds the equilibria.
+        solver: What finds the equilibria.
         load_history: The loads.
 
     Raises:
         NotConverged: When a step fails at the smallest increment too, or a patch leaves the range
             of its law; the steps yielded before stay valid.
     """
-    return iter(LoadStepper(coupling, load_history))
+    return iter(LoadStepper(solver, load_history))
 
 
 class LoadStepper:
     """Makes the load steps of a load history, see `load_steps`, from any position in it.
 
     Args:
-        coupling: What finds the equilibria.
+        solver: What finds the equilibria.
         load_history: The loads.
         position: Where to start.
 
@@ -249,9 +191,9 @@ class LoadStepper:
     """
 
     def __init__(
-        self, coupling: Coupling, load_history: LoadHistory, position: LoadPosition | None = None
+        self, solver: Solver, load_history: LoadHistory, position: LoadPosition | None = None
     ) -> None:
-        self._coupling, self._load_history = coupling, load_history
+        self._solver, self._load_history = solver, load_history
         self.position = position or LoadPosition()
         self._newton = self._linear = 0
         self._seconds = 0.0
@@ -281,11 +223,11 @@ class LoadStepper:
         by_force = self._load_history.quantity == "force"
         if divisible and by_force and self._exceeds_limit(target):
             return None
-        past = self._coupling.past if isinstance(self._coupling, PathDependent) else None
+        past = getattr(self._solver, "past", None)
         step = self._reached(target)
         if divisible and self._exceeds_limit(step.force_N):
-            if past is not None and isinstance(self._coupling, PathDependent):
-                self._coupling.past = past
+            if past is not None:
+                setattr(self._solver, "past", past)  # noqa: B010
             return None
         return step
 
@@ -303,7 +245,7 @@ class LoadStepper:
         while True:
             control = self._load_history.control(ahead[-1])
             try:
-                step = self._coupling.press(control)
+                step = self._solver.press(control)
             except NotConverged as error:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws)

@@ -47,7 +47,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.setup.has_block or not (run.finished or run.fields.kept):
+    if not run.coupling.has_body or not (run.finished or run.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their

@@ -13,12 +13,10 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.inputs.body_facts import BodyFacts
 from multiscale.machine import peak_memory
 from multiscale.run import Run
 from multiscale.scene.identity import files_of
-from multiscale.setup.mesh_bodies import FaceFacts
-from multiscale.setup.problem import ProblemSetup
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
@@ -34,7 +32,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     Returns:
         A dictionary that JSON can hold; what is unknown or infinite is None.
     """
-    history, setup = run.history(), run.setup
+    history, coupling = run.history(), run.coupling
     content = {
         "patchlaw": version("patchlaw"),
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
@@ -44,19 +42,19 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "files": files_of(run.identity),
         "units": "mm, N, MPa",
         "surface": {
-            "source": setup.surface.source,
-            "notes": list(setup.surface.notes),
-            "lengths_mm": list(setup.surface.lengths),
+            "source": coupling.surface.source,
+            "notes": list(coupling.surface.notes),
+            "lengths_mm": list(coupling.surface.lengths),
             "heights_sha256": run.heights,
-            "highest_mm": setup.surface.highest,
-            "zero_below_highest_mm": setup.zero,
-            **(_summits(setup) if setup.uses_summits else {}),
+            "highest_mm": coupling.surface.highest,
+            "zero_below_highest_mm": coupling.zero,
+            **coupling.surface_record(),
         },
-        "patches": None if setup.samples else list(setup.patches.grid),
-        "regions": list(setup.regions.names) if setup.regions else None,
-        "bodies": [_body(face) for face in (setup.face, setup.counter_face) if face is not None],
-        "contact_modulus_MPa": setup.materials.contact_modulus,
-        "micro_model": None if setup.micro is None else {"name": setup.model.name},
+        "patches": None if coupling.regions else list(coupling.patches.grid),
+        "regions": list(coupling.regions.names) if coupling.regions else None,
+        "bodies": [_body(one) for one in coupling.shown_bodies],
+        "contact_modulus_MPa": coupling.materials.contact_modulus,
+        "micro_model": coupling.record().get("micro_model"),
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
@@ -65,7 +63,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
         "errors_N": [dict(step.errors) for step in history],
-        "decision": setup.decision and asdict(setup.decision),
+        "decision": coupling.decision and asdict(coupling.decision),
         "accuracy": history.accuracy
         and {**asdict(history.accuracy), "kept": history.accuracy.kept},
         "steps": len(history),
@@ -80,7 +78,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     return known
 
 
-def _body(face: FaceFacts) -> dict[str, Any]:
+def _body(face: BodyFacts) -> dict[str, Any]:
     """Return what is known of a body and its contact face."""
     return {
         "mesh_sha256": face.digest or None,
@@ -96,26 +94,17 @@ def _body(face: FaceFacts) -> dict[str, Any]:
 
 def _reference(run: Run) -> dict[str, Any] | None:
     """Return the meshes of a reference and its errors; None with other couplings."""
-    record, coupling = run.history().reference, run.coupling
-    if record is None or not isinstance(coupling, ReferenceCoupling):
+    record = run.history().reference
+    if record is None:
         return None
     return {
-        "method": run.scene.reference.method,
+        **run.coupling.record(),
         "sizes_mm": record.sizes.tolist(),
         "unknowns": record.unknowns,
         "active_sets": [step.newton_iterations for step in run.steps],
         "force_rate": record.force.rate.tolist(),
         "area_rate": record.area.rate.tolist(),
         "error": record.label,
-        "mesh_quality": coupling.qualities,
-    }
-
-
-def _summits(setup: ProblemSetup) -> dict[str, int]:
-    return {
-        "summits": setup.asperities.count,
-        "summits_in_reach": int(setup.interfering_summits.sum()),
-        "border_maxima_in_reach": setup.interfering_border_maxima,
     }
 
 

@@ -7,14 +7,13 @@ from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from importlib.metadata import version
 
-from geometry.patches import PatchGrid
+from multiscale.couplings import describe
+from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.output.provenance import library_versions
-from multiscale.planning import plan
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
 from multiscale.run import Run
-from multiscale.setup.problem import ProblemSetup
 
 PAPER = (
     "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
@@ -43,22 +42,22 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
         pictures: Files of the figures by name, see `multiscale.output.results.pictures_of`.
         options: PETSc options given by the user.
     """
-    history, setup = run.history(), run.setup
-    statements = dict(plan.statements(setup))
+    history, coupling = run.history(), run.coupling
+    statements = dict(coupling.statements())
     folded = [(topic, text) for topic, text in statements.items() if topic not in _OF_INPUTS]
     cautions = [note for note in history.notes if isinstance(note, Caution)]
     return filled(
         "output/report.jinja",
         title=f"patchlaw: {run.scene.name}",
         history=history,
-        results=list(results(history.steps[-1], setup, run)) if len(history) else [],
+        results=list(results(history.steps[-1], coupling, run)) if len(history) else [],
         reference=history.reference.sentence if history.reference else "",
         finished=run.finished,
-        warnings=[*cautions, *plan.warnings(setup)],
+        warnings=[*cautions, *coupling.warnings()],
         notes=[note for note in history.notes if not isinstance(note, Caution | Detail)],
         details=[note for note in history.notes if isinstance(note, Detail)],
         inputs=[
-            *_inputs(setup),
+            *_inputs(coupling),
             *((name, statements[name]) for name in _OF_INPUTS[1:] if name in statements),
         ],
         folded=[pair for pair in folded if pair[0] != "inputs"],
@@ -71,15 +70,15 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
     )
 
 
-def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str, str, str]]:
+def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str, str, str]]:
     """Yield name, value and a remark of what a run found at its last load step.
 
     Args:
         last: The load step.
-        setup: The problem set up from the scene.
+        coupling: What was made of the scene.
         run: The run.
     """
-    forced = setup.load_history.quantity == "force"
+    forced = coupling.load_history.quantity == "force"
     for name, value, error, unit, given in (
         ("force", last.force_N, last.force_error_N, "N", forced),
         ("approach", last.approach_mm, last.approach_error_mm, "mm", not forced),
@@ -87,11 +86,9 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
     if (approach := last.first_touch_approach_mm) is not None:
-        above = f"which is {quantity(last.zero_mm, 'mm')} above the {setup.scene.loading.zero}"
+        above = f"which is {quantity(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
         yield "approach from first touch", quantity(approach, "mm"), above
-    face = setup.patches.area * setup.patches.count
-    if not isinstance(run.history().patches, PatchGrid) and setup.face is not None:
-        face = setup.face.area
+    face = coupling.area
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
@@ -109,13 +106,13 @@ def results(last: LoadStep, setup: ProblemSetup, run: Run) -> Iterator[tuple[str
             yield text, quantity(value, unit), ""
 
 
-def _inputs(setup: ProblemSetup) -> Iterator[tuple[str, str]]:
+def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     """Yield what the user gave, with its topic."""
-    yield "material", plan.material_statement(setup)
-    yield "dimensions", plan.dimension_statement(setup)
-    yield "surface", plan.surface_statement(setup)
-    if setup.scene.micro.hardness is not None:
-        yield "hardness", quantity(setup.scene.micro.hardness, "MPa")
+    yield "material", describe.materials(coupling)
+    yield "dimensions", describe.dimensions(coupling)
+    yield "surface", describe.surface(coupling)
+    if coupling.scene.micro.hardness is not None:
+        yield "hardness", quantity(coupling.scene.micro.hardness, "MPa")
 
 
 def _made(run: Run, options: list[str]) -> list[tuple[str, str]]:

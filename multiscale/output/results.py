@@ -9,17 +9,13 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.couplings.coupling import Coupling
 from multiscale.laws.law_file import write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.setup.problem import ProblemSetup
 from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 from support.collective import on_root, shared
 from support.errors import NotInstalled
@@ -154,7 +150,7 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
 def has_block_figure(run: Run) -> bool:
     """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
     pressure = run.contacts[-1].pressure_MPa if run.contacts else None
-    return pressure is not None and pressure.shape == run.setup.surface.grid
+    return pressure is not None and pressure.shape == run.coupling.surface.grid
 
 
 class Pictures(NamedTuple):
@@ -201,24 +197,17 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
     return [write_bytes(folder / name, content) for name, content in pictures.items()]
 
 
-def _face_pressures(run: Run) -> NDArray[np.float64] | None:
-    """Return the pressures at the points of a face with laws of samples, where they are known."""
-    if run.setup.samples and isinstance(run.coupling, EmbeddedCoupling):
-        return run.coupling.face_pressures()
-    return None
-
-
 def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
     """Return the functions that draw the figures of a run, by their names.
 
     Note:
         Collective; drawing is not.
     """
-    setup, history, face = run.setup, run.history(), _face_pressures(run)
-    of_samples = bool(setup.samples)
+    coupling, history, face = run.coupling, run.history(), run.coupling.face_pressures()
+    surface, of_samples = coupling.surface, coupling.regions is not None
     figures: dict[str, Callable[[], Figure]] = {
-        "overview": _from("contact", "overview_figure", setup.surface, of_samples, history, face),
-        "surface": partial(surface_picture, setup),
+        "overview": _from("contact", "overview_figure", surface, of_samples, history, face),
+        "surface": partial(surface_picture, coupling),
         "curves": partial(history.plot, run.scene.kind),
     }
     if not of_samples:
@@ -226,25 +215,25 @@ def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
     if face is not None:
         figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
     if run.scene.output.figures == "all" and has_block_figure(run):
-        ratio = setup.materials.first.poisson_ratio
-        figures["block"] = _from("block", "contact_block", setup.surface, run.contacts[-1], ratio)
+        ratio = coupling.materials.first.poisson_ratio
+        figures["block"] = _from("block", "contact_block", surface, run.contacts[-1], ratio)
     if run.contacts:
         figures["contact"] = run.contacts[-1].plot
-    if run.table is not None:
+    if coupling.table is not None:
         figures["laws"] = _from("curves", "law_figure", run.laws)
     return figures
 
 
-def surface_picture(setup: ProblemSetup) -> Figure:
+def surface_picture(coupling: Coupling) -> Figure:
     """Draw the surface of a scene, with its summits where the micro model uses them.
 
     Args:
-        setup: The problem set up from the scene.
+        coupling: What was made of the scene.
     """
     from multiscale.figures.surface import surface_figure  # loads matplotlib
 
-    summits = setup.asperities if setup.uses_summits else None
-    return surface_figure(setup.surface, summits, setup.patches, setup.scene.surface.spectrum)
+    target = coupling.scene.surface.spectrum
+    return surface_figure(coupling.surface, coupling.summits, coupling.patches, target)
 
 
 def _from(module: str, function: str, *arguments: Any) -> Callable[[], Figure]:

@@ -12,14 +12,12 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
+from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadHistory
 from multiscale.machine import cores_statement, peak_memory
-from multiscale.planning import plan
-from multiscale.planning.work import Work
 from multiscale.readable import Caution, Observer, duration, quantity
 from multiscale.results.history import History
-from multiscale.setup.problem import ProblemSetup
 from support.errors import PatchlawError
 
 MOST_ROWS = 60
@@ -96,14 +94,17 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
 
 
 def show_plan(
-    comm: Any, setup: ProblemSetup, work: Work | None = None, shortages: Sequence[str] = ()
+    comm: Any,
+    coupling: Coupling,
+    cost: Sequence[tuple[str, str]] = (),
+    shortages: Sequence[str] = (),
 ) -> None:
     """Print what a run will do, and why.
 
     Args:
         comm: MPI communicator, or None.
-        setup: The problem, set up from the scene.
-        work: What the run computes, counted; None leaves it out.
+        coupling: What was made of the scene.
+        cost: What it costs, in sentences with topics.
         shortages: Sentences on the memory that these nodes lack.
 
     Note:
@@ -111,8 +112,8 @@ def show_plan(
     """
     cores = cores_statement(comm)
     if speaks(comm):
-        warnings = [*plan.warnings(setup), *shortages]
-        show_pairs(comm, [*plan.statements(setup, work), ("cores", cores)], warnings)
+        warnings = [*coupling.warnings(), *shortages]
+        show_pairs(comm, [*coupling.statements(cost), ("cores", cores)], warnings)
 
 
 def show_times(comm: Any, seconds: Mapping[str, float]) -> None:

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from multiscale.planning.auto_keys import auto_keys, is_measured, resolved_sections, with_resolved
-from multiscale.planning.problem_setup import make_setup
+from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
 from multiscale.studies.configurations import (
     Configuration,

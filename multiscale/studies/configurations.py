@@ -17,19 +17,14 @@ from typing import Any, TypeAlias, cast
 
 from geometry.meshes.families import suggested_fine
 from micro import MODELS
-from multiscale.planning.problem_setup import make_setup
-from multiscale.planning.work import work_of
+from multiscale.couplings.coupling import Coupling
+from multiscale.inputs.block import LAW_BLOCK_CELLS, block_section
+from multiscale.inputs.loads import load_history_on, patch_grid
+from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.surfaces import make_surface
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
-from multiscale.setup.memory import MemoryLacking
-from multiscale.setup.problem import ProblemSetup
-from multiscale.setup.surface_and_block import (
-    LAW_BLOCK_CELLS,
-    block_section,
-    load_history_on,
-    make_surface,
-    patch_grid,
-)
+from multiscale.setup import make_setup
 from support.errors import InputError, NotConverged
 
 Grid: TypeAlias = tuple[int, int]
@@ -111,14 +106,14 @@ def configurations(scene: Scene, ranks: int = 1) -> list[Configuration]:
         InputError: When the surface cannot be read.
     """
     chosen: dict[str, Configuration] = {}
-    setups: dict[Any, ProblemSetup] = {}
+    setups: dict[Any, Coupling] = {}
     # The scene itself comes first: an equal configuration does not replace its name.
     for number, values in enumerate(_Catalogue(scene).all()):
         try:
             changed, cost = scene.with_(values), float("inf")
             setup = make_setup(changed, like=setups.get(changed.surface.grid))
             setups.setdefault(changed.surface.grid, setup)
-            cost = work_of(setup).computing
+            cost = setup.work().computing
         except MemoryLacking:  # its row says so, once it is to be run
             pass
         except (InputError, NotConverged):

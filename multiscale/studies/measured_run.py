@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from geometry.patches import PatchGrid
+from multiscale.inputs.memory import MemoryLacking
 from multiscale.readable import duration
 from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.setup.memory import MemoryLacking
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.running import CaseResult, run_case
 from support.collective import on_root
@@ -138,10 +138,10 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         ratio = np.ones(len(history))
         np.divide(curves["force"], history.force_N, out=ratio, where=history.force_N > 0.0)
         pressure = pressure * ratio[:, None]
-    finite_slopes = run.scene.kind == "reference" or bool(run.setup.finite_slopes)
+    finite_slopes = run.scene.kind == "reference" or bool(run.coupling.finite_slopes)
     return {
         "measured": {
-            "phases": run.times, "unknowns": run.unknowns, "finite_slopes": finite_slopes,
+            "phases": run.clock.times, "unknowns": run.unknowns, "finite_slopes": finite_slopes,
         },
         "arrays": curves | {"patch_pressure": pressure},
     }  # fmt: skip

@@ -93,7 +93,7 @@ def run_case(
     run, status, failure = Run(scene, comm), "done", ""
     try:
         if comm is None:
-            run.observe = lambda *_: progress()
+            run.clock.observe = lambda *_: progress()
         for _ in run.load_steps():
             progress()
     except NotConverged as error:

@@ -33,7 +33,7 @@ from macro import compat, contact_facets, nodal_contact
 from multiscale import run
 from multiscale.figures import style
 from multiscale.figures.maps import colour_bar, map_axes
-from multiscale.planning.problem_setup import make_setup
+from multiscale.setup import make_setup
 
 LARGEST, STEPS, EDGE = 10e-3, 4, 0.2
 MAGNIFIED, ROUGH = 30, 0.2  # the face lies above −0.2 mm

@@ -17,7 +17,7 @@ from mpi4py import MPI
 from geometry import BlockShape
 from macro import Material
 from micro import FreeSides, half_space_modes, side_modes
-from multiscale.couplings.body import Body
+from multiscale.bodies.block import BlockTerms
 
 REPEATS = 7
 BLOCKS = {"cube": 1.0, "pancake": 0.1, "column": 10.0, "wide margin": 1.0, "rollers": 1.0}
@@ -29,7 +29,7 @@ def body(name, height):
     shape = BlockShape(interface=(1.0, 1.0), height=height, cells=(1, 1, 1), **margin)
     decay_length = 0.25 * min(1.0, height)
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=decay_length)
-    return Body(
+    return BlockTerms(
         shape=shape,
         material=Material(young_modulus=4000.0, poisson_ratio=0.15),
         sides="roller" if name == "rollers" else "free",

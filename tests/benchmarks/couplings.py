@@ -17,9 +17,9 @@ from mpi4py import MPI
 from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
 from macro import Material
 from micro import FreeSides, HalfSpaceModel
-from multiscale import CondensedCoupling, LoadHistory, consistent_laws, load_steps
-from multiscale.couplings.body import Body
-from multiscale.couplings.contact import ContactCoupling
+from multiscale import CondensedLaws, LoadHistory, consistent_laws, load_steps
+from multiscale.bodies.block import BlockTerms
+from multiscale.couplings.contact_solver import ContactSolver
 
 REPEATS = 5
 APPROACH = 8e-3
@@ -40,7 +40,7 @@ def block():
     """Return the compliance of the cube's top in modes."""
     shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(1, 1, 1))
     sides = FreeSides(lengths=(1.0, 1.0), poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)
-    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=sides)
+    body = BlockTerms(shape=shape, material=MATERIAL, sides="free", side_term=sides)
     return body, body.face(MPI.COMM_SELF)
 
 
@@ -60,7 +60,7 @@ def surface_of(cells):
 def condensed(table, compliance):
     """Press a hundred steps."""
     load_history = LoadHistory(quantity="approach", points=(APPROACH,), steps=100)
-    return list(load_steps(CondensedCoupling(table, compliance), load_history))
+    return list(load_steps(CondensedLaws(table, compliance), load_history))
 
 
 def by_laws(body, face, count):
@@ -87,7 +87,7 @@ def by_laws(body, face, count):
 def together(model):
     """Press eight steps."""
     patches = PatchGrid(grid=(4, 4), lengths=model.surface.lengths)
-    coupling = ContactCoupling(model, patches, patch_means(model.surface, patches))
+    coupling = ContactSolver(model, patches, patch_means(model.surface, patches))
     return [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
 
 

@@ -20,11 +20,11 @@ from dataclasses import replace
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
+from multiscale.couplings.body import scene_body
 
 from geometry import InputError, Spectrum, Surface, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene
-from multiscale.couplings.body import scene_body
 from multiscale.couplings.contact import SLOPES, on_body
 
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
@@ -121,7 +121,7 @@ def meshed_force(data):
 
 def finer_force(run, number):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
-    setup, step = run.setup, run.steps[-1]
+    setup, step = run.coupling, run.steps[-1]
     block = scene_body(setup) if setup.has_block else None
     face = block and block.face(None, modes=block.modes + MORE_MODES)
     body = on_body(setup, None, half_space=block is None, face=face)
@@ -156,7 +156,7 @@ def measured(numbers):
         rows.append((abs(step.force_N - true), bar, stated, meshed, true))
         told = ", ".join(f"{cause} {error / true:.2%}" for cause, error in parts.items())
         print(
-            f"{number:3d} {data['coupling']['kind']:10s} {run.setup.surface.grid[0]:3d}² "
+            f"{number:3d} {data['coupling']['kind']:10s} {run.coupling.surface.grid[0]:3d}² "
             f"{'honed ' * is_honed(number)}{'steep ' * (number % STEEP == 0)}height "
             f"{data['block']['height']:g}, {step.force_N:.4g} N: off by "
             f"{step.force_N / true - 1:+.2%} ± {bar / true:.2%}, stated {stated / true:.2%} "
@@ -202,8 +202,9 @@ def accuracies(numbers):
         off = step.force_N / true - 1.0
         rows.append((wanted, off, bar / true))
         print(
-            f"{number:3d} {kind:10s} {run.setup.decision.taken}: asked {wanted:.0%}, off by "
-            f"{off:+.2%} ± {bar / true:.2%}, promised {run.setup.decision.error:.2%}, {own:.0f} s "
+            f"{number:3d} {kind:10s} {run.coupling.decision.taken}: asked {wanted:.0%}, off by "
+            f"{off:+.2%} ± {bar / true:.2%}, promised {run.coupling.decision.error:.2%}, "
+            f"{own:.0f} s "
             f"and {time.perf_counter() - began - own:.0f} s for the truth",
             flush=True,
         )

@@ -32,7 +32,7 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel
-from multiscale.couplings.body import Body
+from multiscale.bodies.block import BlockTerms
 from multiscale.results.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -51,7 +51,7 @@ def rough(seed, grid=256):
 def body_of():
     """Return what the block adds to the half-space with its sides, which serves every surface."""
     shape = BlockShape(interface=(SIDE, SIDE), height=SIDE, cells=(1, 1, 1))
-    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=SIDES)
+    body = BlockTerms(shape=shape, material=MATERIAL, sides="free", side_term=SIDES)
     return body.term(body.face(COMM))
 
 

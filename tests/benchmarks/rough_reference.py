@@ -26,7 +26,7 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes, FreeSides, HalfSpaceModel
-from multiscale.couplings.body import Body
+from multiscale.bodies.block import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
@@ -59,7 +59,7 @@ def concurrent(surface):
     nu, side = MATERIAL.poisson_ratio, surface.lengths[0]
     sides = FreeSides(lengths=surface.lengths, poisson_ratio=nu, decay_length=0.25 * side)
     shape = BlockShape(interface=surface.lengths, height=1.0, cells=(1, 1, 1))
-    body = Body(shape=shape, material=MATERIAL, sides="free", side_term=sides)
+    body = BlockTerms(shape=shape, material=MATERIAL, sides="free", side_term=sides)
     model = HalfSpaceModel(
         surface=surface,
         contact_modulus=MATERIAL.contact_modulus,

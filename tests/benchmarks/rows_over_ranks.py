@@ -47,11 +47,11 @@ def scene(choice: argparse.Namespace) -> dict:
 def measure(choice: argparse.Namespace) -> None:
     """Make the laws on this rank and the others; rank 0 prints the facts as JSON."""
     from mpi4py import MPI
+    from multiscale.couplings.assembly import make_table
+    from multiscale.couplings.patch_compliance import patch_displacements
 
     import macro  # noqa: F401 imports are no part of the times
     from multiscale import Scene, consistent_laws
-    from multiscale.couplings.assembly import make_table
-    from multiscale.couplings.patch_compliance import patch_displacements
     from multiscale.run import Run
 
     comm = MPI.COMM_WORLD if MPI.COMM_WORLD.size > 1 else None
@@ -66,7 +66,7 @@ def measure(choice: argparse.Namespace) -> None:
         return found
 
     run = timed("set-up", lambda: Run(Scene.from_dict(scene(choice)), comm))
-    model, setup = timed("body", run.make_model), run.setup
+    model, setup = timed("body", run.make_model), run.coupling
     if choice.kind == "concurrent":
         timed("coupling", run.make_coupling)
         steps = timed("load steps", lambda: list(run.load_steps()))

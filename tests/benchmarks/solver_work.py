@@ -171,7 +171,7 @@ def main() -> None:
     words += REFERENCE if choice.reference else ["coupling.newton=full"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
-    coupling = run.make_coupling()
+    coupling = run.prepare()
     finest = coupling.finest if isinstance(coupling, ReferenceCoupling) else coupling.face
     work = Work(finest.body.solver)
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())

@@ -5,7 +5,7 @@ from numpy.polynomial import legendre
 
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from micro import BodyModes, HalfSpaceModel
-from multiscale.couplings.contact import ContactCoupling
+from multiscale.couplings.contact_solver import ContactSolver
 
 MODULUS = 4000.0
 CELLS = 16
@@ -31,7 +31,7 @@ def coupling(scale):
     model = HalfSpaceModel(
         surface=SURFACE, contact_modulus=MODULUS, tolerance=1e-11, body=body(scale)
     )
-    return ContactCoupling(model, SCENE, MEANS)
+    return ContactSolver(model, SCENE, MEANS)
 
 
 def dense_forces(scale, approach, tilt):

@@ -9,7 +9,7 @@ from scipy.special import gamma
 from geometry import BlockShape, Control, Surface, reference_shapes
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, HertzContact
-from multiscale.couplings.body import Body
+from multiscale.bodies.block import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus
@@ -35,7 +35,7 @@ def block_body(height=1.0, sides="free", *, known=True):
     if known and sides == "free":
         nu, decay_length = MATERIAL.poisson_ratio, 0.25 * min(1.0, height)
         free = FreeSides(lengths=SQUARE, poisson_ratio=nu, decay_length=decay_length)
-    return Body(shape=shape, material=MATERIAL, sides=sides, side_term=free)
+    return BlockTerms(shape=shape, material=MATERIAL, sides=sides, side_term=free)
 
 
 @cache

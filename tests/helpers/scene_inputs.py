@@ -8,11 +8,10 @@ import re
 import numpy as np
 from hypothesis import strategies as st
 
-from multiscale.planning.plan import statements, warnings
-from multiscale.planning.problem_setup import make_setup
-from multiscale.planning.work import work_of
+from multiscale.couplings.cost import cost_statements, memory_parts
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
 from support.errors import InputError, NotConverged
 
 BASE = {
@@ -229,9 +228,10 @@ def planned(path, overrides=()):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        made = work_of(setup)
-        told = [*(text for _, text in statements(setup, made)), *warnings(setup)]
-        assert all(np.isfinite(part) for part in (made.seconds, made.memory)), told
+        made, cost = setup.work(), cost_statements(setup, 1e8, 1)
+        told = [*(text for _, text in setup.statements(cost)), *setup.warnings()]
+        sizes = made.computing, *memory_parts(setup, made, 1e8).values()
+        assert all(np.isfinite(part) for part in sizes), told
     except InputError as error:
         told = str(error)
         of_heights = error.key == "surface.file"  # which names the file of heights
@@ -251,13 +251,14 @@ def ran(path):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        meshes = [] if setup.meshes is None else setup.meshes.unknowns
+        meshes = getattr(setup, "rough_meshes", None)
+        meshes = [] if meshes is None else meshes.unknowns
         large = (
             setup.surface.heights.size > 600
             or setup.patches.count > 16
             or scene.loading.steps > 9
             or sum(meshes) > 5000
-            or math.prod(setup.shape.cells) > 800
+            or math.prod(setup.body.shape.cells) > 800
         )
         if large or (scene.block.margin and scene.block.margin_cells > 4):
             return "not tried"

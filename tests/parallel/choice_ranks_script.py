@@ -23,7 +23,7 @@ if __name__ == "__main__":
     )
     list(run.load_steps())
     accuracy = run.history().accuracy
-    told = (json.dumps(run.resolved, sort_keys=True), run.setup.decision.sentence)
+    told = (json.dumps(run.resolved, sort_keys=True), run.coupling.decision.sentence)
     everywhere = COMM.gather((*told, accuracy.error))
     if COMM.rank == 0:
         assert len(set(everywhere)) == 1

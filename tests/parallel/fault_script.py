@@ -11,19 +11,18 @@ from itertools import count
 from mpi4py import MPI
 
 from multiscale.cli import main
-from multiscale.couplings import assembly
-from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.planning import set_up
+from multiscale.couplings.patch_laws import PatchLaws
+from multiscale.law_solvers.condensed import CondensedLaws
 from support.errors import NotConverged
 
 command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
-    "surface": (set_up, "on_root_alone"),
+    "surface": (sys.modules["multiscale.setup"], "on_root_alone"),
     "plan": (command.terminal, "show_plan"),
-    "laws": (assembly, "make_table"),
-    "block": (assembly, "assemble"),
-    "load step": (CondensedCoupling, "press"),
+    "laws": (PatchLaws, "make_laws"),
+    "block": (PatchLaws, "_make_solver"),
+    "load step": (CondensedLaws, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),
     "writing on rank 0": (command, "write_results"),
@@ -57,7 +56,7 @@ def full(folder, run):
     return write_fields(folder, run)
 
 
-accept, press = command.CheckpointWriter.accept, CondensedCoupling.press
+accept, press = command.CheckpointWriter.accept, CondensedLaws.press
 write_fields = command.write_fields
 accepted = count(0)  # the first call is made before any load step
 rank, what, place, *words = int(sys.argv[1]), *sys.argv[2:]

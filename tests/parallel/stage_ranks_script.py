@@ -22,7 +22,7 @@ def parts(value):
 
 if __name__ == "__main__":
     scene = Scene.load(PAPER, ["surface.grid=[200, 256]", "coupling.kind=analytic"])
-    setup = Run(scene, COMM if COMM.size > 1 else None).setup
+    setup = Run(scene, COMM if COMM.size > 1 else None).coupling
     surface = setup.surface
     told = (
         hashlib.sha256(surface.heights.tobytes()).hexdigest(),

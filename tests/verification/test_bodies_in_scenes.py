@@ -54,7 +54,7 @@ def body(folder, name="cube", **changes):
 
 def done(*, table=None, **sections):
     whole = Run(Scene.from_dict(sections))
-    whole.table = table
+    whole.coupling.table = table
     list(whole.load_steps())
     return whole
 
@@ -74,7 +74,7 @@ def test_a_cube_from_a_file_is_the_block(folder, name):
     assert forces(found) == pytest.approx(forces(expected), rel=1e-10)
     found = done(**PATCHES, **coupling, body=body(folder, "turned"), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
-    np.testing.assert_allclose(found.setup.face.lengths, [1, 1], rtol=1e-12)
+    np.testing.assert_allclose(found.coupling.face.lengths, [1, 1], rtol=1e-12)
 
 
 def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
@@ -191,7 +191,7 @@ def test_a_crown_is_a_gap_of_the_face(folder):
     found = done(**sections, law=law, body=crowned, table=flat.table)
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]
     assert forces(found) == pytest.approx(forces(key), rel=2e-3)  # chords of the parabola
-    assert "below its highest point" in found.setup.face.notes[0]
+    assert "below its highest point" in found.coupling.face.notes[0]
     with pytest.raises(InputError, match=r"is not planar: its nodes are up to 0\.000625 mm off"):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 

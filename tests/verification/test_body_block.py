@@ -9,7 +9,7 @@ from mpi4py import MPI
 from geometry import BlockShape, PatchGrid
 from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 from micro import FreeSides
-from multiscale.couplings.body import Body
+from multiscale.bodies.block import BlockTerms
 
 COMM = MPI.COMM_SELF
 
@@ -22,7 +22,7 @@ def body(shape, nu=0.15, known=True, sides="free"):
         else None
     )
     material = Material(young_modulus=1.0, poisson_ratio=nu)
-    return Body(shape=shape, material=material, sides=sides, side_term=free)
+    return BlockTerms(shape=shape, material=material, sides=sides, side_term=free)
 
 
 @pytest.mark.parametrize("margin", [{}, {"margin": 0.25, "margin_cells": 2}])

@@ -10,7 +10,7 @@ from helpers.reference_cases import on_block
 from geometry import PatchGrid, Spectrum, Surface, patch_means, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Scene, run
-from multiscale.couplings.contact import ContactCoupling
+from multiscale.couplings.contact_solver import ContactSolver
 from multiscale.loading.stepper import LoadHistory, load_steps
 
 SURFACE = synthesise(
@@ -25,7 +25,7 @@ BLOCKS = {"pancake": (0.1, "free"), "cube": (1.0, "free"), "column": (10.0, "rol
 def coupling(block):
     height, sides = BLOCKS[block]
     model = on_block(SURFACE, height=height, sides=sides, tolerance=1e-10)
-    return ContactCoupling(model, PATCHES, patch_means(SURFACE, PATCHES))
+    return ContactSolver(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
 @pytest.mark.parametrize("tilt", [(0.005, -0.002), None], ids=["tilted", "balanced"])

@@ -10,7 +10,6 @@ from geometry.rigid_plane import Control
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes
 from multiscale import Scene, make_setup
-from multiscale.couplings.contact import contact_model
 
 MATERIAL = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
 HEIGHT, APPROACH, FINE, LOW = 0.3, 8e-3, 1.4e-2, 0.01
@@ -57,7 +56,7 @@ def meshed(surface):
 @pytest.mark.long
 def test_slopes_soften_a_low_block_as_its_mesh():
     expected = meshed(setup(slopes=True).surface)  # −3.73, −3.94, −4.06 % with edges 20, 14, 10 µm
-    steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))
+    steep, flat = (setup(slopes=slopes).model_on_body() for slopes in (True, False))
     small = flat.solve(APPROACH).force
     found = replace(steep, tolerance=1e-8).solve(APPROACH).force / small - 1.0
     assert found == pytest.approx(expected, abs=2.5e-3)  # −4.13 %
@@ -69,7 +68,7 @@ def test_slopes_soften_a_low_block_as_its_mesh():
 
 
 def test_heights_count_from_the_highest_point_of_a_higher_block():
-    steep, flat = (contact_model(setup(slopes=slopes), None) for slopes in (True, False))
+    steep, flat = (setup(slopes=slopes).model_on_body() for slopes in (True, False))
     assert flat.slopes is None
     assert len(steep.slopes.edge_stresses) == 2  # the sides' stresses, and the body's
     surface = steep.surface

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from helpers.hard_cases import KINDS, history, scene
 
-from geometry import PatchGrid, patch_means
+from geometry import Material, MaterialPair, PatchGrid, patch_means
 from micro import MODEL_NAMES
-from multiscale.planning.problem_setup import stated_model
-from multiscale.setup.surface_and_block import make_surface
+from multiscale.couplings.micro_coupling import _stated_model
+from multiscale.inputs.surfaces import make_surface
 
+MATERIALS = MaterialPair(first=Material(young_modulus=4000.0, poisson_ratio=0.15))
 MODULUS = 4000.0 / (1.0 - 0.15**2)
 PUNCH = 1.5 * 2.0 * MODULUS * np.sqrt(0.5)  # N/mm
 COARSE = {
@@ -45,7 +46,7 @@ def test_nothing_touches_before_first_touch(model, patches):
         surface = make_surface(given)
         grid = PatchGrid(grid=patches, lengths=surface.lengths)
         means = patch_means(surface, grid)
-        whole = stated_model(given, surface, MODULUS)
+        whole = _stated_model(given, surface, MATERIALS)
         parts = [(whole, grid, means)]
         for index in range(grid.count):
             parts.append((*whole.of_patch(grid, index), means[index : index + 1]))

@@ -9,7 +9,6 @@ from mpi4py import MPI
 from geometry import BlockShape, Control, Surface
 from macro import Block, Material, UnilateralContactProblem, block_mesh, rough_block_mesh
 from multiscale import make_setup
-from multiscale.planning.plan import warnings
 
 BLOCKED = ("isolated", "consistent", "concurrent")
 
@@ -71,9 +70,9 @@ def test_the_plan_says_that_linear_elements_lock(element, nu, told):
     plain = scene(coupling__kind="isolated", **material)
     meshed = scene(coupling__kind="reference", **material, **cells)
     for one in (plain, meshed):
-        assert sum("linear elements lock" in text for text in warnings(make_setup(one))) == told
+        assert sum("linear elements lock" in text for text in make_setup(one).warnings()) == told
     split = make_setup(scene(block__poisson_ratio=0.4999))
-    assert not any("lock" in one for one in warnings(split))  # its elements are of high order
+    assert not any("lock" in one for one in split.warnings())  # its elements are of high order
 
 
 @pytest.mark.parametrize(
@@ -155,7 +154,7 @@ def test_flat_and_slender_blocks_on_the_mesh(height, bound):
 def test_love_on_a_patch_as_large_as_the_block():
     # hard: the half-space inside the law is none; warned, and the error is this
     large = {"patches__grid": [1, 1], "block__height": "0.2 mm"}
-    told = list(warnings(make_setup(scene(coupling__kind="isolated", **large))))
+    told = list(make_setup(scene(coupling__kind="isolated", **large)).warnings())
     assert any("not small against the block" in one for one in told)
     right = history(coupling__kind="concurrent", **large).force_N[-1]
     wrong = history(coupling__kind="isolated", **large).force_N[-1]

@@ -13,7 +13,7 @@ from geometry import Material
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from micro import influence_matrix
-from multiscale.couplings.condensed import equilibrium
+from multiscale.law_solvers.condensed import equilibrium
 from multiscale.laws.patch_law import PatchLaw, PatchLaws, repaired_law
 from multiscale.laws.rows import LawRows
 from multiscale.run import Run

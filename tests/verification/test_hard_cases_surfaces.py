@@ -7,7 +7,6 @@ from helpers.hard_cases import centred, from_file, history, scene
 from geometry.files.reading import read_surface
 from geometry.missing import filled
 from multiscale import make_setup, run
-from multiscale.planning.plan import statements, warnings
 from support.errors import InputError
 
 X, Y = centred(32)
@@ -50,7 +49,8 @@ def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
         history(coupling__kind="isolated", coupling__newton="full", **surface)
     # left open, it is taken after all; the plan says that it may be, the run that it was
     left_open = scene(coupling__kind="isolated", **surface)
-    assert "should a patch turn out to be flat" in dict(statements(make_setup(left_open)))["newton"]
+    said = dict(make_setup(left_open).statements())
+    assert "should a patch turn out to be flat" in said["newton"]
     found = run(left_open)
     assert found.force_N[-1] > 0.0
     assert any(
@@ -118,7 +118,7 @@ def test_too_few_heights_are_refused(shape, tmp_path):
 def test_noise_between_the_heights_is_told(tmp_path):
     # hard: a spline through white noise rises far above all heights, and approach counts from it
     noise = 3e-3 * np.random.default_rng(0).standard_normal((32, 32))
-    told = list(warnings(make_setup(scene(**from_file(tmp_path, noise)))))
+    told = list(make_setup(scene(**from_file(tmp_path, noise))).warnings())
     assert any("too coarse or too noisy" in one for one in told)
 
 
@@ -134,7 +134,7 @@ def test_missing_heights_are_refused_or_filled_on_request(tmp_path):
     with pytest.raises(InputError, match=r"49 of 1024 heights are missing.*missing = 'fill'"):
         history(**gaps)
     made = make_setup(scene(surface__missing="fill", micro__finite_slopes=False, **gaps))
-    said = dict(statements(made))["surface"]
+    said = dict(made.statements())["surface"]
     assert "4.79 % of the heights missing and filled by a membrane" in said
     # the summit is not in a gap, and what is filled nowhere rises above what is around it; slopes
     # of what does not touch would count, too

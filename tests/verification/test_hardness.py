@@ -7,7 +7,7 @@ import pytest
 
 from geometry import Control, PatchGrid, Spectrum, Surface, patch_means, synthesise
 from micro import HalfSpaceModel
-from multiscale.couplings.contact import ContactCoupling
+from multiscale.couplings.contact_solver import ContactSolver
 from multiscale.loading.energy import missing_energy, with_work
 from multiscale.loading.stepper import LoadHistory, load_steps
 
@@ -103,7 +103,7 @@ def test_monotone_loading_does_not_depend_on_its_steps():
 def test_work_is_elastic_and_plastic_energy():
     """The rise of energy lies between first and last force times motion, at every step."""
     surface = rough()
-    coupling = ContactCoupling(model(surface), WHOLE, patch_means(surface, WHOLE))
+    coupling = ContactSolver(model(surface), WHOLE, patch_means(surface, WHOLE))
     history, steps = LoadHistory(quantity="approach", points=(8e-3, 2e-3, 8e-3), steps=16), []
     for step in load_steps(coupling, history):
         stiffness, _, error = coupling.stiffness()
@@ -122,7 +122,7 @@ def test_a_step_that_is_halved_leaves_no_plastic_depth():
     """A force that changes by too much was pressed for, and must not have flattened anything."""
     surface, ends = rough(), []
     for change in (None, 0.3):
-        coupling = ContactCoupling(model(surface), WHOLE, patch_means(surface, WHOLE))
+        coupling = ContactSolver(model(surface), WHOLE, patch_means(surface, WHOLE))
         history = LoadHistory(
             quantity="approach", points=(2e-3, 8e-3, 4e-3), steps=1, force_change=change
         )
@@ -249,7 +249,7 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
 def test_work_of_a_first_step_is_that_of_many(seed, hardness):
     surface, ends = rough(seed, 48), []
     for count in (1, 64):
-        coupling = ContactCoupling(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
+        coupling = ContactSolver(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
         history, before = LoadHistory(quantity="approach", points=(8e-3,), steps=count), None
         for step in load_steps(coupling, history):
             stiffness, _, error = coupling.stiffness()

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from geometry import Control, PatchGrid, Spectrum, Surface, mirrored, synthesise
 from macro import LawContactProblem
 from micro import HalfSpaceModel, influence_matrix
-from multiscale.couplings.condensed import CondensedCoupling
+from multiscale.law_solvers.condensed import CondensedLaws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.representative import representative_law
 
@@ -123,7 +123,7 @@ def test_a_crowned_face_with_its_roughness_resolved():
         patches=halves, laws=tuple(map(law.shifted, depth)), made_by={"coupling": "representative"}
     )
     compliance = influence_matrix(halves) / np.pi
-    step = CondensedCoupling(table, compliance).press(Control(force=force))
+    step = CondensedLaws(table, compliance).press(Control(force=force))
     found = np.reshape(step.patches.pressure_MPa, (many, 2, many, 2)).mean(axis=(1, 3)).ravel()
     exact = resolved.response.patch_pressure[0]
     assert exact.max() < 0.8 * 1.5 * force / (np.pi * hertz**2)  # roughness spreads the pressure

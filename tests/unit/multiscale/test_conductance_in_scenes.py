@@ -75,7 +75,7 @@ def test_a_block_does_not_change_what_its_contacts_conduct_between_half_spaces()
 def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
     done = Run(scene(kind))
     for step in done.load_steps():
-        laws = done.table.laws
+        laws = done.coupling.table.laws
         ahead, behind = (
             [
                 float(law.pressure(c + way))
@@ -85,7 +85,7 @@ def test_patch_laws_have_their_stiffness_and_conduct_side_by_side(kind):
         )
         rate = np.subtract(ahead, behind) / 2e-8
         np.testing.assert_allclose(step.patches.stiffness_MPa_per_mm, rate, rtol=1e-5, atol=1e-3)
-        modulus = done.setup.materials.contact_modulus
+        modulus = done.coupling.materials.contact_modulus
         # MPa/mm over MPa on mm² is a length in mm
         expected = 2.0 * PAIR * (rate.sum() * 0.25 / modulus) * 1e-3
         assert step.thermal_conductance_W_per_K == pytest.approx(expected, rel=1e-5)

@@ -175,8 +175,8 @@ def test_run_that_stops_early_shows_its_last_contact():
     whole = Run(scene())
     next(whole.load_steps())
     assert whole.contacts == ()
-    whole.make_contact()
-    whole.make_contact()  # once only
+    whole.finish()
+    whole.finish()  # once only
     assert [record.step for record in whole.contacts] == [1]
 
 

@@ -12,6 +12,8 @@ from mpi4py import MPI
 
 from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
+from multiscale.couplings.dispatch import coupling_class
+from multiscale.inputs.memory import body_request, shortage_warnings
 from multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
@@ -19,8 +21,6 @@ from multiscale.machine import (
     control_group_memory,
     memory_of_this_node,
 )
-from multiscale.planning.block_plan import memory_warnings
-from multiscale.setup.memory import body_request, check_memory, memory_requests
 from support.errors import InputError
 
 PAPER = Path(__file__).parents[3] / "demos" / "scenes" / "paper.toml"
@@ -30,6 +30,14 @@ GB = 1e9
 
 def scene(*words):
     return Scene.load(PAPER, ["surface.grid=[64, 64]", *words])
+
+
+def requests(given):
+    return coupling_class(given).requests(given)
+
+
+def check_memory(given, nodes):
+    coupling_class(given).check_memory(given, nodes)
 
 
 def of(count, *, ranks=1, memory=64.0):
@@ -124,7 +132,7 @@ def test_isolated_laws_are_dealt_to_the_ranks():
     laws = {
         kind: next(
             request
-            for request in memory_requests(scene(*words, f"coupling.kind={kind}"))
+            for request in requests(scene(*words, f"coupling.kind={kind}"))
             if request.purpose == "a law for every patch"
         )
         for kind in ("isolated", "consistent")
@@ -137,12 +145,12 @@ def test_isolated_laws_are_dealt_to_the_ranks():
 def test_a_plan_says_what_nodes_a_run_needs():
     one = of(1)
     setup = make_setup(scene(*LARGE), nodes=replace(one, extensible=True))
-    (warning,) = memory_warnings(setup, one)
+    (warning,) = shortage_warnings(setup.memory_requests(), one)
     assert warning == (
         "block.cells = (500, 500, 200): needs about 250 GB of memory; there is one node of 64 GB; "
         "4 such nodes would do, filled evenly by mpirun over several hosts"
     )
-    assert not list(memory_warnings(setup, of(4)))
+    assert not list(shortage_warnings(setup.memory_requests(), of(4)))
     with pytest.raises(InputError, match="one node of 30 GB"):  # of which no number helps
         words = ("patches.grid=[64, 64]", "surface.grid=[20000, 20000]")
         make_setup(scene(*words), nodes=replace(of(1, memory=30.0), extensible=True))
@@ -153,12 +161,13 @@ def test_the_reference_is_shared_but_for_gmsh():
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
         make_setup(scene(*hexahedra), nodes=of(1))
     setup = make_setup(scene(*hexahedra), nodes=of(8))
-    assert setup.meshes.gathered == 0.0
-    assert "the reference needs about" in next(iter(memory_warnings(setup, of(1))))
+    assert setup.rough_meshes.gathered == 0.0
+    (first, *_) = shortage_warnings(setup.memory_requests(), of(1))
+    assert "the reference needs about" in first
     tetrahedra = ("coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=1")
     setup = make_setup(scene(*tetrahedra))
-    least = setup.meshes.gathered
-    assert 0.0 < least < 0.2 * setup.meshes.bytes
+    least = setup.rough_meshes.gathered
+    assert 0.0 < least < 0.2 * setup.rough_meshes.bytes
     many = ClusterNodes(ranks=(1,) * 1000, memory=0.9 * least)
     text = r"gmsh on rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
     with pytest.raises(InputError, match=text):

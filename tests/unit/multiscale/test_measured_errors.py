@@ -12,7 +12,6 @@ import pytest
 
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene, run
-from multiscale.couplings.contact import on_body
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
 from multiscale.readable import quantity, with_error
@@ -104,8 +103,8 @@ def test_a_prescribed_force_has_an_error_of_the_approach():
 
 
 def test_laws_under_a_plane_free_to_turn_are_compared_with_one_free_to_turn():
-    setup = Run(scene("concurrent")).setup
-    probe = ErrorProbe(model=setup.micro, on_body=on_body(setup, None), order=0, by_laws=True)
+    setup = Run(scene("concurrent")).coupling
+    probe = ErrorProbe(model=setup.micro, on_body=setup.put_on_body, order=0, by_laws=True)
     free = Control(approach=0.006, tilt=None)
     turned = probe.on_body(setup.micro, 0).equilibrium(free)
     level = probe.on_body(setup.micro, 0).solve(0.006)
@@ -159,8 +158,8 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
 
 
 def test_fewer_modes_are_solved_on_the_body_itself():
-    setup = Run(scene("concurrent")).setup
-    body = on_body(setup, None)
+    setup = Run(scene("concurrent")).coupling
+    body = setup.put_on_body
     probe = ErrorProbe(model=setup.micro, on_body=body, order=2)
     stiff = replace(probe, on_body=lambda model, order: replace(body(model, order), body=None))
     force = body(setup.micro, 2).solve(0.006).force

@@ -15,9 +15,8 @@ from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel, HalfSpaceState
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
+from multiscale.couplings.cost import cost_statements
 from multiscale.output.results import write_results
-from multiscale.planning.plan import statements, warnings
-from multiscale.planning.work import work_of
 from multiscale.results.contact_record import ContactRecord
 
 FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
@@ -84,7 +83,7 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
     assert len(list(run.load_steps())) == 2
     names = {path.name for path in write_results(tmp_path, run, options=[])}
     assert names == {"history.csv", "patches.csv", "provenance.json"}
-    assert "output" not in run.seconds  # no figure was drawn
+    assert "output" not in run.clock.seconds  # no figure was drawn
 
 
 def test_a_contact_is_worked_out_for_the_last_load_step_alone(monkeypatch):
@@ -116,20 +115,20 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     if kind != "isolated" or load == "approach":
         for solution in ("solve", "solve_force", "equilibrium", "respond", "press"):
             monkeypatch.setattr(HalfSpaceModel, solution, never)
-    monkeypatch.setattr("multiscale.couplings.patch_compliance.embedding", never)
-    monkeypatch.setattr("multiscale.couplings.body.Body.face", never)
-    monkeypatch.setattr("multiscale.couplings.contact.on_body", never)
-    monkeypatch.setattr("multiscale.couplings.assembly.make_table", never)
+    monkeypatch.setattr("multiscale.bodies.bodies.Bodies.contact_face", never)
+    monkeypatch.setattr("multiscale.bodies.block.BlockTerms.face", never)
+    monkeypatch.setattr("multiscale.couplings.micro_coupling.on_body", never)
+    monkeypatch.setattr("multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
-    said = dict(statements(setup, work_of(setup)))
+    said = dict(setup.statements(cost_statements(setup, 1e8, 1)))
     assert {"work", "cost", "load", "coupling", "contact"} <= set(said)
-    assert all(isinstance(text, str) for text in warnings(setup))
+    assert all(isinstance(text, str) for text in setup.warnings())
 
 
 def test_patches_out_of_reach_build_no_law():
     given = data("isolated", patches={"grid": [4, 4]}, load={"approach": 0.003, "steps": 1})
     run = Run(Scene.from_dict(given))
-    reached = run.setup.interfering_patches
+    reached = run.coupling.interfering_patches
     assert 0 < reached < 16
     assert sum(not law.is_open for law in run.make_laws().laws) == reached
 
@@ -187,7 +186,7 @@ def test_hardness_and_conductance_cost_nothing_where_nobody_asks(tmp_path, monke
     """No plastic depth, no second stiffness, and none of the modules that make them."""
     path, asked = tmp_path / "asked", tmp_path / "not"
     path.mkdir(), asked.mkdir()
-    modules = {"multiscale.conductances", "micro.conductance"}
+    modules = {"multiscale.observers.conductance", "micro.conductance"}
     heat = {"conductance": {"conductivity": ["50 W/m/K"]}}
     assert modules <= loaded(path, "run", data(**heat))
     assert not modules & loaded(asked, "run", data())

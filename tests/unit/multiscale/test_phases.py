@@ -22,7 +22,7 @@ def test_phases_add_up(monkeypatch, load, kind):
     run = Run(scene)
     assert len(list(run.load_steps())) == 1
     elapsed = next(looks) - 101.0  # from the first look of the run to the last
-    times = run.times
+    times = run.clock.times
     assert sum(times.values()) == pytest.approx(elapsed, rel=1e-12)  # sums of whole numbers
     assert {"surface", "load estimate", "load steps", "other"} <= set(times)
     assert min(times.values()) >= 0.0

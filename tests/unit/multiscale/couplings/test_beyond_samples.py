@@ -34,14 +34,14 @@ def test_laws_that_end_too_early_are_extended():
     short = Run(scene.with_({"law.largest_pressure": "5 MPa", "load.steps": 4}))
     early = short.make_laws()
     *_, step = short.load_steps()
-    assert early.largest_pressure < 7.0 and short.table.largest_pressure > 20.0
+    assert early.largest_pressure < 7.0 and short.coupling.table.largest_pressure > 20.0
     # both laws are right to the tolerance of their rows, 1e-3 of the pressure
     assert step.approach_mm == pytest.approx(wanted.approach_mm, rel=2e-3)
     assert step.force_N == pytest.approx(2000.0, rel=1e-9)
-    (kept,), (longer,) = early.laws, short.table.laws
+    (kept,), (longer,) = early.laws, short.coupling.table.laws
     for name, column in kept.rows.columns():  # earlier load steps stay what they were
         np.testing.assert_array_equal(getattr(longer.rows, name)[: len(kept.rows)], column)
-    (other,) = whole.table.laws
+    (other,) = whole.coupling.table.laws
     closures = np.linspace(0.1, 0.95, 50) * min(longer.range[1], other.range[1])
     off = longer.pressure(closures) - other.pressure(closures)
     least = 0.03 * other.rows.pressure[-1]  # smaller loads count as this much, see `refinement`
@@ -63,7 +63,7 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     # Newton's iteration ends at 1e-9 of the load
     assert resumed.approach_mm == pytest.approx(last.approach_mm, rel=1e-8)
     np.testing.assert_allclose(
-        again.table.laws[0].rows.pressure, first.table.laws[0].rows.pressure, rtol=1e-12
+        again.laws.laws[0].rows.pressure, first.laws.laws[0].rows.pressure, rtol=1e-12
     )
 
 

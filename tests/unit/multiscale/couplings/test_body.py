@@ -7,9 +7,6 @@ import pytest
 
 from micro import BodyModes, FiniteSlopes, FreeSides
 from multiscale import Scene, make_setup
-from multiscale.couplings.body import scene_body
-from multiscale.couplings.contact import contact_model
-from multiscale.couplings.patch_compliance import patch_displacements
 from support.errors import InputError
 
 
@@ -51,12 +48,12 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
     found = setup(kind, coupling=coupling)
     # a quarter of the block's height, its shortest side
     expected = FreeSides(lengths=(1.0, 1.0), poisson_ratio=0.15, decay_length=0.2)
-    assert scene_body(found).side_term == expected
-    model = contact_model(found, None)
+    assert found.bodies.terms(side_term=True).side_term == expected
+    model = found.model_on_body()
     assert model.sides == expected
     assert isinstance(model.body, BodyModes)
     assert isinstance(model.slopes, FiniteSlopes)
-    assert (found.model.sides, found.model.body, found.model.slopes) == (None, None, None)
+    assert (found.micro.sides, found.micro.body, found.micro.slopes) == (None, None, None)
 
 
 @pytest.mark.parametrize(
@@ -65,14 +62,13 @@ def test_cells_know_the_free_sides_of_their_block(kind, coupling):
 )
 def test_other_bodies_have_their_sides_in_the_body_term(given):
     found = setup(slopes=False, **given)
-    assert scene_body(found).side_term is None
-    model = contact_model(found, None)
+    model = found.model_on_body()
     assert isinstance(model.body, BodyModes)
     assert getattr(model, "sides", None) is None
 
 
 def test_patches_alone_lie_on_a_half_space():
-    model = contact_model(setup("isolated"), None)
+    model = setup("isolated").model_alone()
     assert (model.sides, model.body, model.slopes) == (None, None, None)
 
 
@@ -80,7 +76,7 @@ def test_patches_alone_lie_on_a_half_space():
 @pytest.mark.parametrize("slopes", [None, True, False])
 def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
     found = setup(kind, slopes=slopes)
-    model = contact_model(found, None)
+    model = found.model_on_body()
     assert (model.slopes is not None) == (slopes is not False)
     assert (model.body is not None) == (kind != "analytic")
 
@@ -88,7 +84,7 @@ def test_slopes_are_finite_unless_the_scene_says_otherwise(kind, slopes):
 @pytest.mark.parametrize("way", ["decomposed", "finite-element"])
 def test_displacements_of_patches_are_those_of_the_macro_model(way):
     found = setup("consistent", patches=2, coupling={"compliance": way, "newton": "condensed"})
-    dense = patch_displacements(found, None, dense=True)
+    dense = found.bodies.patch_displacements(dense=True, solutions=0)
     pressures = np.array([[0.0, 0.0, 0.0, 0.0], [1.0, 2.0, 0.0, 4.0]])
     sunk = dense(pressures)
     assert not sunk[0].any()
@@ -96,7 +92,7 @@ def test_displacements_of_patches_are_those_of_the_macro_model(way):
     assert np.all(sunk[1] > 0.0)
     if way == "finite-element":
         # the linear solver's tolerance
-        solved = patch_displacements(found, None, dense=False)(pressures)
+        solved = found.bodies.patch_displacements(dense=False, solutions=0)(pressures)
         np.testing.assert_allclose(solved, sunk, rtol=1e-7)
 
 
@@ -108,5 +104,5 @@ def test_blocks_too_flat_for_their_modes_are_refused(key, block):
     with pytest.raises(
         InputError, match=r"so flat a block, in \d+ modes a side, needs about"
     ) as caught:
-        contact_model(setup(approach=1e-6, **block), None)
+        setup(approach=1e-6, **block).model_on_body()
     assert caught.value.key == key

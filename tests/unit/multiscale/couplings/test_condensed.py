@@ -7,10 +7,7 @@ import pytest
 from petsc4py import PETSc
 
 from multiscale import Run, Scene, run
-from multiscale.couplings.assembly import newton_choice
-from multiscale.couplings.patch_compliance import patch_compliance
-from multiscale.planning.plan import statements
-from multiscale.planning.problem_setup import make_setup
+from multiscale.setup import make_setup
 from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -71,7 +68,7 @@ def test_way_down_is_the_way_up(way):
 
 def compliance(way, cells):
     words = [f"coupling.compliance={way}", "coupling.newton=condensed", f"block.cells={cells}"]
-    return patch_compliance(make_setup(scene(*words)), None)
+    return make_setup(scene(*words)).bodies.patch_compliance()
 
 
 def test_a_users_loose_solver_leaves_nothing_to_later_runs(monkeypatch, tmp_path):
@@ -137,22 +134,24 @@ def test_leaving_a_law_ends_the_run_and_keeps_what_was_accepted():
     whole = Run(scene("coupling.newton=condensed"))
     whole.make_laws()
     short = Run(scene("coupling.newton=condensed", approach="4 um")).make_laws()
-    whole.table = short
+    whole.coupling.table = short
     with pytest.raises(NotConverged, match=r"load step 2 .approach 0.0053.*LAW_RANGE: patch \("):
         list(whole.load_steps())
     assert [step.step for step in whole.steps] == [1]
 
 
-def test_fields_are_those_of_the_patch_pressures():
+def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     """Without a mesh that was pressed, one is loaded by the pressures that were found."""
     (full, condensed) = (
         Run(scene(f"coupling.newton={newton}", "output.fields=true"))
         for newton in ("full", "condensed")
     )
-    fields = []
+    written, fields = [], []
+    monkeypatch.setattr("macro.write_fields", lambda path, *what: written.append(what))
     for whole in (full, condensed):
         list(whole.load_steps())
-        interface, steps = whole.fields.on_body(whole.coupling, whole.steps)
+        whole.write_fields(Path("fields.xdmf"))
+        interface, steps = written.pop()
         ((number, displacement, pressure),) = steps
         assert number == len(whole.steps)
         np.testing.assert_array_equal(pressure, whole.steps[-1].patches.pressure_MPa)
@@ -173,7 +172,7 @@ def test_fields_are_those_of_the_patch_pressures():
     ],
 )
 def test_newton_is_chosen_by_counted_cycles(overrides, condensed, why):
-    choice = newton_choice(make_setup(scene(*overrides)))
+    choice = make_setup(scene(*overrides)).newton()
     assert choice.condensed == condensed
     assert why in choice.why
 
@@ -182,5 +181,5 @@ def test_cells_of_a_decomposed_block_do_not_matter():
     """Its body term has a mesh of its own."""
     coarse, fine = (compliance("decomposed", cells) for cells in ([8, 8, 5], [64, 64, 40]))
     np.testing.assert_array_equal(coarse, fine)
-    text = dict(statements(make_setup(scene("coupling.compliance=decomposed"))))["block"]
+    text = dict(make_setup(scene("coupling.compliance=decomposed")).statements())["block"]
     assert "from finite elements of high order" in text

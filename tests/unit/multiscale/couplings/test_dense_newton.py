@@ -9,7 +9,7 @@ from scipy.optimize import brentq, root
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from multiscale.couplings.condensed import equilibrium
+from multiscale.law_solvers.condensed import equilibrium
 from support.errors import InputError, NotConverged
 
 

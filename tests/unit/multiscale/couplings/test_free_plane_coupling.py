@@ -6,7 +6,7 @@ import pytest
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.law_couplings import FreePlaneCoupling
+from multiscale.law_solvers.free_plane import FreePlaneLaws
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
@@ -71,7 +71,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         model, patches, mean_heights=means, largest=Control(force=2.0, tilt=None)
     )
     compliance = influence_matrix(patches) / (np.pi * MODULUS)
-    coupling = FreePlaneCoupling(table, lambda pressures: pressures @ compliance.T)
+    coupling = FreePlaneLaws(table, lambda pressures: pressures @ compliance.T)
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
         _, plane, *_ = model.press(control, patches=patches, mean_heights=means)
@@ -82,7 +82,7 @@ def test_any_partition_turns_as_the_contacts_do(grid):
         assert np.abs(step.moment_N_mm).max() < 1e-6 * force
     with pytest.raises(NotConverged, match="LAW_RANGE"):
         coupling.press(Control(force=3.0, tilt=None))
-    other = FreePlaneCoupling(table, lambda pressures: 6.0 * pressures @ compliance.T)
+    other = FreePlaneLaws(table, lambda pressures: 6.0 * pressures @ compliance.T)
     with pytest.raises(NotConverged, match=r"the patches at .*make the laws for this block"):
         other.press(Control(force=2.0, tilt=None))
 
@@ -91,4 +91,4 @@ def test_laws_of_a_given_tilt_have_no_path():
     patches = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
     law = PatchLaw(rows=SolvedRows.none(), first_touch=1.0, initial_separation=1.0)
     with pytest.raises(ValueError, match="given tilt"):
-        FreePlaneCoupling(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)
+        FreePlaneLaws(LawTable(patches=patches, laws=(law,), made_by={}), lambda _: _)

@@ -7,7 +7,7 @@ import pytest
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from multiscale.couplings.law_couplings import EmbeddedCoupling
+from multiscale.law_solvers.embedded import EmbeddedLaws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows
@@ -55,7 +55,7 @@ class EasyBlock:
 
 def embedded(*laws):
     table = LawTable(patches=PATCHES, laws=laws or (law(), law()), made_by={})
-    return EmbeddedCoupling(EasyBlock(), table, face=None)
+    return EmbeddedLaws(EasyBlock(), table, face=None)
 
 
 def test_steps_read_the_laws_at_their_closures():
@@ -90,11 +90,11 @@ def test_remedy_beyond_a_consistent_law_fits_what_is_wrong(falls, remedy):
     bent = law(0.5, **falling)
     table = LawTable(patches=PATCHES, laws=(law(), bent), made_by={"coupling": "consistent"})
     with pytest.raises(BeyondLaws, match=f"LAW_RANGE: .*: take coupling.{remedy}"):
-        EmbeddedCoupling(EasyBlock(), table, face=None).press(Control(approach=0.8))
+        EmbeddedLaws(EasyBlock(), table, face=None).press(Control(approach=0.8))
 
 
 def test_remedy_beyond_the_law_of_a_sample_names_its_range():
     made_by = {"coupling": "representative"}
     table = LawTable(patches=PATCHES, laws=(law(), law(0.5)), made_by=made_by)
     with pytest.raises(BeyondLaws, match=r"LAW_RANGE: .* almost the hardness or"):
-        EmbeddedCoupling(EasyBlock(), table, face=None).press(Control(approach=8.0))
+        EmbeddedLaws(EasyBlock(), table, face=None).press(Control(approach=8.0))

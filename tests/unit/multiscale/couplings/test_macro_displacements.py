@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.patch_compliance import patch_displacements
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 SMALL = [
@@ -22,7 +21,8 @@ def test_the_mesh_gives_those_of_its_compliance():
     pressures = np.random.default_rng(1).uniform(0.0, 50.0, (3, 8))
     pressures[1] = 0.0  # before the first touch
     dense, meshed = (
-        patch_displacements(setup, None, dense=dense)(pressures) for dense in (True, False)
+        setup.bodies.patch_displacements(dense=dense, solutions=0)(pressures)
+        for dense in (True, False)
     )
     np.testing.assert_allclose(meshed, dense, rtol=1e-8, atol=1e-12)  # linear solves to 1e-10
     assert np.all(meshed[1] == 0.0)

@@ -14,7 +14,6 @@ from multiscale import Scene, make_setup, run
 from multiscale.cli.command_line import main
 from multiscale.figures.contact import pressure_figure
 from multiscale.figures.curves import history_figure
-from multiscale.planning import plan
 from multiscale.results.reference_record import reference_record
 from support.errors import InputError
 
@@ -274,11 +273,10 @@ def test_fields_are_those_of_the_rough_block(capsys, tmp_path):
 
 def test_tetrahedra_are_small_where_contact_can_occur():
     setup = make_setup(scene(cells="reference.mesh=tetrahedra"))
-    statements = dict(plan.statements(setup))
+    statements = dict(setup.statements())
     assert "tetrahedra (P2)" in statements["block"]
     assert "across a typical contact" in statements["block"]
-    with pytest.raises(ValueError, match="a reference has no micro model"):
-        _ = setup.model
+    assert not hasattr(setup, "micro")
 
 
 def test_the_blocks_cells_are_not_the_references():
@@ -287,13 +285,13 @@ def test_the_blocks_cells_are_not_the_references():
     assert given.block.cells == (40, 40, 25)
     setup = make_setup(given)
     default = make_setup(Scene.load(PAPER, ["coupling.kind=reference", "block.cells=auto"]))
-    assert not setup.meshes.hexahedral
-    assert setup.meshes.unknowns == default.meshes.unknowns
+    assert not setup.rough_meshes.hexahedral
+    assert setup.rough_meshes.unknowns == default.rough_meshes.unknowns
 
 
 def test_plan_of_hexahedra():
     setup = make_setup(scene("reference.meshes=1", "block.grading=1"))
-    statements, warnings = dict(plan.statements(setup)), " ".join(plan.warnings(setup))
+    statements, warnings = dict(setup.statements()), " ".join(setup.warnings())
     assert "one mesh of 12 × 12 × 4 hexahedra (Q1)" in statements["block"]
     assert f"{3 * 13 * 13 * 5} unknowns" in statements["block"]
     assert "no error bar" in warnings

@@ -8,8 +8,8 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.couplings.condensed import CondensedCoupling
-from multiscale.couplings.law_couplings import FreePlaneCoupling
+from multiscale.law_solvers.condensed import CondensedLaws
+from multiscale.law_solvers.free_plane import FreePlaneLaws
 from multiscale.laws.consistent import WholeSurface, consistent_laws
 
 MODULUS = 4000.0
@@ -31,7 +31,7 @@ def parts(surface, grid, name="circular", tolerance=1e-4):
         model, patches, mean_heights=means, largest=LARGEST, tolerance=tolerance, most_rows=400
     )
     half_space = influence_matrix(patches) / (np.pi * MODULUS)
-    return model, patches, means, table, CondensedCoupling(table, half_space)
+    return model, patches, means, table, CondensedLaws(table, half_space)
 
 
 @pytest.mark.parametrize("name", ["circular", "half-space"])
@@ -104,9 +104,9 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         displacements=lambda pressures: pressures @ compliance.T,
         tolerance=1e-3,
     )
-    coupling, start = CondensedCoupling(table, compliance), None
+    coupling, start = CondensedLaws(table, compliance), None
     if tilt is None:
-        coupling = FreePlaneCoupling(table, lambda pressures: pressures @ compliance.T)
+        coupling = FreePlaneLaws(table, lambda pressures: pressures @ compliance.T)
     assert table.made_by["tilt"] == ("free" if tilt is None else f"{tilt[0]:g}, {tilt[1]:g}")
     for force in (0.2, 0.7, 1.3, 2.0):
         control = Control(force=force, tilt=tilt)

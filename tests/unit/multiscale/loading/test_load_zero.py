@@ -37,7 +37,7 @@ def scene(zero, kind="analytic", depth=0.0, **sections):
 
 
 def depth_of(given):
-    return Run(given).setup.zero
+    return Run(given).coupling.zero
 
 
 CASES = {
@@ -99,13 +99,13 @@ def test_laws_of_samples_count_from_the_zero():
 
     known = of("first touch").make_laws()
     for zero in ZEROS:
-        run_ = of(zero, of(zero).setup.zero)
+        run_ = of(zero, of(zero).coupling.zero)
         run_.make_laws()
         law = run_.laws.laws[0]
-        assert law.first_touch == pytest.approx(known.laws[0].first_touch - run_.setup.zero)
+        assert law.first_touch == pytest.approx(known.laws[0].first_touch - run_.coupling.zero)
         closure = np.linspace(*known.laws[0].range, 7)
         np.testing.assert_allclose(
-            law.pressure(closure - run_.setup.zero), known.laws[0].pressure(closure), rtol=1e-9
+            law.pressure(closure - run_.coupling.zero), known.laws[0].pressure(closure), rtol=1e-9
         )
         if zero == "mean plane":
             assert law.initial_separation == pytest.approx(0.0, abs=1e-15)
@@ -147,10 +147,10 @@ def test_the_error_of_the_zero_is_a_cause():
     """It is what the plane's force changes by, and counts in full in the approach under a force."""
     given = scene("first touch")
     last = run(given).steps[-1]
-    setup = Run(given).setup
+    setup = Run(given).coupling
     error = setup.zero_error
     assert error > 0.0
-    model = setup.model  # half as many cells a side do not touch
+    model = setup.micro  # half as many cells a side do not touch
     nearer = [model.equilibrium(Control(approach=0.5 * UP + more)).force for more in (0.0, error)]
     assert dict(last.errors)["zero"] == pytest.approx(np.diff(nearer)[0], rel=1e-4)  # residuals
     forced = run(scene("first touch", load={"approach": None, "force": "2 N"})).steps[-1]

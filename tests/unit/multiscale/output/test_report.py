@@ -124,7 +124,7 @@ LAWS = ["coupling.kind=isolated", "block.cells=[8, 8, 4]"]
 def test_every_coupling_has_a_readable_report(words, force):
     run = Run(Scene.load(PAPER, [*SMALL, *words]))
     list(run.load_steps())
-    run.make_contact()
+    run.finish()
     page = parsed(report_html(run, {}, options=["-ksp_rtol", "1e-9"]))
     names = page.text[page.text.index("force") :]
     assert re.fullmatch(force, names[1])

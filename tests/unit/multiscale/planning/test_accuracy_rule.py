@@ -9,17 +9,14 @@ import time
 import pytest
 
 from multiscale import Run, Scene, make_setup
+from multiscale.auto import mesh_search, search
+from multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
+from multiscale.couplings import work
+from multiscale.couplings.work import SOLUTIONS_OF_LAWS
 from multiscale.machine import ClusterNodes
 from multiscale.output import terminal
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
-from multiscale.planning import accuracy, mesh_accuracy, work
-from multiscale.planning.auto_keys import (
-    SOLUTIONS_OF_LAWS,
-    auto_keys,
-    chosen_coupling,
-    resolved_sections,
-)
 from multiscale.readable import Caution
 from support.errors import InputError
 
@@ -58,7 +55,7 @@ def scene(kind="open", error=0.03, **sections):
 
 def mesh_error(setup):
     """An error of third order in the edges, 1 % at 25 µm."""
-    return 0.01 * (float(setup.meshes.sizes[-1]) / 0.025) ** 3
+    return 0.01 * (float(setup.rough_meshes.sizes[-1]) / 0.025) ** 3
 
 
 @pytest.mark.parametrize(("kind", "stated"), list(itertools.product(KINDS, STATED)))
@@ -87,8 +84,8 @@ def test_what_is_stated_is_kept_and_the_rest_is_refined(kind, stated):
     decision = setup.decision
     assert decision.errors
     if kind == "reference" and refined:
-        assert decision.error <= 0.03 and setup.meshes.sizes[-1] < 0.037
-    if kind != "reference" and setup.meshes is None and (grid or model is None):
+        assert decision.error <= 0.03 and setup.rough_meshes.sizes[-1] < 0.037
+    if kind != "reference" and setup.scene.kind != "reference" and (grid or model is None):
         grid_error = decision.errors["grid"]
         # refined to a share of the accuracy, or until other causes are what is left
         others = decision.error - grid_error
@@ -232,7 +229,7 @@ HARD = 2e-4
 
 def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
     """The rule's meshes are taken, or refused with what they need; no other way is taken."""
-    monkeypatch.setattr(accuracy, "_TRIALS", 1)  # of cells
+    monkeypatch.setattr(search, "_TRIALS", 1)  # of cells
     given = scene(error=HARD)
     chosen = make_setup(given, mesh_error=lambda setup: 1e-4)
     assert chosen.scene.kind == "reference"
@@ -241,8 +238,8 @@ def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
 
 
 def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
-    monkeypatch.setattr(mesh_accuracy, "_MOST_UNKNOWNS", 1000)
-    monkeypatch.setattr(accuracy, "_TRIALS", 1)
+    monkeypatch.setattr(mesh_search, "_MOST_UNKNOWNS", 1000)
+    monkeypatch.setattr(search, "_TRIALS", 1)
     setup = make_setup(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"
     assert not setup.decision.kept and "is not kept" in setup.decision.warning

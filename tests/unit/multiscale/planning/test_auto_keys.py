@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from multiscale import Scene, make_setup
+from multiscale.auto.keys import auto_keys, resolved_sections
 from multiscale.machine import ClusterNodes
-from multiscale.planning.auto_keys import auto_keys, resolved_sections
-from multiscale.planning.plan import statements, warnings
 from support.errors import InputError
 
 
@@ -50,7 +49,7 @@ def test_tighter_accuracies_measure_smaller_errors_on_finer_grids():
     assert grids[0] < grids[-1]
     for setup in found:
         assert setup.decision.kept
-        assert not [text for text in warnings(setup) if "accuracy" in text]
+        assert not [text for text in setup.warnings() if "accuracy" in text]
 
 
 def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
@@ -63,14 +62,14 @@ def test_auto_values_are_resolved_and_the_plan_says_what_was_measured():
     assert resolved.block.cells == "auto"  # of no mesh
     assert set(setup.decision.errors) == {"body", "slopes", "zero", "grid"}
     assert setup.decision.error <= setup.decision.accuracy == 0.05
-    assert dict(statements(setup))["choice"] == setup.decision.sentence
+    assert dict(setup.statements())["choice"] == setup.decision.sentence
 
 
 def test_what_a_run_began_with_is_what_it_goes_on_with():
     given = scene(accuracy=0.05)
     setup = make_setup(given)
     kept = json.loads(json.dumps(resolved_sections(setup, given)))
-    again = make_setup(given, kept)
+    again = make_setup(given, resolved=kept)
     assert again.scene == setup.scene
     np.testing.assert_array_equal(again.micro.surface.heights, setup.micro.surface.heights)
     assert again.micro.reference_height == setup.micro.reference_height == setup.surface.highest
@@ -87,7 +86,7 @@ def test_finite_slopes_left_out_are_an_error():
     stated = {"model": "half-space", "finite_slopes": False}
     setup = make_setup(scene({"grid": "auto"}, accuracy=0.01, micro=stated))
     assert setup.decision.errors["slopes"] > 0.01
-    (said,) = [text for text in warnings(setup) if "accuracy" in text]
+    (said,) = [text for text in setup.warnings() if "accuracy" in text]
     assert "an accuracy of 1 % is not kept" in said
     assert "most of it by slopes" in said
 
@@ -100,7 +99,7 @@ def test_laws_are_interpolated_to_a_tenth_of_the_accuracy():
     assert setup.table_tolerance == pytest.approx(0.02, rel=1e-12)
     stated = scene(accuracy=0.2, coupling={"kind": "consistent"}, load=load)
     begun = make_setup(stated)
-    again = make_setup(stated, json.loads(json.dumps(resolved_sections(begun, stated))))
+    again = make_setup(stated, resolved=json.loads(json.dumps(resolved_sections(begun, stated))))
     assert again.table_tolerance == begun.table_tolerance == setup.table_tolerance
 
 
@@ -163,13 +162,13 @@ def test_models_without_measure_say_so():
     assert not setup.decision.errors
     assert not setup.decision.kept
     assert "which is not measured beforehand" in setup.decision.sentence
-    assert dict(statements(setup))["error"].startswith("not measured: elliptic")
+    assert dict(setup.statements())["error"].startswith("not measured: elliptic")
 
 
 def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
     setup = make_setup(scene(accuracy=0.0015), mesh_error=lambda setup: 0.001)
     assert setup.scene.coupling.kind == "reference"
-    assert setup.micro is None
+    assert setup.cells is None
     assert setup.decision.kept
     assert sum(setup.decision.missed.values()) > 0.0015
     assert "without meshing the roughness measured" in setup.decision.sentence
@@ -178,13 +177,13 @@ def test_a_reference_is_taken_where_nothing_else_keeps_the_accuracy():
 def test_meshes_are_refined_until_their_error_keeps_the_accuracy():
     def made(accuracy, **reference):
         given = scene(accuracy=accuracy, coupling={"kind": "reference"}, reference=reference)
-        return make_setup(given, mesh_error=lambda s: (float(s.meshes.sizes[-1]) / 0.03) ** 3)
+        return make_setup(given, mesh_error=lambda s: (float(s.rough_meshes.sizes[-1]) / 0.03) ** 3)
 
     coarse, fine = made(0.1), made(0.01)
-    assert fine.meshes.sizes[-1] < coarse.meshes.sizes[-1]
+    assert fine.rough_meshes.sizes[-1] < coarse.rough_meshes.sizes[-1]
     assert fine.decision.error <= 0.01
     stated = made(0.01, fine=0.03)
-    assert stated.meshes.sizes[-1] == pytest.approx(0.03)
+    assert stated.rough_meshes.sizes[-1] == pytest.approx(0.03)
     assert "most of it by mesh" in stated.decision.warning
 
 
@@ -243,5 +242,5 @@ def test_auto_values_survive_a_dump_and_are_in_the_schema():
 
 
 def test_the_plan_says_how_fine_the_heights_are():
-    said = dict(statements(make_setup(scene())))["surface"]
+    said = dict(make_setup(scene()).statements())["surface"]
     assert "8 heights along the shortest wavelength" in said  # 48 heights, 6 waves

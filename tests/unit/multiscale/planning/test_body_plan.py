@@ -1,18 +1,10 @@
 """What a plan says of bodies on meshes and of laws of samples."""
 
-import numpy as np
 import pytest
 from helpers.box_msh import write_box
-from mpi4py import MPI
 
 from geometry import BlockShape
-from macro.compliance.cache import cached
-from multiscale import Scene
-from multiscale.couplings.body import scene_body
-from multiscale.planning.memory_costs import Launch, run_memory_requests
-from multiscale.planning.plan import statements, warnings
-from multiscale.planning.set_up import set_up
-from multiscale.planning.work import work_of
+from multiscale import Scene, make_setup
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks
 SPECTRUM = {"hurst": 0.9, "waves": [2, 4], "rms_slope": 0.2, "seed": 3}
@@ -34,32 +26,30 @@ def setup_of(mesh, **sections):
         "body": {**body, "young_modulus": "4 GPa", "poisson_ratio": 0.48},
         "load": {"force": "2 N", "steps": 2},
     }
-    return set_up(Scene.from_dict(data | sections), None)
+    return make_setup(Scene.from_dict(data | sections))
 
 
 def test_a_plan_says_size_faces_and_body_term(mesh):
     setup = setup_of(mesh, coupling={"kind": "consistent"})
-    work = work_of(setup)
-    said = dict(statements(setup, work))
+    said = dict(setup.statements())
     assert "18 hexahedra (linear), 144 unknowns, contact face of 1 mm²" in said["body"]
     assert "the body lies below the plane of its contact face" in said["body term"]
     assert "E = 4 GPa, ν = 0.48" in said["inputs"] and "body 1 mm high" in said["inputs"]
-    assert "cells × products" in said["work"]  # no mesh: the body's term is known
-    assert [one.key for one in run_memory_requests(setup)].count("body.mesh") == 1
-    assert any("linear elements lock" in warning for warning in warnings(setup))
+    assert [one.key for one in setup.memory_requests()].count("body.mesh") == 1
+    assert any("linear elements lock" in warning for warning in setup.warnings())
 
 
 def test_a_plan_says_what_samples_there_are(mesh):
     setup = setup_of(mesh, counter_body=HALF_SPACE, **SAMPLES)
-    said = dict(statements(setup))
+    said = dict(setup.statements())
     assert "top: 2 periodic samples of 500 µm × 500 µm" in said["coupling"]
     assert "laws of samples hold at the points of the mesh" in said["newton"]
     assert "half-space with E = 100 GPa" in said["inputs"]
-    told = "; ".join(warnings(setup))
+    told = "; ".join(setup.warnings())
     assert "a sample stands for faces that are much larger" in told
-    assert "the half-space of the counter-body gives way on the scale of the sample alone" in told
+    assert "the compliance of the counter-body, a half-space, counts on the scale" in told
     measured = {**SURFACE, "detrend": "plane"}
-    told = "; ".join(warnings(setup_of(mesh, surface=measured, **SAMPLES)))
+    told = "; ".join(setup_of(mesh, surface=measured, **SAMPLES).warnings())
     assert "do not continue periodically: their sample is four mirror images" in told
 
 
@@ -69,18 +59,3 @@ def test_surfaces_lie_in_the_middle_of_a_face_or_where_the_scene_says(mesh):
     body = {"mesh": str(mesh), "contact": 1, "supports": [{"surface": 2}], "place": ["0.5 mm", 0]}
     moved = setup_of(mesh, body={**body, **HALF_SPACE}).bodies.first.frame
     assert moved.origin.tolist() == pytest.approx([0.5, 0.0, 0.0], abs=1e-12)
-
-
-def test_a_face_that_is_yet_to_be_solved_for_is_planned(mesh, tmp_path, monkeypatch):
-    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / "cache"))
-    setup = setup_of(mesh, coupling={"kind": "concurrent"})
-    terms = scene_body(setup)
-    assert not terms.is_cached()
-    first, later = (
-        work_of(setup, Launch.anew(1e8, solves_face=solves)) for solves in (True, False)
-    )
-    assert first.cycles > later.cycles == 0.0
-    assert "body term" in first.parts and "body term" not in later.parts
-    key = terms._key(terms._count(None))
-    cached("mesh-face", key, lambda: {"found": np.zeros(1)}, MPI.COMM_SELF)
-    assert terms.is_cached()

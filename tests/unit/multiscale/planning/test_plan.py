@@ -3,9 +3,8 @@
 import pytest
 
 from micro import HalfSpaceModel
-from multiscale.planning.plan import statements, warnings
-from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
 
 
 def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
@@ -30,15 +29,15 @@ def setup_of(lengths=(1.0, 1.0), kind="concurrent", **block):
 def test_the_micro_model_is_half_space_when_not_given():
     setup = setup_of()
     assert isinstance(setup.micro, HalfSpaceModel)
-    assert dict(statements(setup))["micro model"] == "half-space"
+    assert dict(setup.statements())["micro model"] == "half-space"
 
 
 @pytest.mark.parametrize("size", [0.02, 0.1, 5.0, 50.0])
 def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
     setup = setup_of((size, size))
     side = f"{1e3 * size:g} µm" if size < 1.0 else f"{size:g} mm"
-    assert f"{side} × {side} and {side} high" in dict(statements(setup))["block"]
-    assert not list(warnings(setup))
+    assert f"{side} × {side} and {side} high" in dict(setup.statements())["block"]
+    assert not list(setup.warnings())
 
 
 @pytest.mark.parametrize(
@@ -50,9 +49,9 @@ def test_the_block_of_a_map_of_any_size_is_a_cube_and_needs_no_note(size):
     ],
 )
 def test_a_block_beyond_three_to_one_is_noted(lengths, block, note):
-    (said,) = warnings(setup_of(lengths, **block))
+    (said,) = setup_of(lengths, **block).warnings()
     assert note in said
 
 
 def test_proportions_of_three_to_one_are_not_noted():
-    assert not list(warnings(setup_of((3.0, 1.0), height="3 mm")))
+    assert not list(setup_of((3.0, 1.0), height="3 mm").warnings())

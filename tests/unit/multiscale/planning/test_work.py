@@ -11,13 +11,12 @@ import pytest
 from geometry import BlockShape
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup
-from multiscale.loading.stepper import LoadHistory
+from multiscale.couplings import patch_laws, work
+from multiscale.couplings.cost import cost_statements, magnitude, memory_parts
+from multiscale.couplings.work import SOLUTIONS_OF_LAWS
+from multiscale.inputs.reference_meshes import mesh_unknowns
+from multiscale.loading.stepper import LoadHistory, step_count
 from multiscale.output.terminal import Pace
-from multiscale.planning import work
-from multiscale.planning.auto_keys import SOLUTIONS_OF_LAWS
-from multiscale.planning.memory_costs import Launch, step_count
-from multiscale.planning.work import magnitude, work_of
-from multiscale.setup.reference_meshes import mesh_unknowns
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
@@ -58,8 +57,8 @@ def test_a_load_step_is_one_solution(solved, load, kind):
     run = Run(scene(kind, load=load | {"steps": 4}))
     solved.clear()
     list(run.load_steps())
-    counted = work_of(run.setup)
-    assert solved == {counted.cells: counted.solutions} == {64**2: 4}
+    counted = run.coupling.work()
+    assert solved == {counted.size: counted.solutions} == {64**2: 4}
 
 
 @pytest.mark.parametrize("kind", [pytest.param("consistent", marks=pytest.mark.long), "isolated"])
@@ -71,7 +70,7 @@ def test_rows_of_laws_are_about_as_many_as_counted(solved, kind):
     rows = solved[64**2] if kind == "consistent" else np.mean(sizes)
     # refinement takes 33 to 65 rows, and some solutions to find its ends
     assert SOLUTIONS_OF_LAWS / 1.7 <= rows <= 1.7 * SOLUTIONS_OF_LAWS
-    assert work_of(run.setup).rows == SOLUTIONS_OF_LAWS
+    assert run.coupling.work().rows == SOLUTIONS_OF_LAWS
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2"])
@@ -86,7 +85,7 @@ def test_unknowns_of_a_mesh(element):
 def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind):
     run = Run(scene(kind, grid=grid, micro={"model": "half-space", "finite_slopes": False}))
     counted = sum(step.newton_iterations for step in run.load_steps()) * grid**2
-    assert work_of(run.setup).products / 2.0 <= counted <= 2.0 * work_of(run.setup).products
+    assert run.coupling.work().products / 2.0 <= counted <= 2.0 * run.coupling.work().products
 
 
 @pytest.mark.parametrize("way", ["reference", "full", "condensed"])
@@ -100,12 +99,12 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
         given = scene(cells=(8, 8, 5), coupling=coupling, micro={"model": "circular"})
     run = Run(given)
     list(run.load_steps())
-    counted = work_of(run.setup)
+    counted = run.coupling.work()
     assert counted.unknowns == (run.unknowns or counted.unknowns)
-    cycles = counted.cycles / counted.unknowns - work._SET_UP
+    cycles = counted.cycles / counted.unknowns - work.SET_UP_CYCLES
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step
-        assert cycles == work.CYCLES_PER_PATCH * 16
+        assert cycles == patch_laws._CYCLES_PER_PATCH * 16
     else:
         assert cycles / 3.0 <= done <= 3.0 * cycles
     run.close()
@@ -113,19 +112,17 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
 
 def test_work_grows_with_what_is_asked():
     def counted(**sections):
-        return work_of(make_setup(scene(**sections)))
+        return make_setup(scene(**sections)).work()
 
     few = counted()
     assert counted(load={"approach": 0.008, "steps": 40}).products == 10.0 * few.products
     assert counted(grid=128).products == 4.0 * few.products
     assert counted(micro={"finite_slopes": False}).products < few.products
     assert counted(output={"check": "last"}).solutions > few.solutions
-    figures = {"figures": True, "report": False, "check": "none"}
-    assert counted(output=figures).seconds > few.seconds
     meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
     coarse, fine = (counted(kind="reference", reference=mesh) for mesh in meshes)
     assert coarse.cycles < fine.cycles and coarse.products == 0.0
-    two = work_of(make_setup(scene("reference", reference=meshes[0])), Launch(ranks=2))
+    two = make_setup(scene("reference", reference=meshes[0])).work(2)
     assert coarse.computing == pytest.approx(2.0 * two.computing, rel=1e-12)
 
 
@@ -139,19 +136,16 @@ def test_steps_that_may_be_halved_are_counted():
 
 
 def test_the_plan_says_work_order_of_time_and_the_largest_part_of_the_memory():
-    launch = Launch(memory=1e6, imported=lambda _: True)
     flat = {"model": "half-space", "finite_slopes": False}
-    counted = work_of(make_setup(scene(grid=512, cells=(4, 4, 4), micro=flat)), launch)
-    said = dict(counted.statements())
+    coupling = make_setup(scene(grid=512, cells=(4, 4, 4), micro=flat))
+    said = dict(cost_statements(coupling, 1e6, 1))
     # 4 load steps of 30 products each on 512² cells
     assert "about 4 contact problems, on 262144 cells each: 31 million cells" in said["work"]
     assert "of the order of 3 s" in said["cost"]
-    assert "most of it for the contact problem" in said["cost"]
-    assert counted.memory == pytest.approx(sum(counted.parts.values()), rel=1e-12)
+    assert "most of it for the" in said["cost"]
     meshed = make_setup(scene(coupling={"kind": "consistent", "compliance": "finite-element"}))
-    counted = work_of(meshed, launch)
-    assert counted.parts["meshes and laws"] > 0.0
-    assert f"{SOLUTIONS_OF_LAWS} of them rows of laws" in dict(counted.statements())["work"]
+    assert memory_parts(meshed, meshed.work(), 1e6)["meshes and laws"] > 0.0
+    assert f"{SOLUTIONS_OF_LAWS} of them rows of laws" in dict(meshed.work().statements())["work"]
 
 
 @pytest.mark.parametrize(
@@ -186,5 +180,5 @@ def test_memory_of_the_contact_problem_is_what_a_run_allocates():
     list(run.load_steps())
     allocated = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    counted = work_of(run.setup).parts["contact problem"]
+    counted = run.coupling.work().memory
     assert counted / 2.0 < allocated < 2.0 * counted

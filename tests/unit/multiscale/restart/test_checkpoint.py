@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from multiscale import Run, Scene
+from multiscale.auto import keys as auto_keys
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
-from multiscale.planning import auto_keys
 from multiscale.restart.checkpoint import (
     FORMAT,
     CheckpointWriter,
@@ -510,7 +510,7 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     assert Run(left_open).scene != whole.scene  # the plan would be another one here
     again = Run(left_open, resolved=kept.resolved)
     assert again.scene == whole.scene
-    assert again.setup.micro.surface.grid == whole.setup.micro.surface.grid
+    assert again.coupling.micro.surface.grid == whole.coupling.micro.surface.grid
     again.resume(kept.steps, kept.position, kept.state, kept.laws)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

@@ -9,7 +9,7 @@ import pytest
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import BodyModes, micro_model
-from multiscale.couplings.contact import ContactCoupling
+from multiscale.couplings.contact_solver import ContactSolver
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.results.history import range_notes
@@ -40,7 +40,7 @@ def step(number, *pressures, warnings=()):
 def test_a_model_solved_at_every_step_speaks_for_itself(parts, body):
     _, model, means = parts
     model = replace(model, body=body)
-    coupling = ContactCoupling(model, PATCHES, means)
+    coupling = ContactSolver(model, PATCHES, means)
     few, many = (coupling.press(Control(approach=approach)) for approach in (4e-3, END))
     whole = model.respond([4e-3, END], patches=PATCHES, mean_heights=means)
     assert few.warnings == () and many.warnings == whole.warnings != ()

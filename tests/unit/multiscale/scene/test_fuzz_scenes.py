@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from multiscale.machine import ClusterNodes
-from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import MOST_BYTES, parsed
+from multiscale.setup import make_setup
 from support.errors import InputError
 
 few = settings(

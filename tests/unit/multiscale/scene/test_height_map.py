@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from multiscale import compare, run
+from multiscale.inputs.surfaces import make_surface
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import make_surface
 from support.errors import InputError
 
 

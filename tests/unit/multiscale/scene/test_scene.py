@@ -9,9 +9,9 @@ import numpy as np
 import pint
 import pytest
 
-from multiscale.planning.problem_setup import make_setup
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import read_scene_file
+from multiscale.setup import make_setup
 from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"

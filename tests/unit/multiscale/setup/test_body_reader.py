@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from helpers.box_msh import write_box
 
+from multiscale.bodies.reader import read_bodies
 from multiscale.scene.scene import Scene
-from multiscale.setup.body_reader import scene_bodies
 from support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
@@ -24,7 +24,7 @@ def read(tmp_path, monkeypatch):
         whole = {"mesh": "part.msh", "contact": "top", "supports": [{"surface": "bottom"}]}
         laws = {"kind": "representative", **(law or {})}
         data = {"surface": SAMPLE, "load": {"force": "1 N"}, "law": laws}
-        return scene_bodies(Scene.from_dict(data | {"body": whole | STEEL | body}), None)
+        return read_bodies(Scene.from_dict(data | {"body": whole | STEEL | body}), None)
 
     return read
 
@@ -67,6 +67,6 @@ def test_contradictions_are_refused(read, body, match):
 def test_what_fits_is_read(read):
     law = {"regions": [{"surface": "upper half", **SAMPLE}]}
     loads = [{"surface": "right", "stress": UP}]
-    found = read(law=law, tractions=loads).first
+    found = read(law=law, tractions=loads)[0]
     assert len(found.facets) == 2
     assert found.facts.area == pytest.approx(100.0, rel=1e-12)

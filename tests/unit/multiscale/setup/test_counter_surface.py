@@ -5,8 +5,7 @@ import pytest
 
 from geometry import Spectrum, facing, synthesise, turned_over
 from multiscale import Scene, make_setup, run, sweep
-from multiscale.planning.plan import statements
-from multiscale.setup.surface_and_block import make_surfaces
+from multiscale.inputs.surfaces import make_surfaces
 from support.errors import InputError
 
 
@@ -94,13 +93,13 @@ def test_bad_input(given, above, text):
 
 def test_the_plan_says_how_they_lie_and_whose_slopes_count():
     said = dict(
-        statements(make_setup(scene(slopes=True, shift=["100 um", "0"], rotation="180 deg")))
+        make_setup(scene(slopes=True, shift=["100 um", "0"], rotation="180 deg")).statements()
     )
     assert "turned by 180°, moved by 100 µm and 0 mm" in said["two rough sides"]
     assert "the slopes of each count on its own body" in said["two rough sides"]
     rigid = scene(slopes=True).written
     rigid = {key: value for key, value in rigid.items() if key != "counter_body"}
-    said = dict(statements(make_setup(Scene.from_dict(rigid))))
+    said = dict(make_setup(Scene.from_dict(rigid)).statements())
     assert "the slopes of [surface] alone count" in said["two rough sides"]
 
 

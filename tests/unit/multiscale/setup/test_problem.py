@@ -7,9 +7,8 @@ import pytest
 
 from geometry import InputError
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.contact import ContactCoupling
-from multiscale.planning.plan import statements, warnings
-from multiscale.planning.problem_setup import plane_at_largest_load
+from multiscale.couplings.contact_solver import ContactSolver
+from multiscale.couplings.estimate import plane_at_largest_load
 from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -46,7 +45,7 @@ def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
 @pytest.mark.parametrize("coupling", ["isolated", "consistent", "concurrent"])
 def test_plane_that_does_not_touch_carries_nothing(coupling):
     asked = scene(coupling=coupling, approach=1e-6)
-    assert make_setup(asked).model.first_touch > 1e-5  # cells miss the interpolant's highest point
+    assert make_setup(asked).micro.first_touch > 1e-5  # cells miss the interpolant's highest point
     history = run(asked)
     assert (history.force_N[-1], history.contacts[-1]) == (0.0, 0)
 
@@ -60,7 +59,7 @@ def test_plane_that_does_not_touch_carries_nothing(coupling):
     ],
 )
 def test_plan_says_under_which_tilt_laws_are_made(tilt, coupling, load):
-    said = dict(statements(make_setup(scene(approach=8e-3, tilt=tilt))))
+    said = dict(make_setup(scene(approach=8e-3, tilt=tilt)).statements())
     assert coupling in said["coupling"]
     assert load in said["load"]
 
@@ -90,11 +89,11 @@ def test_the_plan_warns_of_flat_summits_that_carry_nothing(tmp_path, model, warn
             "load": {"approach": "4 um", "steps": 1},
         }
     )
-    said = [text for text in warnings(make_setup(stepped)) if "summits are flat" in text]
+    said = [text for text in make_setup(stepped).warnings() if "summits are flat" in text]
     assert len(said) == warns
 
 
-class Shy(ContactCoupling):
+class Shy(ContactSolver):
     """Presses no further than by a micrometre at once."""
 
     reached = 0.0
@@ -108,9 +107,9 @@ class Shy(ContactCoupling):
 
 def test_free_plane_that_is_not_found_at_once_is_found_in_smaller_steps():
     setup = make_setup(scene(coupling="concurrent", approach=3e-3, tilt="free"))
-    coupling = Shy(setup.model, setup.patches, setup.mean_heights)
+    coupling = Shy(setup.micro, setup.patches, setup.mean_heights)
     load_history = setup.scene.loading.load_history
-    plain = ContactCoupling(setup.model, setup.patches, setup.mean_heights)
+    plain = ContactSolver(setup.micro, setup.patches, setup.mean_heights)
     known, found = (
         plane_at_largest_load(load_history, one, setup.surface) for one in (plain, coupling)
     )
@@ -135,8 +134,8 @@ def test_a_block_is_as_high_as_the_shorter_side_unless_told(given, height):
             }
         )
     )
-    assert made.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
-    said = dict(statements(made))["block"]
+    assert made.body.shape.height == pytest.approx(1e-3 * height, rel=1e-12)
+    said = dict(made.statements())["block"]
     assert f"40 µm × 20 µm and {height} µm high, free sides" in said
 
 
@@ -159,4 +158,4 @@ def test_approaches_below_the_rounding_of_heights_are_refused(tmp_path):
 def test_a_plane_that_load_steps_find_is_not_solved_for_ahead(coupling):
     setup = make_setup(scene(coupling=coupling, force=1.0))
     assert (setup.plane_at_largest_load is None) == (not setup.scene.on_mesh)
-    assert "approach" not in dict(statements(setup))["load"] or setup.scene.on_mesh
+    assert "approach" not in dict(setup.statements())["load"] or setup.scene.on_mesh

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from micro import HalfSpaceModel
-from multiscale.planning.problem_setup import make_setup
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
 from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -61,7 +61,7 @@ def test_missing_heights_are_no_value_of_the_file_key(tmp_path):
 def test_a_periodic_scene_is_pressed_periodically():
     scene = Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]"])
     setup = make_setup(scene)
-    assert setup.model.name == "half-space-periodic"
+    assert setup.micro.name == "half-space-periodic"
     small = run(Scene.load(PAPER, [*PERIODIC, "surface.grid=[32, 32]", *SMALL_SLOPES]))
     alone = HalfSpaceModel(setup.surface, contact_modulus=4e3 / (1 - 0.15**2), periodic=True)
     forces = [alone.solve(approach).force for approach in small.approach_mm]

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from micro import MODEL_NAMES
-from multiscale.planning.auto_keys import auto_keys
+from multiscale.auto.keys import auto_keys
+from multiscale.inputs.block import LAW_BLOCK_CELLS
 from multiscale.scene.scene import Scene
-from multiscale.setup.surface_and_block import LAW_BLOCK_CELLS
 from multiscale.studies.comparison import ranked, refinements, resolved_scene
 from multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations, pressure_grid
 from multiscale.studies.errors import Row

@@ -1,0 +1,202 @@
+"""Auto values of a scene: which keys have one, what to start from, and what they became."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Any
+
+import numpy as np
+
+from geometry.surface import Surface
+from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.dispatch import coupling_class
+from multiscale.couplings.work import SOLUTIONS_OF_LAWS
+from multiscale.inputs.loads import PROVISIONAL_PATCHES
+from multiscale.inputs.spectrum import most_waves
+from multiscale.loading.stepper import step_count
+from multiscale.scene.coupling_sections import CouplingSection
+from multiscale.scene.scene import Scene
+from support.errors import InputError
+
+DEFAULT_ACCURACY = 0.02
+"""Relative error of the force that is kept unless the scene says."""
+PATCHES_ACROSS = 8
+"""Patches along the shorter side, enough for a map."""
+LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
+"""Heights along a side of grids that are chosen."""
+
+_KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
+
+
+def auto_keys(scene: Scene) -> frozenset[str]:
+    """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
+
+    The block's cells are one of them only under laws on its mesh, the grid of the surface only
+    where it is a spectrum's.
+
+    Args:
+        scene: The scene as it was given.
+    """
+    open_keys = set()
+    for key in _KEYS:
+        name, _, field = key.partition(".")
+        section = getattr(scene, name)
+        if section is None or scene.law.representative:
+            continue
+        unstated = scene.accuracy is not None and field not in section.model_fields_set
+        if name == "micro":  # its other keys belong to a model that is stated
+            unstated = unstated and not section.model_fields_set
+        if name == "surface":
+            unstated = scene.accuracy is not None and scene.surface.lacks_grid
+        if getattr(section, field) == "auto" or unstated:
+            open_keys.add(key)
+    return frozenset(open_keys if scene.on_mesh else open_keys - {"block.cells"})
+
+
+def accuracy_of(scene: Scene) -> float:
+    """Return the relative error of the force that a scene may be left with.
+
+    Args:
+        scene: The scene.
+    """
+    return scene.accuracy or DEFAULT_ACCURACY
+
+
+def is_measured(scene: Scene) -> bool:
+    """Tell whether errors are measured before the run to resolve auto values.
+
+    They are wherever a key is open that errors depend on, with an accuracy the edges of a
+    reference's meshes among them.
+
+    Args:
+        scene: The scene as it was given.
+    """
+    opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
+    sized = scene.accuracy is None or not scene.reference.sizes_are_open
+    return opened or (scene.kind == "reference" and not sized)
+
+
+def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
+    """Return a scene with values to start from for its auto keys, but for the surface's grid.
+
+    Args:
+        scene: The scene as it was given.
+        auto: Its auto keys.
+    """
+    start: dict[str, Any] = {"block.cells": None, "patches.grid": PROVISIONAL_PATCHES}
+    changed = scene
+    if "coupling.kind" in auto:
+        changed = scene.model_copy(update={"coupling": chosen_coupling(scene)[0]})
+    for key in auto & set(start):
+        changed = with_value(changed, key, start[key])
+    return changed
+
+
+def with_value(scene: Scene, key: str, value: Any) -> Scene:
+    """Return a scene with another value of a key, which is not checked.
+
+    Args:
+        scene: The scene.
+        key: Section and name, such as ``"patches.grid"``.
+        value: The value.
+    """
+    name, _, field = key.partition(".")
+    section = getattr(scene, name).model_copy(update={field: value})
+    return scene.model_copy(update={name: section})
+
+
+def resolved_sections(coupling: Coupling, given: Scene) -> dict[str, Any]:
+    """Return what the auto values of a scene became, so that a run goes on as it began.
+
+    It need not measure errors again.
+
+    Args:
+        coupling: The coupling.
+        given: The scene as it was given.
+
+    Returns:
+        The sections with auto values by name, as JSON can hold them. That of the micro model is the
+        cells of the half-space.
+    """
+    names = {key.partition(".")[0] for key in auto_keys(given)}
+    if is_measured(given):
+        names |= {"coupling", "reference"}  # the tolerance of laws, and the edges of meshes
+    sections: dict[str, Any] = {}
+    for name in sorted(names):
+        section = getattr(coupling.scene, name)
+        sections[name] = section.model_dump(mode="json", by_alias=True, exclude_unset=True)
+    if "micro" in names:
+        sections["micro"] = None if coupling.cells is None else list(coupling.cells)
+    return sections
+
+
+def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
+    """Return a scene whose auto values are what they became, but for the micro model's cells.
+
+    Args:
+        scene: The scene as it was given.
+        resolved: What `resolved_sections` returned.
+    """
+    changed: dict[str, Any] = {
+        name: type(getattr(scene, name)).model_validate(content)
+        for name, content in resolved.items()
+        if name != "micro"
+    }
+    return scene.model_copy(update=changed)
+
+
+def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
+    """Return the coupling that is chosen beside what a scene states, and why.
+
+    It is concurrent, which has neither laws nor their error, unless the scene has more load steps
+    than consistent laws take solutions, or states what belongs to laws.
+
+    Args:
+        scene: The scene as it was given, whose coupling is open.
+    """
+    fitting = {}
+    for kind in ("concurrent", "consistent"):
+        with suppress(InputError):  # another key does not go with it
+            fitting[kind] = scene.with_({"coupling.kind": kind}).coupling
+    steps = step_count(scene.loading.load_history)
+    if len(fitting) < 2:
+        kind = next(iter(fitting), "consistent")
+        return fitting.get(kind, scene.coupling), "what the scene states goes with no other"
+    if steps > SOLUTIONS_OF_LAWS:
+        why = f"laws take about {SOLUTIONS_OF_LAWS} contact problems, fewer than {steps} load steps"
+        return fitting["consistent"], why
+    why = f"no laws, which take about {SOLUTIONS_OF_LAWS} contact problems for {steps} load steps"
+    return fitting["concurrent"], why
+
+
+def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
+    """Return nearly square patches that make a map, no more than heights or elements below.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+    """
+    shorter = min(surface.lengths)
+    most = np.min(list(coupling_class(scene).patch_limits(scene, surface).values()), axis=0)
+    x, y = (
+        min(max(round(PATCHES_ACROSS * length / shorter), 1), int(limit))
+        for length, limit in zip(surface.lengths, most, strict=True)
+    )
+    return x, y
+
+
+def on_waves(scene: Scene, count: int) -> Scene:
+    """Return a scene on a grid with so many heights along the shortest wavelength.
+
+    Args:
+        scene: The scene, of a spectrum.
+        count: Heights along the wavelength.
+    """
+    section = scene.surface
+    if section.spectrum is None or section.lengths is None:  # refused when the scene was read
+        return scene
+    waves = most_waves(section.spectrum, section.lengths)
+    grid = tuple(min(max(8 * math.ceil(count * k / 8), LEAST_HEIGHTS), MOST_HEIGHTS) for k in waves)
+    return with_value(scene, "surface.grid", grid)

@@ -1,0 +1,1 @@
+"""The bodies of a scene: blocks, bodies on meshes, pairs, and their terms in contact problems."""

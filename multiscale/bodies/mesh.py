@@ -1,0 +1,253 @@
+"""A meshed body under a contact: its terms in the contact problem.
+
+Theory: docs/theory.md, sections 5 and 6.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from geometry import Material, PatchGrid
+from micro import FreeSides, RectangleFields
+from multiscale.bodies.face_terms import (
+    CUBE_MODES,
+    DECAY_LENGTH,
+    FLATNESS_POWER,
+    LEAST_WITH_MARGIN,
+    LEAST_WITH_SIDES,
+    FaceTerms,
+)
+from multiscale.bodies.scene_body import SceneBody
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import ContactFacets, ElasticBody, FaceCompliance
+    from macro.compliance.surroundings import Surroundings
+
+_SAME = 1e-9
+"""Difference of Poisson's ratios that is rounding."""
+_CACHED = "mesh-face"
+"""Kind of these compliances in the cache."""
+_ON_MESH = 6
+"""Modes at most where they load the mesh itself: finer ones are those of its elements."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MeshTerms(FaceTerms):
+    """A meshed body under a contact on a rectangle of its face.
+
+    Args:
+        body: The body.
+        facets: Facets of its contact face; the frame's origin is the rectangle's lower corner.
+        rectangle: The rectangle.
+        around: What is around it.
+        side_term: Free sides that are a term of their own; None where there is none.
+        behind: Whether the body lies on the other side, in a frame turned about the y axis.
+    """
+
+    body: ElasticBody
+    facets: ContactFacets
+    rectangle: PatchGrid
+    around: Surroundings
+    side_term: FreeSides | None = None
+    behind: bool = False
+
+    @classmethod
+    def of(
+        cls,
+        scene_body: SceneBody,
+        lengths: tuple[float, float],
+        *,
+        side_term: bool,
+        behind: bool = False,
+    ) -> MeshTerms:
+        """Return the terms of a scene's body, whose coordinates count from its surface's corner.
+
+        Args:
+            scene_body: The body on its mesh.
+            lengths: Sides (Lx, Ly) of the surface [mm].
+            side_term: Whether free sides that bound the surface are a term of their own.
+            behind: Whether it is the counter-body, in the coordinates of the first one.
+
+        Raises:
+            InputError: When the surface reaches beyond the face.
+
+        Note:
+            Collective.
+        """
+        from macro.compliance.mesh_face import from_outside
+        from macro.compliance.surroundings import surroundings
+
+        rectangle = PatchGrid(grid=(1, 1), lengths=lengths)
+        facets = scene_body.facets[0]
+        if behind:
+            facets = from_outside(facets, lengths[0])
+        around = surroundings(scene_body.body, facets, rectangle)
+        sides = None
+        if side_term and any(around.free_sides):
+            sides = FreeSides(
+                lengths=lengths,
+                poisson_ratio=around.material.poisson_ratio,
+                decay_length=DECAY_LENGTH * min(*lengths, around.thickness),
+                present=around.free_sides,
+            )
+        return cls(
+            body=scene_body.body,
+            facets=facets,
+            rectangle=rectangle,
+            around=around,
+            side_term=sides,
+            behind=behind,
+        )
+
+    @property
+    def material(self) -> Material:  # type: ignore[override]
+        """Elastic constants under the contact."""
+        return self.around.material
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Sides of the rectangle that the modes cover [mm]."""
+        return self.rectangle.lengths
+
+    @property
+    def modes(self) -> int:
+        """Modes along a side that resolve the body correction; see `FaceTerms`."""
+        flatness = max(self.lengths) / min(*self.lengths, self.around.thickness)
+        count = CUBE_MODES * flatness**FLATNESS_POWER
+        if self.side_term is None and any(self.around.free_sides):
+            count = max(count, LEAST_WITH_SIDES)
+        elif not all(self.around.free_sides):
+            count = max(count, LEAST_WITH_MARGIN)
+        return math.ceil(round(count if self.around.below else min(count, _ON_MESH), 6))
+
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
+        """Return the compliance of the rectangle in modes, from the mesh.
+
+        Args:
+            comm: MPI communicator; ranks are those of the mesh.
+            modes: Modes along a side; by default those of the shape.
+
+        Note:
+            Collective.
+        """
+        from macro import FaceCompliance
+        from macro.compliance.cache import cached
+        from macro.compliance.mesh_face import lowered, mesh_face_compliance, raised, turned
+
+        count, body = self._count(modes), raised(self.body)
+
+        def of(one: ElasticBody) -> FaceCompliance:
+            fields = RectangleFields(
+                lengths=self.lengths,
+                count=count,
+                material=self.material,
+                extended=self.around.free_sides,
+            )
+            loads = fields if self.around.below else None
+            return mesh_face_compliance(
+                one, self.facets, self.rectangle, self.material, count, loads
+            )
+
+        def compute() -> dict[str, Any]:
+            linear = lowered(body)
+            rough = None if linear is None else of(linear).normal
+            return replace(of(body), rough=rough).arrays
+
+        found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
+        return turned(found) if self.behind else found
+
+    def _count(self, modes: int | None) -> int:
+        """Return the modes along a side, by default those of the shape."""
+        count = modes or self.modes
+        return count if self.around.below else min(count, _ON_MESH)
+
+    def _key(self, count: int) -> tuple[object, ...]:
+        """Return what the compliance in so many modes along a side depends on; collective."""
+        from macro.compliance.mesh_digest import body_digest
+        from macro.compliance.mesh_face import raised
+
+        frame = self.facets.frame
+        return (
+            body_digest(raised(self.body)),
+            (*frame.origin.tolist(), *frame.axes.ravel().tolist()),
+            self.lengths,
+            count,
+            self.around.free_sides,
+            self.around.below,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PairTerms(FaceTerms):
+    """A body and a meshed counter-body on the other side of the contact.
+
+    Free sides are a term of their own only where those of the first body are, or where both bodies
+    have the same ones and the same Poisson's ratio.
+
+    Args:
+        first: The first body.
+        second: The counter-body, whose free sides are not a term of their own.
+    """
+
+    first: FaceTerms
+    second: MeshTerms
+
+    @property
+    def material(self) -> Material:  # type: ignore[override]
+        """Elastic constants of the first body under the contact."""
+        return self.first.material
+
+    @property
+    def side_term(self) -> FreeSides | None:  # type: ignore[override]
+        """Free sides that are a term of their own."""
+        return self.first.side_term
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Sides of the rectangle that the modes cover [mm]."""
+        return self.first.lengths
+
+    @property
+    def modes(self) -> int:
+        """Modes along a side that resolve both body corrections."""
+        return max(self.first.modes, self._behind.modes)
+
+    def side_share(self, contact_modulus: float) -> float:
+        """Return the share of the contact modulus over that of what has the free sides."""
+        share = self.first.side_share(contact_modulus)
+        if self._alike:
+            share += contact_modulus / self.second.material.contact_modulus
+        return share
+
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
+        """Return the compliance of the first body, and what the other adds to a half-space.
+
+        Args:
+            comm: MPI communicator; ranks are those of the meshes.
+            modes: Modes along a side; by default those of both shapes.
+
+        Note:
+            Collective.
+        """
+        count = modes or self.modes
+        face = self.first.face(comm, modes=count)
+        other = self._behind.face(comm, modes=face.count)
+        term = self._behind.term(other)
+        rough = term.matrix if term.rough is None else term.rough
+        rough = (face.normal if face.rough is None else face.rough) + rough
+        return replace(face, normal=face.normal + term.matrix, rough=rough)
+
+    @property
+    def _alike(self) -> bool:
+        """Whether both bodies have the same free sides and the same Poisson's ratio."""
+        own, around = self.first.side_term, self.second.around
+        left, right, *others = around.free_sides
+        same = own is not None and own.present == (right, left, *others)
+        apart = self.first.material.poisson_ratio - self.second.material.poisson_ratio
+        return same and abs(apart) < _SAME
+
+    @property
+    def _behind(self) -> MeshTerms:
+        return replace(self.second, side_term=self.first.side_term) if self._alike else self.second

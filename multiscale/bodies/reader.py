@@ -1,0 +1,269 @@
+"""Reads the bodies of a scene that come from meshes, and checks them.
+
+Theory: docs/theory.md, section 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from geometry import InputError, Material
+from geometry.face_frame import UPWARD, FaceFrame
+from multiscale.bodies.scene_body import SceneBody
+from multiscale.inputs.body_facts import BodyFacts
+from multiscale.scene.body_sections import CounterBodySection
+from multiscale.scene.identity import content_digest
+from multiscale.scene.scene import Scene
+from support.collective import on_root
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import ContactFacets, MeshedBody, TaggedMesh
+
+MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
+"""Units of meshes in mm."""
+
+_SAME_PLANE = 1e-6
+"""Distance between planes, relative to the face, that is rounding of coordinates in files."""
+_MOST_CURVED = 5e-3
+"""Height of a slightly curved face over its shorter side, up to which its gap counts as one between
+planes. A sphere has slopes of 2 % at its edge then, whose squares are not counted."""
+
+
+def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
+    """Read and check the meshes of a scene's bodies.
+
+    Args:
+        scene: The scene.
+        comm: MPI communicator; None for this process alone.
+
+    Returns:
+        The body below the surface, None for a block, and the body on the other side, None where
+        that is rigid or a half-space.
+
+    Raises:
+        InputError: On all ranks, when a mesh, its names, supports or contact face do not fit; names
+            file and key.
+
+    Note:
+        Collective.
+    """
+    first = counter = None
+    if scene.body is not None:
+        reader = _Reader(scene, scene.body, "body", comm)
+        first = reader.read([region.surface for region in scene.law.regions])
+    section = scene.counter_body
+    if section is not None and section.mesh is not None:
+        frame = first.frame if first else UPWARD
+        counter = _Reader(scene, section, "counter_body", comm).read((), opposite=frame)
+    return first, counter
+
+
+class _Reader:
+    """Reads one body of a scene."""
+
+    def __init__(self, scene: Scene, section: CounterBodySection, key: str, comm: Any) -> None:
+        from mpi4py import MPI
+
+        self._scene, self._section, self._key = scene, section, key
+        self._comm = comm or MPI.COMM_SELF
+        self._path = scene.path_of(section.mesh) or Path()
+
+    def read(self, regions: Sequence[str | int], opposite: FaceFrame | None = None) -> SceneBody:
+        """Return the body with its contact face, and further regions of it.
+
+        Args:
+            regions: Names or numbers of further faces in the plane of the contact face.
+            opposite: Frame of the face of a first body, which this one lies opposite to.
+        """
+        try:
+            return self._read(regions, opposite)
+        except InputError as error:
+            raise error.located(key=f"{self._key}.mesh", file=self._scene.file) from None
+
+    def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
+        from macro import contact_facets
+        from macro.mesh.checks import check_size
+        from macro.mesh.from_file import read_mesh
+
+        mesh = read_mesh(self._path, self._comm, unit=MILLIMETRES[self._section.mesh_unit])
+        check_size(mesh, key=f"{self._key}.mesh_unit")
+        tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
+        for region in regions:
+            tag = mesh.facet_tag(region, key="law.regions")
+            if tag in tags:
+                problem = "the surface is the contact face or another region already"
+                raise InputError(problem, key="law.regions", value=region)
+            tags.append(tag)
+        face = self._face(mesh, tags)
+        frame = face.frame if opposite is None else _opposed(opposite, face.frame, self._key)
+        body = self._body(mesh, tags, face.frame)
+        facets = tuple(
+            contact_facets(
+                mesh.mesh, mesh.facet_tags.find(tag), frame, opposed=opposite is not None
+            )
+            for tag in tags
+        )
+        return SceneBody(
+            body=body, facets=facets, frame=frame, facts=self._facts(body, face, facets)
+        )
+
+    def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
+        """Return the elastic body with its supports and loads."""
+        from macro import MeshedBody, Support, Traction
+        from macro.mesh.supports import check_supports, check_tractions
+
+        section, key = self._section, self._key
+        supports = [
+            Support(
+                tag=mesh.facet_tag(one.surface, key=f"{key}.supports"),
+                displacement=_components(one.displacement),
+            )
+            for one in section.supports
+        ]
+        for tag in contact:
+            check_supports(mesh, supports, tag, key=f"{key}.supports")
+        loads = [
+            Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
+            for one in section.tractions
+        ]
+        for tag in contact:
+            check_tractions(mesh, loads, supports, tag, key=f"{key}.tractions")
+        x, y, z = map(float, frame.normal)
+        order = 1 if section.element == "linear" else 2
+        return MeshedBody(
+            mesh, self._materials(mesh), supports, loads, normal=(x, y, z), order=order
+        )
+
+    def _facts(self, body: MeshedBody, face: _Face, facets: Sequence[ContactFacets]) -> BodyFacts:
+        """Return what is known of the body without its mesh."""
+        from macro.mesh.checks import size_note
+
+        lowest, highest = self._extent(body.mesh, face.frame)
+        cells = int(body.mesh.mesh.topology.index_map(3).size_global)
+        note = size_note(body.mesh)
+        return BodyFacts(
+            lengths=face.lengths,
+            area=face.area,
+            depth=-lowest,
+            cells=f"{cells} {'hexahedra' if body.hexahedral else 'tetrahedra'}",
+            unknowns=body.dofs,
+            element=f"{'Q' if body.hexahedral else 'P'}{body.degree}",
+            materials=tuple(self._at_face(body, part) for part in facets),
+            poisson_ratio=body.poisson_ratio,
+            above=highest > _SAME_PLANE * max(face.lengths),
+            digest=on_root(self._comm, lambda: content_digest(self._path)),
+            notes=(*filter(None, [note]), *self._curved(face)),
+        )
+
+    def _face(self, mesh: TaggedMesh, tags: Sequence[int]) -> _Face:
+        """Return the plane of the contact face with all its regions."""
+        from macro.mesh.planar_face import planar_face
+
+        names = {tag: name for name, tag in mesh.facet_names.items()}
+        curved = self._scene.law.representative
+        allowed = _MOST_CURVED * self._shortest(mesh) if curved else 0.0
+        faces = [
+            planar_face(
+                mesh, tag, name=names.get(tag), deviation=allowed, key=f"{self._key}.contact"
+            )
+            for tag in tags
+        ]
+        first, corners = faces[0], []
+        for face, tag in zip(faces, tags, strict=True):
+            height = float(first.frame.height(face.frame.origin[None])[0])
+            apart = abs(height) > max(allowed, _SAME_PLANE * max(first.lengths))
+            if apart or face.frame.normal @ first.frame.normal < 1.0 - _SAME_PLANE:
+                raise InputError(
+                    f"the surface {names.get(tag, str(tag))!r} does not lie in the plane of the "
+                    f"contact face: it is {height:.4g} mm above it",
+                    key="law.regions",
+                )
+            corners += [face.frame.in_space([[0.0, 0.0], face.lengths])]
+        frame = FaceFrame.through(np.concatenate(corners), first.frame.normal)
+        lengths = frame.in_plane(np.concatenate(corners)).max(axis=0)
+        return _Face(
+            frame=frame,
+            lengths=(float(lengths[0]), float(lengths[1])),
+            area=sum(face.area for face in faces),
+            deviation=max(face.deviation for face in faces),
+        )
+
+    def _shortest(self, mesh: TaggedMesh) -> float:
+        lower, upper = mesh.bounding_box()
+        return float(np.sort(upper - lower)[1])  # of the two longer sides
+
+    def _materials(self, mesh: TaggedMesh) -> Material | dict[int, Material]:
+        section = self._section
+        if section.whole_material is not None:
+            return section.whole_material
+        return {
+            mesh.cell_tag(name, key=f"{self._key}.materials"): one.material
+            for name, one in section.materials.items()
+        }
+
+    def _at_face(self, body: MeshedBody, facets: ContactFacets) -> Material:
+        """Return the material of the cells at a face, which must be one."""
+        materials = body.materials
+        if isinstance(materials, Material):
+            return materials
+        tags = body.mesh.cell_tags
+        of_cells = np.zeros(int(tags.indices.max(initial=-1)) + 1, dtype=np.int64)
+        of_cells[tags.indices] = tags.values
+        here = set(map(int, of_cells[facets.cell]))
+        found = {materials[tag] for part in self._comm.allgather(here) for tag in part}
+        if len(found) > 1:
+            raise InputError(
+                "the contact face has cells of several materials",
+                key=f"{self._key}.contact",
+                value=len(found),
+                allowed="faces of one material each; further ones as law.regions",
+            )
+        return found.pop()
+
+    def _extent(self, mesh: TaggedMesh, frame: FaceFrame) -> tuple[float, float]:
+        """Return the heights between which the body lies, above the plane of its face [mm]."""
+        heights = frame.height(mesh.mesh.geometry.x)
+        parts = self._comm.allgather((heights.min(initial=0.0), heights.max(initial=0.0)))
+        lowest, highest = zip(*parts, strict=True)
+        return float(min(lowest)), float(max(highest))
+
+    def _curved(self, face: _Face) -> Iterator[str]:
+        if face.deviation > _SAME_PLANE * max(face.lengths):
+            yield (
+                f"the contact face of {self._key} is up to {2.0 * face.deviation:.3g} mm below its "
+                "highest point; that gap closes before laws act there"
+            )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Face:
+    """A contact face with all its regions."""
+
+    frame: FaceFrame
+    lengths: tuple[float, float]
+    area: float
+    deviation: float
+
+
+def _components(
+    stated: Sequence[float | str],
+) -> tuple[float | None, float | None, float | None]:
+    x, y, z = (None if isinstance(one, str) else one for one in stated)
+    return x, y, z
+
+
+def _opposed(first: FaceFrame, second: FaceFrame, key: str) -> FaceFrame:
+    """Return the frame of a first face, moved along its normal into the plane of a second one."""
+    if first.normal @ second.normal > -1.0 + _SAME_PLANE:
+        raise InputError(
+            "does not face the body: their contact faces are not parallel and opposite",
+            key=f"{key}.contact",
+            allowed="a face whose outward normal is opposite to that of the body's",
+        )
+    height = float(first.height(second.origin[None])[0])
+    return replace(first, origin=first.in_space([[0.0, 0.0]], height)[0])

@@ -1,0 +1,271 @@
+"""Sentences on what is the same of all couplings: surface, materials, body, loads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from geometry.materials import Material
+from geometry.meshes.block import misalignment
+from geometry.statistics import roughness
+from multiscale.couplings.scene_parts import SceneParts
+from multiscale.inputs.block import block_section
+from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.spectrum import heights_per_wave
+from multiscale.readable import number, quantity
+from multiscale.scene.keys import bare_quantities
+
+LOCKING_FROM = 0.45
+"""Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
+cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
+are 0.5, 1.1 and 1.5 % too stiff."""
+MOST_UNEQUAL = 3.0
+"""Ratio of two edges of the block that deserves a note: few mean it, and many forget a unit."""
+LEAST_CELLS_PER_PATCH = 4
+"""Linear cells along a patch below which the block is too stiff under a patch's pressure."""
+
+
+def materials(parts: SceneParts) -> str:
+    """Say the elastic constants of both sides."""
+    second = parts.materials.second
+    other = "a half-space" if parts.both_elastic else "a body"
+    against = f", against {other} with {_constants(second)}" if second else ""
+    return f"{_constants(parts.materials.first)}{against}"
+
+
+def dimensions(parts: SceneParts) -> str:
+    """Say the dimensions of the surface and of what it lies on."""
+    lx, ly = (quantity(side, "mm") for side in parts.surface.lengths)
+    what = "body" if parts.body.on_mesh else "block"
+    solid = "a half-space"
+    if parts.has_body:
+        solid = f"a {what} {quantity(parts.body.depth, 'mm')} high"
+    return f"{lx} × {ly} on {solid}{' as sample' if parts.regions else ''}"
+
+
+def _constants(material: Material) -> str:
+    return f"E = {quantity(material.young_modulus, 'MPa')}, ν = {material.poisson_ratio:g}"
+
+
+def surface(parts: SceneParts) -> str:
+    """Say what the surface is."""
+    rough_surface, spectrum = parts.surface, parts.scene.surface.spectrum
+    rough = roughness(rough_surface)
+    lx, ly = (quantity(side, "mm") for side in rough_surface.lengths)
+    continued = ", continued periodically" if parts.scene.surface.periodic else ""
+    text = (
+        f"{rough_surface.source}; {rough_surface.grid[0]} × {rough_surface.grid[1]} heights on "
+        f"{lx} × {ly}{continued}, "
+        f"rms height {quantity(rough.sq, 'mm', 3)}, rms gradient {number(rough.sdq, 3)}"
+    )
+    if spectrum is None:
+        return text
+    waves = heights_per_wave(spectrum, rough_surface.grid, rough_surface.lengths)
+    return f"{text}, {waves:.3g} heights along the shortest wavelength"
+
+
+def two_sides(parts: SceneParts) -> str:
+    """Say how two rough sides lie on each other, and whose slopes count."""
+    section = parts.scene.counter_surface
+    text = "[counter_surface], turned over, lies on [surface]"
+    if section is not None and section.rotation:
+        text += f", turned by {section.rotation:g}°"
+    if section is not None and any(section.shift):
+        text += (
+            f", moved by {quantity(section.shift[0], 'mm')} and {quantity(section.shift[1], 'mm')}"
+        )
+    if not parts.finite_slopes or parts.regions:
+        return f"{text}; the heights of both add"
+    if parts.materials.second is None:
+        rigid = "the slopes of [surface] alone count: the other side is rigid"
+        return f"{text}; the heights of both add, {rigid}"
+    return f"{text}; the heights of both add, and the slopes of each count on its own body"
+
+
+def load(parts: SceneParts) -> str:
+    """Say the load steps."""
+    history = parts.scene.loading.load_history
+    forced = history.quantity == "force"
+    unit, what = ("N", "a force") if forced else ("mm", "an approach")
+    way = ", ".join(quantity(point, unit, 6) for point in history.points)
+    again = f", {history.cycles} times" * (history.cycles > 1)
+    text = f"{history.count} steps to {what} of {way}{again}"
+    if parts.zero:
+        depth = quantity(parts.zero, "mm", 4)
+        text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
+    if history.force_change is not None:
+        text += f", halved where the force changes by more than {history.force_change:.3g}"
+    if history.tilt is None:
+        text += ", the plane free to tilt"
+    elif any(history.tilt):
+        tx, ty = history.tilt
+        text += f", tilted by {1e3 * tx:.3g} and {1e3 * ty:.3g} µm/mm along x and y"
+    return text
+
+
+def body(parts: SceneParts) -> str:
+    """Say what the bodies are made of, of meshes or under laws of samples."""
+    modulus = quantity(parts.materials.contact_modulus, "MPa")
+    text = f"{_mesh(parts.body)}, contact modulus {modulus}"
+    if parts.counter is not None:
+        text += f"; counter-body {_mesh(parts.counter)}; unknowns of both are one problem"
+    return text
+
+
+def _mesh(facts: BodyFacts) -> str:
+    degree = "linear" if facts.degree == 1 else "quadratic"
+    x, y = facts.lengths
+    return (
+        f"{facts.cells} ({degree}), {facts.unknowns} unknowns, contact face of {facts.area:.6g} "
+        f"mm² within {x:.6g} × {y:.6g} mm, {facts.depth:.6g} mm of body below it"
+    )
+
+
+def body_term(parts: SceneParts) -> str:
+    """Say how contact problems of the whole surface see a body on a mesh, and why."""
+    if parts.body.above:
+        return (
+            "the compliance of the mesh itself under smooth modes of pressure, as parts of the "
+            "body lie above the plane of its contact face, where no half-space is"
+        )
+    return (
+        "the half-space's own near field, and what the body adds to it in smooth modes of the "
+        "surface's rectangle, from the mesh: the body lies below the plane of its contact face"
+    )
+
+
+def block(parts: SceneParts) -> str:
+    """Say what a block is made of."""
+    shape = parts.body.shape
+    assert shape is not None
+    sizes = [quantity(side, "mm") for side in (*parts.surface.lengths, shape.height)]
+    sides, modulus = block_section(parts.scene).sides, parts.materials.contact_modulus
+    text = (
+        "decomposed: the half-space's own near field, and what the finite block adds to it in "
+        "smooth modes of its contact face, from finite elements of high order"
+    )
+    if not parts.scene.decomposed:
+        split = "" if shape.hexahedral else " split into tetrahedra"
+        margin = f", {shape.margin:g} mm beyond it in {shape.margin_cells} cells"
+        text = (
+            f"finite elements under the patches, {times(shape.cells)} hexahedra{split} "
+            f"({shape.element}) under the interface, grading {shape.grading:g}"
+            f"{margin if shape.margin else ''}"
+        )
+    return (
+        f"{text}, {sizes[0]} × {sizes[1]} and {sizes[2]} high, "
+        f"{sides} sides, contact modulus {quantity(modulus, 'MPa')}"
+    )
+
+
+def surface_warnings(parts: SceneParts, size: float) -> Iterator[str]:
+    """Yield what a user should know about the surface and the numbers of the scene.
+
+    Args:
+        parts: What is known of the scene.
+        size: What the interpolant may exceed the heights by a tenth of [mm].
+    """
+    rough_surface = parts.surface
+    yield from rough_surface.notes
+    if bare := list(bare_quantities(parts.scene.written)):
+        yield f"numbers without a unit: {', '.join(bare)}"
+    excess = rough_surface.highest - rough_surface.heights.max()
+    if not parts.zero and excess > 0.1 * size:
+        x, y = rough_surface.highest_point
+        yield (
+            "the approach counts from the interpolant's highest point, "
+            f"{quantity(excess, 'mm', 3)} above the highest of the given heights, at "
+            f"x = {x:.4g} mm, y = {y:.4g} mm: the heights are too coarse or too noisy there"
+        )
+
+
+def output_warnings(parts: SceneParts, *, cells: bool) -> Iterator[str]:
+    """Yield what of the requested output there will not be.
+
+    Args:
+        parts: What is known of the scene.
+        cells: Whether pressures of the surface's cells will be known.
+    """
+    output = parts.scene.output
+    if output.fields and not parts.has_body:
+        yield (
+            "output.fields: there is no block, and no fields are written; the analytic coupling "
+            "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
+            "'isolated' or 'reference')"
+        )
+    if output.figures == "all" and not cells:
+        yield (
+            "output.figures = 'all': no block.png is drawn, for no pressures of cells are known; "
+            "micro.model = 'half-space' has them, with laws where output.contact = 'last'"
+        )
+
+
+def mesh_warnings(parts: SceneParts) -> Iterator[str]:
+    """Yield what a user should know about bodies on meshes, or under laws of samples."""
+    for facts in filter(None, (parts.body, parts.counter)):
+        yield from facts.notes
+        if facts.degree == 1 and facts.poisson_ratio > LOCKING_FROM:
+            yield (
+                f"linear elements lock as Poisson's ratio comes near 0.5 (here "
+                f"{facts.poisson_ratio:g}): the body is too stiff by several per cent or more; "
+                "take element = 'quadratic'"
+            )
+
+
+def proportions(parts: SceneParts) -> Iterator[str]:
+    """Yield what is doubtful of the proportions of a block."""
+    shape = parts.body.shape
+    assert shape is not None
+    widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
+    (least, most), high, height = sorted(widths), shape.height, ""
+    if high > MOST_UNEQUAL * least:
+        height = "most of the approach may be the compression of the column below the surface"
+    elif least > MOST_UNEQUAL * high:
+        height = "the fixed bottom is near, and stiffens what lies above it"
+    if height:
+        ratio = max(high / least, least / high)
+        yield (
+            f"the block is {high:g} mm high and {least:g} mm wide, a ratio of {ratio:.3g}: "
+            f"{height}; block.height is the shorter side when not given"
+        )
+    if most > MOST_UNEQUAL * least:
+        yield (
+            f"the block is {widths[0]:g} × {widths[1]:g} mm wide, a ratio of {most / least:.3g}: "
+            "are these the lengths along x and y of the whole map?"
+        )
+
+
+def locking(poisson_ratio: float, degree: int) -> Iterator[str]:
+    """Yield a warning where linear elements of a block lock.
+
+    Args:
+        poisson_ratio: Poisson's ratio of the block.
+        degree: Degree of the displacements.
+    """
+    if degree == 1 and poisson_ratio > LOCKING_FROM:
+        yield (
+            f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
+            "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
+            "coupling.compliance = 'decomposed', whose elements are of high order"
+        )
+
+
+def coarse_cells(parts: SceneParts) -> Iterator[str]:
+    """Yield what is doubtful of the cells of a meshed block under its patches."""
+    shape = parts.body.shape
+    assert shape is not None
+    counts = zip(shape.cells[:2], parts.patches.grid, strict=True)
+    cells = min(cells / patches for cells, patches in counts)
+    if cells * shape.degree < LEAST_CELLS_PER_PATCH:
+        yield (
+            f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones "
+            "make the block stiffer by several per cent under a patch's pressure; refine "
+            "block.cells"
+        )
+    yield from locking(parts.materials.first.poisson_ratio, shape.degree)
+    if sentence := misalignment(shape, parts.patches):
+        yield sentence
+
+
+def times(counts: tuple[int, ...]) -> str:
+    """Return counts with crosses between them."""
+    return " × ".join(map(str, counts))

@@ -1,0 +1,350 @@
+"""Couplings of a micro model of the whole surface, with laws or without."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Asperities, InputError, MaterialPair, Surface
+from geometry.plausibility import check_finite_slopes
+from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from multiscale.bodies.on_body import SLOPES, OnBody, on_body
+from multiscale.couplings import describe
+from multiscale.couplings.contact_solver import ContactSolver
+from multiscale.couplings.coupling import Coupling, Facts
+from multiscale.couplings.estimate import plane_at_largest_load, prescribed_plane
+from multiscale.couplings.pressed_surface import PressedSurface
+from multiscale.couplings.work import (
+    BYTES_PER_CELL,
+    FACE_CYCLES,
+    PRODUCTS,
+    SET_UP_CYCLES,
+    SLOPES_PRODUCTS,
+    SOLUTIONS_OF_LAWS,
+    Work,
+)
+from multiscale.inputs.memory import law_requests
+from multiscale.inputs.surfaces import located
+from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import step_count
+from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
+from multiscale.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+_INTERACTING = ("elliptic", "circular")
+_CHECK, _FINER = 2.0, 6.0
+"""Solutions on the run's cells that an error check is worth, and where it solves a finer grid."""
+
+
+@dataclass(kw_only=True, eq=False)
+class MicroCoupling(PressedSurface):
+    """A micro model of the whole surface, on the body of the scene.
+
+    Attributes:
+        micro: Micro model of the whole surface, on a half-space.
+    """
+
+    needs_plane: ClassVar[bool] = False
+    """Whether something needs the plane at the largest load before the load steps."""
+
+    micro: MicroModel
+
+    @classmethod
+    def from_scene(
+        cls,
+        scene: Scene,
+        facts: Facts,
+        nodes: ClusterNodes,
+        *,
+        like: Coupling | None = None,
+        cells: tuple[int, int] | None = None,
+    ) -> Self:
+        """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
+        parts = cls._parts(scene, facts, nodes, like)
+        began, surface, history = time.perf_counter(), parts["surface"], parts["load_history"]
+        model = _stated_model(scene, surface, parts["materials"])
+        if cells is not None and isinstance(model, HalfSpaceModel):
+            model = model.resampled(cells)
+        _refuse_without_summits(scene, model)
+        plane = prescribed_plane(history, surface)
+        solves = cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel)
+        if plane is None and solves:  # laws end there, and statements say it of summits
+            solver = ContactSolver(model, parts["patches"], parts["mean_heights"])
+            plane = plane_at_largest_load(history, solver, surface)
+        parts["seconds"]["load estimate"] = time.perf_counter() - began
+        return cls(micro=model, plane_at_largest_load=plane, **parts)
+
+    def __post_init__(self) -> None:
+        """Refuse finite slopes of a surface that is too steep for them."""
+        if self.finite_slopes:
+            with located(self.scene, "micro.finite_slopes"):
+                for surface in self._sloped:
+                    check_finite_slopes(surface)
+
+    @property
+    def _sloped(self) -> list[Surface]:
+        """The rough sides of the bodies, whose slopes count."""
+        if self.counter_surface is None:
+            return [self.surface]
+        own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
+        return [own] if self.materials.second is None else [own, self.counter_surface]
+
+    @classmethod
+    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that a scene needs, with the interaction of its patches."""
+        yield from super().requests(scene)
+        yield from law_requests(scene, interact=cls.has_body)
+
+    # --- the micro model and the body
+
+    @property
+    def finite_slopes(self) -> bool:
+        """Whether finite slopes of the surface count."""
+        return self.scene.micro.finite_slopes is not False and self._on_cells
+
+    @property
+    def _on_cells(self) -> bool:
+        """Whether the micro model is the half-space on the cells of the surface."""
+        return isinstance(self.micro, HalfSpaceModel)
+
+    @property
+    def cells(self) -> tuple[int, int] | None:
+        """Cells of the half-space of contact problems; None where these have no cells."""
+        return self.micro.surface.grid if isinstance(self.micro, HalfSpaceModel) else None
+
+    @property
+    def label(self) -> str:
+        """The coupling, and the cells or micro model that it works on."""
+        kind = self.scene.kind
+        if self.cells is None:
+            return f"{kind}, {self.micro.name}"
+        return f"{kind} on {self.cells[0]} × {self.cells[1]} cells"
+
+    @cached_property
+    def asperities(self) -> Asperities:
+        """The surface's summits; found when first needed."""
+        return super().asperities if self.summits is None else self.summits
+
+    @property
+    def summits(self) -> Asperities | None:
+        """The summits that the micro model consists of; None where it knows the whole surface."""
+        return self.micro.asperities if isinstance(self.micro, AsperityModel) else None
+
+    @cached_property
+    def put_on_body(self) -> OnBody:
+        """What puts half-space models on the bodies, which are solved for once; collective."""
+        bodies = self.bodies if self.has_body else None
+        with self.clock.phase("block"):
+            return on_body(bodies, self.materials, self.counter_surface)
+
+    def model_on_body(self) -> MicroModel:
+        """Return the micro model on the body that it is pressed on, finite slopes included.
+
+        Note:
+            Collective.
+        """
+        if isinstance(self.micro, HalfSpaceModel):
+            return self.put_on_body(self.micro, SLOPES if self.finite_slopes else 0)
+        if not self.has_body:
+            return self.micro
+        with self.clock.phase("block"):
+            terms = self.bodies.terms(side_term=False)
+            body = terms.term(terms.face(self.comm))
+        return replace(self.micro, body=body)  # type: ignore[type-var]
+
+    # --- errors
+
+    def error_probe(self) -> ErrorProbe:
+        """Return what measures the errors of load steps, with a half-space model; collective."""
+        assert isinstance(self.micro, HalfSpaceModel)
+        return ErrorProbe(
+            model=self.micro,
+            on_body=self.put_on_body,
+            order=SLOPES if self.finite_slopes else 0,
+            by_laws=self.has_laws,
+            zero=self.zero_error,
+        )
+
+    def checked(self, step: LoadStep) -> LoadStep | None:
+        """Return a load step with its errors measured; None where they cannot be."""
+        if not self._on_cells:
+            return None
+        return checked(step, self.error_probe(), self.load_history, self.comm)
+
+    def unmeasured(self) -> str:
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        if not self._on_cells:
+            return f"{self.micro.name} contacts have no measure of it, half-space has"
+        return "output.check = 'none'" if self.scene.output.check == "none" else ""
+
+    def contact_solver(self, model: MicroModel) -> ContactSolver:
+        """Return what solves the contact problem of a model of the surface."""
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
+
+    # --- what is known before the run
+
+    def work(self, ranks: int = 1) -> Work:
+        """Count what a run computes; see `Coupling.work`."""
+        output, steps = self.scene.output, step_count(self.scene.loading.load_history)
+        rows = SOLUTIONS_OF_LAWS if self.has_laws else 0
+        solutions, factor = float(rows or steps), SLOPES_PRODUCTS if self.finite_slopes else 1.0
+        finer = 1.0
+        if isinstance(self.micro, HalfSpaceModel):
+            size = int(self.micro.surface.heights.size)
+            if output.check != "none":
+                # a check solves a finer grid where the error of the grid is not outweighed
+                refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
+                each, finer = (_FINER, 4.0) if refines else (_CHECK, 1.0)
+                solutions += each * (steps if output.check == "all" else 1)
+        else:
+            size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
+        unknowns, cycles = 0, 0.0
+        if self.has_body:
+            unknowns = sum(facts.unknowns for facts in self.meshes)
+            cycles = FACE_CYCLES * unknowns
+        if self.has_body and self.scene.on_mesh:
+            unknowns = unknowns or self.body.unknowns
+            cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
+        return Work(
+            size=size,
+            solutions=solutions,
+            rows=rows,
+            products=solutions * size * PRODUCTS * factor,
+            unknowns=unknowns,
+            cycles=cycles,
+            ranks=ranks,
+            memory=finer * BYTES_PER_CELL * size * self._on_cells,
+            of_pairs=not self._on_cells,
+        )
+
+    def _law_cycles(self, steps: int, rows: int) -> float:
+        """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
+        return 0.0
+
+    @property
+    def interfering_summits(self) -> NDArray[np.bool_]:
+        """Which summits have a positive interference, shape (n,)."""
+        summits = self.asperities
+        return self.interference(summits.x, summits.y, summits.z) > 0.0
+
+    @property
+    def interfering_border_maxima(self) -> int:
+        """Number of maxima on the border of the surface with a positive interference."""
+        cut = self.asperities
+        return int(np.sum(self.interference(cut.border_x, cut.border_y, cut.border_z) > 0.0))
+
+    # --- statements
+
+    def contact_statement(self) -> str:
+        """Say what is in contact."""
+        if self.summits is not None:
+            within = f"{int(self.interfering_summits.sum())} within the largest approach"
+            return f"{len(self.summits)} summits, {within}; the others cost nothing"
+        return super().contact_statement()
+
+    def model_statement(self) -> str:
+        """Say which micro model solves contacts, and how."""
+        micro, name = self.scene.micro, self.micro.name
+        if micro.model in _INTERACTING:
+            return f"{name}, solved by {micro.solver}"
+        unused = micro.solver != type(micro)().solver
+        return f"{name}; it has no use for micro.solver" if unused else name
+
+    def body_statements(self) -> Iterator[tuple[str, str]]:
+        """Yield what the bodies are, with topics."""
+        if not self.has_body:
+            return
+        if not self.body.on_mesh:
+            yield "block", describe.block(self)
+            return
+        yield "body", describe.body(self)
+        yield "body term", self._body_term_statement()
+
+    def _body_term_statement(self) -> str:
+        return describe.body_term(self)
+
+    def error_statement(self) -> str:
+        """Say how the run will know its error."""
+        if why := self.unmeasured():
+            return f"not measured: {why}"
+        which = "every load step" if self.scene.output.check == "all" else "the last load step"
+        body = ", body" if self.has_body else "; there is no block"
+        laws = " and laws" * self.has_laws
+        return f"measured at {which}, by cause: grid, zero, slopes{body}{laws}"
+
+    def contact_warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the contact and of its micro model."""
+        yield from super().contact_warnings()
+        if self.summits is None:
+            return
+        if self.interfering_border_maxima:
+            yield (
+                "maxima on the surface's border within the largest approach: "
+                f"{self.interfering_border_maxima}; an 8-neighbour search cannot confirm them, and "
+                "they carry no load here"
+            )
+        if self.summits.flat:
+            yield (
+                f"{self.summits.flat} summits are flat, as heights in steps are: without radii "
+                "they carry no load here; take micro.model = 'half-space'"
+            )
+
+    def body_warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies."""
+        if self.body.on_mesh:
+            yield from describe.mesh_warnings(self)
+            return
+        yield from describe.proportions(self)
+        if not self.scene.decomposed:
+            yield from describe.coarse_cells(self)
+
+    @property
+    def shows_cells(self) -> bool:
+        """Whether pressures of the surface's cells will be known."""
+        without = ("auto", "none") if self.has_laws else ("none",)
+        return self._on_cells and self.scene.output.contact not in without
+
+    # --- for the record
+
+    def record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the coupling alone, by name."""
+        return {"micro_model": {"name": self.micro.name}}
+
+    def surface_record(self) -> dict[str, Any]:
+        """Return what the provenance of a run says of the surface alone, by name."""
+        if self.summits is None:
+            return {}
+        return {
+            "summits": self.summits.count,
+            "summits_in_reach": int(self.interfering_summits.sum()),
+            "border_maxima_in_reach": self.interfering_border_maxima,
+        }
+
+
+def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> MicroModel:
+    """Return the micro model that a scene names, on a half-space."""
+    micro, modulus = scene.micro, materials.contact_modulus
+    model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
+    if isinstance(model, HalfSpaceModel):
+        return replace(model, periodic=scene.surface.periodic, hardness=micro.hardness)
+    return model
+
+
+def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
+    if not math.isfinite(model.first_touch):
+        raise InputError(
+            "the surface has no summit that could carry load",
+            key="micro.model",
+            value=scene.micro.model,
+            allowed="half-space",
+            file=scene.file,
+        )

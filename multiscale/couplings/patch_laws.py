@@ -1,0 +1,290 @@
+"""The couplings with a law for every patch: consistent and isolated laws.
+
+Theory: docs/theory.md, sections 10 and 11.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Control
+from micro import HalfSpaceModel, MicroModel
+from micro.contact_detail import ContactDetail
+from multiscale.bodies.on_body import on_body
+from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
+from multiscale.couplings.micro_coupling import MicroCoupling
+from multiscale.inputs.block import FIELD_CELLS, LAW_BLOCK_CELLS, Cells
+from multiscale.inputs.memory import law_requests
+from multiscale.law_solvers.condensed import CondensedLaws
+from multiscale.law_solvers.embedded import EmbeddedLaws
+from multiscale.law_solvers.free_plane import FreePlaneLaws
+from multiscale.laws.consistent import consistent_laws
+from multiscale.laws.isolated import isolated_laws
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.refinement import MOST_ROWS
+from multiscale.loading.load_step import LoadStep
+from multiscale.machine import MemoryRequest
+from multiscale.readable import Detail, Observer, quantity
+from multiscale.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+_CELLS_TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4
+"""Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
+_SUMMITS_ROWS = 400
+"""Most rows of laws by summits. On cells a row costs a solution, which is dear."""
+_MOST_CYCLES_PER_STEP = 12
+"""Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
+steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
+patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
+_CYCLES_PER_PATCH = 11
+"""Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
+and 8 × 8 patches."""
+_CYCLES_PER_ROW = 3.0
+"""Multigrid cycles of a row of consistent laws on a mesh, whose displacements it takes."""
+_UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
+
+
+@dataclass(kw_only=True, eq=False)
+class PatchLaws(LawCoupling, MicroCoupling):
+    """A coupling with a law for every patch of the surface."""
+
+    @classmethod
+    def cells_unstated(cls, scene: Scene) -> Cells:
+        """Return the cells of a block that a scene states none for: more under laws on its mesh."""
+        return LAW_BLOCK_CELLS if scene.on_mesh else FIELD_CELLS
+
+    @property
+    def table_tolerance(self) -> float:
+        """Interpolation error that laws are tabulated to."""
+        default = _CELLS_TOLERANCE if self.summits is None else _SUMMITS_TOLERANCE
+        return self.scene.coupling.table_tolerance or default
+
+    @property
+    def table_rows(self) -> int:
+        """Most rows of a table of laws."""
+        return MOST_ROWS if self.summits is None else _SUMMITS_ROWS
+
+    def newton(self, table: LawTable | None = None) -> NewtonChoice:
+        """Choose the Newton of the scene, or the one that is predicted to take fewer cycles.
+
+        The full Newton spends cycles on load steps until its basis of earlier solutions spans all
+        states of the patches. The condensed one spends them on the compliance, before the first
+        step.
+
+        Args:
+            table: The laws, once made; flat patches rule out the full Newton.
+        """
+        coupling, patches = self.scene.coupling, self.patches.count
+        if self.scene.decomposed:
+            return NewtonChoice(True, "the decomposed block is its compliance")
+        flat = 0 if table is None else sum(law.is_flat for law in table.laws)
+        if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
+            why = (
+                f"{flat} of {patches} patches are flat, and their pressure is a function of "
+                "closure nowhere"
+            )
+            return NewtonChoice(True, why)
+        if coupling.interface == "pointwise":
+            return NewtonChoice(False, "laws at points need the whole mesh")
+        if self.both_elastic and coupling.newton == "auto":
+            why = "the counter-body, a half-space, is in the compliance of patches"
+            return NewtonChoice(True, why)
+        if coupling.newton != "auto":
+            return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
+        steps = self.load_history.count
+        compliance, full = _CYCLES_PER_PATCH * patches, self._full_cycles(steps)
+        fewer = "fewer" if compliance < full else "more"
+        known = compliance < full or table is not None or self.summits is not None
+        return NewtonChoice(
+            compliance < full,
+            f"the compliance of {patches} patches takes about {compliance} multigrid cycles, "
+            f"{fewer} than {steps} load steps on the mesh with about {full}"
+            f"{'' if known else _UNLESS_FLAT}",
+        )
+
+    def _full_cycles(self, steps: int) -> int:
+        """Return the multigrid cycles that load steps on the mesh are predicted to take."""
+        return steps * min(max(self.interfering_patches, 1), _MOST_CYCLES_PER_STEP)
+
+    def _law_cycles(self, steps: int, rows: int) -> float:
+        """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
+        if self.newton().condensed:
+            return float(_CYCLES_PER_PATCH * self.patches.count)
+        return float(self._full_cycles(steps))
+
+    def _make_solver(self, table: LawTable) -> LawSolver:
+        """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
+        if self.newton(table).condensed:
+            return CondensedLaws(table, self.bodies.patch_compliance())
+        from macro import LawContactProblem
+
+        face = self.bodies.contact_face()
+        problem = LawContactProblem(face, table.laws, mode=self.scene.coupling.interface)
+        return EmbeddedLaws(problem, table, face)
+
+    def model_behind_laws(self) -> MicroModel:
+        """Return the micro model on the body, which laws stand for; collective."""
+        return self.model_on_body()
+
+    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactDetail] | None:
+        """Solve the contact problem that laws stand for, under the plane of a load step."""
+        solver = self.contact_solver(self.model_behind_laws())
+        solved = solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
+        return with_peak, solver.detail(solver.latest)
+
+    def contact_note(self, step: int, force: float) -> str:
+        """Return that the contact is not that of the laws."""
+        return Detail(
+            f"contact of load step {step}: the contact problem behind the laws, solved under the "
+            f"plane of the step, with a force of {quantity(force, 'N', 5)}"
+        )
+
+    def notes(self, steps: Any) -> Iterator[str]:
+        """Yield what a report says of the approximations behind load steps."""
+        if self.table is not None:
+            yield from self.table.notes(self.table_tolerance)
+            planned, taken = self.newton(), self.newton(self.table)
+            if taken.condensed != planned.condensed:
+                yield Detail(f"Newton condensed to the patches, not full: {taken.why}")
+        yield from super().notes(steps)
+
+    def coupling_statement(self) -> str:
+        """Say how contacts and bodies are put together."""
+        patches = self.patches
+        grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
+        if self.plane_at_largest_load is not None:
+            laws = self.interfering_patches
+            grid += f", {laws} get a law, {patches.count - laws} stay open"
+        coupling = self.scene.coupling
+        return f"{coupling.kind}: {grid}; {self._made}; {coupling.interface} closure"
+
+    @property
+    def _made(self) -> str:
+        """How the laws are made, in words."""
+        raise NotImplementedError
+
+
+@dataclass(kw_only=True, eq=False)
+class ConsistentCoupling(PatchLaws):
+    """Laws of all patches from one solution of the whole surface."""
+
+    @classmethod
+    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that a scene needs, with its laws, which rank 0 makes."""
+        yield from super().requests(scene)
+        yield from law_requests(scene, interact=False, made_by="root_only")
+
+    def _prepare_laws(self) -> None:
+        with self.clock.phase("block"):
+            self._model = self.model_on_body()
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        history, displacements = self.load_history, self._displacements(self.newton().condensed)
+        return consistent_laws(
+            self._model,
+            self.patches,
+            largest=history.control(history.largest),
+            displacements=displacements,
+            pointwise=self.scene.coupling.interface == "pointwise",
+            mean_heights=self.mean_heights,
+            tolerance=self.table_tolerance,
+            most_rows=self.table_rows,
+            comm=self.comm,
+            observe=observe,
+        )
+
+    def _displacements(self, dense: bool) -> Any:
+        return self.bodies.patch_displacements(dense=dense, solutions=self.table_rows)
+
+    def _make_solver(self, table: LawTable) -> LawSolver:
+        """Make what finds load steps from laws; a free plane turns as it did in their rows."""
+        free = table.path is not None and self.load_history.tilt is None
+        if free and self.scene.coupling.interface == "patchwise":
+            return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
+        return super()._make_solver(table)
+
+    def _law_cycles(self, steps: int, rows: int) -> float:
+        cycles = super()._law_cycles(steps, rows)
+        return cycles if self.newton().condensed else cycles + _CYCLES_PER_ROW * rows
+
+    @property
+    def _made(self) -> str:
+        tilt = self.scene.loading.tilt
+        if tilt == "free":
+            how = " under the tilt that the plane takes at each approach"
+        else:
+            how = " under the load's tilt" if any(tilt) else ""
+        return f"all from one solution of the whole surface{how}"
+
+
+@dataclass(kw_only=True, eq=False)
+class IsolatedCoupling(PatchLaws):
+    """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
+
+    needs_plane: ClassVar[bool] = True
+
+    @classmethod
+    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
+        """Yield the memory that a scene needs, with its laws, which all ranks make."""
+        yield from super().requests(scene)
+        yield from law_requests(scene, interact=False, made_by="shared")
+
+    @property
+    def finite_slopes(self) -> bool:
+        """Whether finite slopes count: isolated laws leave them out."""
+        return False
+
+    @property
+    def _closes_at_corners(self) -> bool:
+        """Whether closures at corners count: contacts under a force may lie at a corner."""
+        return super()._closes_at_corners or self.scene.loading.force is not None
+
+    def _make_table(self, observe: Observer | None) -> LawTable:
+        return isolated_laws(
+            self.model_alone(),
+            self.patches,
+            closure_ends=self.largest_closures,
+            love=self.scene.coupling.love,
+            mean_heights=self.mean_heights,
+            tolerance=self.table_tolerance,
+            most_rows=self.table_rows,
+            comm=self.comm,
+            observe=observe,
+        )
+
+    def model_alone(self) -> MicroModel:
+        """Return the micro model on a half-space, which patches are pressed on alone."""
+        if not isinstance(self.micro, HalfSpaceModel):
+            return self.micro
+        return on_body(None, self.materials, None)(self.micro, 0)
+
+    def model_behind_laws(self) -> MicroModel:
+        """Return the micro model on the body where it is half-space, and else alone."""
+        return self.model_on_body() if isinstance(self.micro, HalfSpaceModel) else self.micro
+
+    def body_warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the bodies, and of patches on half-spaces of their own."""
+        yield from super().body_warnings()
+        if self.body.shape is None:
+            return
+        shape = self.body.shape
+        widths = [length + 2.0 * shape.margin for length in self.surface.lengths]
+        if max(self.patches.size) > 0.5 * min(shape.height, *widths):
+            yield (
+                "the patches are not small against the block: the half-space correction (Love) "
+                "inside their laws is an approximation there"
+            )
+
+    def _body_term_statement(self) -> str:
+        return "none: every patch is taken alone on a half-space"
+
+    @property
+    def _made(self) -> str:
+        return f"every patch alone, Love's {self.scene.coupling.love} displacement"

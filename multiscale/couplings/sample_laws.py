@@ -1,0 +1,162 @@
+"""Makes the laws of the samples of a face, as far as its loads need them.
+
+Theory: docs/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry import Surface
+from micro import FiniteSlopes, HalfSpaceModel
+from multiscale.bodies.bodies import Bodies
+from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.surfaces import RegionSamples
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.refinement import MOST_ROWS
+from multiscale.laws.representative import representative_laws
+from multiscale.loading.stepper import LoadHistory
+from multiscale.readable import Observer
+from multiscale.scene.scene import Scene
+
+_CONCENTRATION = 10.0
+"""Largest local pressure that laws are made for, over the mean one on the face."""
+_CROWNED = 2.0
+"""The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
+_YIELDED = 0.95
+"""Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
+then, and at it the pressure is no function of closure."""
+_EXTENSION = 2.0
+"""Largest pressure of laws that turned out to end too early, over that of the earlier ones."""
+_RESERVE = 0.15
+"""Closure that laws are made for beyond the largest approach on the face, relative to it."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SampleLaws:
+    """The laws of the samples of a face.
+
+    Args:
+        scene: The scene.
+        bodies: Its bodies.
+        samples: The samples of every region of the face.
+        model: Micro model of the first sample, the periodic half-space.
+        load_history: The loads, counted from first touch.
+        finite_slopes: Whether finite slopes of the samples count.
+        tolerance: Interpolation error of the laws.
+    """
+
+    scene: Scene
+    bodies: Bodies
+    samples: tuple[RegionSamples, ...]
+    model: HalfSpaceModel
+    load_history: LoadHistory
+    finite_slopes: bool
+    tolerance: float
+
+    @property
+    def _modulus(self) -> float:
+        return self.bodies.materials.contact_modulus
+
+    @property
+    def _face(self) -> BodyFacts:
+        return self.bodies.facts[0]
+
+    def table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
+        """Tabulate the laws, or extend earlier ones as far as the material allows.
+
+        Args:
+            observe: Told of rows as they are made.
+            before: Laws that end too early; where they end as far as possible they come back.
+
+        Note:
+            Collective.
+        """
+        hardness = self.scene.micro.hardness
+        most = math.inf if hardness is None else _YIELDED * hardness
+        if before is None or not (reached := before.largest_pressure):
+            pressure, closure = self.largest_loads()
+        else:
+            pressure, closure = _EXTENSION * reached, None
+            most = min(most, self._modulus)
+        models = {
+            id(one): self._model_of(region, one)
+            for region in self.samples
+            for one in region.surfaces
+        }
+        made = representative_laws(
+            {region.name: region.surfaces for region in self.samples},
+            self._modulus,
+            largest_pressure=min(pressure, most),
+            largest_closure=closure,
+            tolerance=self.tolerance,
+            most_rows=MOST_ROWS,
+            make_model=lambda sample: models[id(sample)],
+            before=before,
+            comm=self.bodies.comm,
+            observe=observe,
+        )
+        return before if before is not None and made.rows == before.rows else made
+
+    def _model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        """Return the periodic model of a sample, with the slopes of its body where they count."""
+        pair = region.materials
+        model = replace(self.model, surface=sample, contact_modulus=pair.contact_modulus)
+        if not self.finite_slopes:
+            return model
+        return replace(model, slopes=FiniteSlopes(sample, pair.first, periodic=True))
+
+    def largest_loads(self) -> tuple[float, float | None]:
+        """Return the largest local pressure that laws are made for [MPa], and closure [mm].
+
+        The closure is None where only a force, or other loads of the body, would tell it.
+
+        Note:
+            Collective.
+        """
+        stated, history = self.scene.law.largest_pressure, self.load_history
+        if history.quantity == "force":
+            force = history.largest
+            mean = force / self._face.area
+            return stated or max(_CONCENTRATION * mean, self._hertz(force=force)), None
+        tilt, lengths = history.tilt or (0.0, 0.0), self._face.lengths
+        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
+        mean = approach / self.mean_compliance()
+        pressure = stated or max(_CONCENTRATION * mean, self._hertz(approach=approach))
+        first = self.bodies.first
+        preloaded = first is not None and first.body.preload is not None
+        return pressure, None if preloaded else (1.0 + _RESERVE) * approach
+
+    def mean_compliance(self) -> float:
+        """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
+
+        Note:
+            Collective.
+        """
+        from macro import FacePair, displacements_under
+
+        face, total = self.bodies.contact_face(), 0.0
+        for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
+            moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
+            total += float(moved @ one.areas / one.areas.sum())
+        return total
+
+    def _hertz(self, *, force: float = 0.0, approach: float = 0.0) -> float:
+        """Return a bound of the pressure between smooth crowned bodies; 0 without a crown [MPa].
+
+        Source:
+            Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
+        """
+        radii = [one for one in self.scene.law.crown or () if one != "inf"]
+        if not radii:
+            return 0.0
+        modulus, radius = self._modulus, math.sqrt(math.prod(radii))
+        if len(radii) == 1:
+            radius, length = radii[0], min(self._face.lengths)
+            line = math.sqrt(force / length * modulus / (math.pi * radius))
+            return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
+        point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
+        return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))

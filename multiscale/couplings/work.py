@@ -1,0 +1,94 @@
+"""What a run computes and the memory it takes, counted; and the order of magnitude of its time.
+
+The work of a contact problem is its cells times its products with the compliance, that of a mesh
+its unknowns times its multigrid cycles. Two rates of one core make seconds of them. No clock is
+read: the same scene has the same work on every machine, and a run tells its own pace after its
+first load step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from multiscale.readable import number
+
+CELL_PRODUCTS = 3e7
+"""Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
+66 and 260 ms (docs/speed.md, 2026-11-22), with some 30 products each."""
+UNKNOWN_CYCLES = 1e6
+"""Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
+2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
+PRODUCTS = 30.0
+"""Products of a solution, 15 to 60 on 64² to 1024² cells."""
+SLOPES_PRODUCTS = 2.4
+"""Factor of the products of a solution with finite slopes."""
+SOLUTIONS_OF_LAWS = 84
+"""Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
+45 to 65 rows, models of summits 60 to 150."""
+SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
+"""Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
+the compliance of a meshed body's face in 64 modes."""
+BYTES_PER_CELL = 165.0
+"""Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
+load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
+and of 1024² cells could; free sides and body add 40, finite slopes 40."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What a run computes.
+
+    Attributes:
+        size: Cells of its contact problem, which isolated laws share; of asperities the pairs that
+            interact; 0 where contact is meshed.
+        solutions: Contact problems that are solved, error check and rows of laws included.
+        rows: Rows of laws; 0 without laws.
+        products: Cells or pairs times products with the compliance, of all contact problems.
+        unknowns: Degrees of freedom of all meshes; 0 without meshes.
+        cycles: Unknowns times multigrid cycles, of all meshes.
+        ranks: Processes that share the meshes.
+        memory: Memory of the largest contact problem [B].
+        of_pairs: Whether pairs of asperities are counted instead of cells.
+    """
+
+    size: int = 0
+    solutions: float = 0.0
+    rows: int = 0
+    products: float = 0.0
+    unknowns: int = 0
+    cycles: float = 0.0
+    ranks: int = 1
+    memory: float = 0.0
+    of_pairs: bool = False
+
+    @property
+    def computing(self) -> float:
+        """Time of contact problems and meshes, to an order of magnitude [s].
+
+        It is that of cores of the kind that the rates were measured on.
+        """
+        meshes = self.cycles / UNKNOWN_CYCLES / self.ranks
+        return self.products / CELL_PRODUCTS + meshes
+
+    def statements(self) -> Iterator[tuple[str, str]]:
+        """Yield what was counted, with its topic."""
+        counted = []
+        if self.size:
+            laws = f", {self.rows} of them rows of laws" if self.rows else ""
+            what = "pairs" if self.of_pairs else "cells"
+            counted.append(
+                f"about {self.solutions:.0f} contact problems{laws}, on {self.size} {what} each: "
+                f"{_millions(self.products)} {what} × products"
+            )
+        if self.cycles:
+            counted.append(
+                f"meshes of about {_millions(self.unknowns)} unknowns: "
+                f"{_millions(self.cycles)} unknowns × multigrid cycles"
+            )
+        if counted:
+            yield "work", "; ".join(counted)
+
+
+def _millions(count: float) -> str:
+    return f"{number(1e-6 * count, 2)} million"

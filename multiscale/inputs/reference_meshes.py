@@ -1,0 +1,274 @@
+"""The meshes of a reference: their shapes and the memory they will take, before any is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
+from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import Shape, characteristic_size, reference_shapes
+from multiscale.inputs.block import block_section
+from multiscale.inputs.memory import check_memory
+from multiscale.inputs.surfaces import located
+from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.readable import listed
+from multiscale.scene.scene import Scene
+
+Array = NDArray[np.float64]
+
+BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
+"""Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""
+_BYTES_IN_GMSH = {1: 1900, 2: 250}
+"""Memory of rank 0 per unknown while gmsh makes tetrahedra, by the element's degree. It is 1 kB for
+each cell [B]."""
+LEAST_ACROSS = {1: 12.0, 2: 3.0}
+"""Edges across a typical contact below which the force is wrong by several per cent, by the
+element's degree."""
+_NODES = {1: 1.1, 2: 8.4}
+"""Nodes of unstructured tetrahedra per cube of their edge, by the element's degree."""
+_RESERVE = 0.1
+"""Depth beyond the largest approach, relative to it, that tetrahedra are small for where the
+approach is not prescribed: the block yields more than a half-space."""
+_ORDERS = {1: (2.0, 1.0), 2: (3.0, 1.0)}
+"""Known orders of force and contact area in the mesh size, by the element's degree."""
+_MOST_LATTICE = 400
+"""Points along a side, at most, of the lattice that tetrahedra are counted on."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReferenceMeshes:
+    """The meshes of a reference, from coarse to fine.
+
+    Attributes:
+        shapes: What to mesh, the finest last.
+        sizes: Edge lengths where contact can occur, falling, shape (meshes,) [mm].
+        across: Edges of the finest mesh across a typical contact at the largest load, estimated.
+        unknowns: Degrees of freedom, estimated for tetrahedra.
+    """
+
+    shapes: tuple[Shape, ...]
+    sizes: Array
+    across: float
+    unknowns: tuple[int, ...]
+
+    @property
+    def hexahedral(self) -> bool:
+        """Whether the cells are hexahedra."""
+        return self.shapes[-1].hexahedral
+
+    @property
+    def key(self) -> str:
+        """Key of the scene that decides how fine the meshes are."""
+        return _key(self.hexahedral)
+
+    @property
+    def degree(self) -> int:
+        """Polynomial degree of the displacements."""
+        return self.shapes[-1].degree
+
+    @property
+    def force_order(self) -> float:
+        """Known order of the force in the mesh size."""
+        return _ORDERS[self.degree][0]
+
+    @property
+    def area_order(self) -> float:
+        """Known order of the contact area in the mesh size."""
+        return _ORDERS[self.degree][1]
+
+    @property
+    def bytes(self) -> float:
+        """Memory of all meshes together over all ranks, roughly [B]."""
+        return float(sum(self.unknowns)) * BYTES_PER_UNKNOWN[self.degree]
+
+    @property
+    def gathered(self) -> float:
+        """Memory of rank 0 while it makes the largest mesh, roughly; 0 for hexahedra [B]."""
+        return 0.0 if self.hexahedral else float(max(self.unknowns)) * _BYTES_IN_GMSH[self.degree]
+
+    @property
+    def statement(self) -> str:
+        """What the meshes are, in words."""
+        finest = self.shapes[-1]
+        if isinstance(finest, BlockShape):
+            cells = " × ".join(map(str, finest.cells))
+            kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
+            where, unknowns = "edges", [f"{count}" for count in self.unknowns]
+        else:  # unknowns are an estimate, which is worth two digits
+            kind = f"tetrahedra ({finest.element}), small only where contact can occur"
+            where = "edges there"
+            unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
+        count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(self.shapes)]
+        sizes = listed(f"{1e3 * size:.3g}" for size in self.sizes)
+        return (
+            f"{count} of {kind}; {where} of {sizes} µm, {self.across:.2g} across a typical "
+            f"contact; {listed(unknowns)} unknowns, about {self.bytes / 1e9:.2g} GB of memory"
+        )
+
+    def warnings(self) -> Iterator[str]:
+        """Yield what is doubtful of the meshes."""
+        if len(self.shapes) == 1:
+            yield (
+                "one mesh: the discretisation error stays unknown, and the results have no error "
+                "bar; reference.meshes = 2 gives one"
+            )
+        if self.across < LEAST_ACROSS[self.degree]:
+            yield (
+                f"{self.across:.2g} edges across a typical contact at the largest load: the "
+                f"force is wrong by several per cent; refine {self.key}"
+            )
+        finest = self.shapes[-1]
+        if isinstance(finest, BlockShape):
+            top = float(finest.ticks[2][-1] - finest.ticks[2][-2])
+            if top > 2.0 * float(self.sizes[-1]):
+                yield (
+                    f"the top layer is {1e3 * top:.3g} µm high, more than twice the width of its "
+                    "cells, which see the contacts no better than cubes would: take more layers, "
+                    "or a larger block.grading"
+                )
+
+
+def reference_meshes(
+    scene: Scene, surface: Surface, plane_at_largest_load: RigidPlane, nodes: ClusterNodes
+) -> ReferenceMeshes:
+    """Return the meshes of a scene's reference.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        plane_at_largest_load: The rigid plane at the largest load.
+        nodes: The nodes of the run.
+
+    Raises:
+        InputError: When they cannot be made or would not fit into memory; names file and key.
+    """
+    _check_block(scene)
+    block, reference = block_section(scene), scene.reference
+    hexahedral, fine = reference.hexahedral, reference.fine
+    approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
+    prescribed = scene.loading.force is None and scene.loading.tilt != "free"
+    largest = approach if prescribed else (1.0 + _RESERVE) * approach
+    with located(scene, _key(hexahedral)):
+        if fine is not None and not hexahedral:
+            # the nodes of the top face where contact can occur alone
+            plane = RigidPlane.above(surface, largest, tilt)
+            depth = surface.highest - surface.heights
+            share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
+            least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
+            check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
+        radius = contact_radius(surface, approach, tilt=tilt)
+        shapes = reference_shapes(
+            surface,
+            largest,
+            block.height_under(surface.lengths),
+            count=reference.meshes,
+            fine=fine,
+            tilt=tilt,
+            mesh="hexahedra" if hexahedral else "tetrahedra",
+            cells=reference.cells,
+            grading=block.grading,
+            element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
+            radius=radius if prescribed else None,
+        )
+    sizes = np.array([characteristic_size(shape) for shape in shapes])
+    meshes = ReferenceMeshes(
+        shapes=shapes,
+        sizes=sizes,
+        across=2.0 * radius / float(sizes[-1]),
+        unknowns=tuple(mesh_unknowns(shape) for shape in shapes),
+    )
+    check_memory(scene, nodes, reference_requests(scene, meshes))
+    return meshes
+
+
+def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[MemoryRequest]:
+    """Yield the memory that the meshes of a reference need.
+
+    Args:
+        scene: The scene.
+        meshes: Its meshes.
+    """
+    yield _request(scene, "the reference", shared=meshes.bytes)
+    yield _request(scene, "gmsh on rank 0, which meshes the reference,", root_only=meshes.gathered)
+
+
+def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
+    reference = scene.reference
+    return MemoryRequest(
+        key=_key(reference.hexahedral),
+        value=reference.cells or reference.fine,
+        purpose=purpose,
+        alternative="fewer reference.meshes",
+        **sizes,
+    )
+
+
+def _key(hexahedral: bool) -> str:
+    return "reference.cells" if hexahedral else "reference.fine"
+
+
+def _check_block(scene: Scene) -> None:
+    """Refuse keys of the block that do not go with a reference."""
+    block = block_section(scene)
+    if block.margin > 0.0:
+        raise InputError(
+            "does not go with coupling.kind = 'reference', whose rough surface is the whole top",
+            key="block.margin",
+            value=block.margin,
+            allowed="0",
+            file=scene.file,
+        )
+    if scene.reference.hexahedral and not block.element.startswith("Q"):
+        raise InputError(
+            "does not go with a reference of hexahedra",
+            key="block.element",
+            value=block.element,
+            allowed="Q1, Q2, or reference.mesh = 'tetrahedra'",
+            file=scene.file,
+        )
+
+
+def mesh_unknowns(shape: Shape) -> int:
+    """Return the degrees of freedom of a mesh; for tetrahedra an estimate from their sizes.
+
+    Args:
+        shape: What is meshed.
+    """
+    if isinstance(shape, BlockShape):
+        return 3 * math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
+    return round(3.0 * _NODES[shape.degree] * _cubes(shape))
+
+
+def _cubes(shape: RefinedShape) -> float:
+    """Return the number of cubes as large as the edges at their place that fill a block."""
+    counts = [
+        int(np.clip(np.ceil(length / shape.fine), 8, _MOST_LATTICE)) for length in shape.interface
+    ]
+    spacing = np.divide(shape.interface, counts)
+    away = np.ones(counts, dtype=bool)
+    near = np.minimum((shape.places / spacing).astype(int), np.array(counts) - 1)
+    away[near[:, 0], near[:, 1]] = False
+    # distance to the nearest place of contact, in layers half as thick as the edges at their depth
+    beside = np.asarray(distance_transform_edt(away, sampling=spacing))
+    depths, total = [0.0], 0.0
+    while depths[-1] < shape.height and _edge(shape, depths[-1]) < shape.coarse:
+        depths.append(min(depths[-1] + 0.5 * _edge(shape, depths[-1]), shape.height))
+    for above, below in pairwise(depths):
+        distance = np.hypot(beside, 0.5 * (above + below))
+        total += (below - above) * float(np.sum(_edge(shape, distance) ** -3.0))
+    total += (shape.height - depths[-1]) * beside.size * shape.coarse**-3.0  # all alike below
+    return total * float(np.prod(spacing))
+
+
+def _edge(shape: RefinedShape, distance: Any) -> Any:
+    """Return the edge length at a distance from the places of contact [mm]."""
+    grown = shape.fine + shape.growth * np.maximum(distance - 2.0 * shape.fine, 0.0)
+    return np.minimum(grown, shape.coarse)

@@ -1,0 +1,200 @@
+"""The surface of a scene, of one side or of both, and the samples of its laws.
+
+Theory: docs/theory.md, section 10.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from geometry import (
+    InputError,
+    Material,
+    MaterialPair,
+    Surface,
+    facing,
+    laid_on,
+    mirrored,
+    read_surface,
+    synthesise,
+    turned_over,
+)
+from geometry.files.reading import surface_of
+from geometry.preparation import prepared
+from multiscale.scene.scene import Scene
+from multiscale.scene.sections import CounterSurfaceSection, SurfaceSection
+
+WHOLE = "face"
+"""Name of the contact face where the mesh gives it none."""
+
+
+def make_surface(scene: Scene) -> Surface:
+    """Return the surface of a scene, with the heights of both sides where both are rough.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    return make_surfaces(scene)[0]
+
+
+def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
+    """Return the surface of a scene, and what of it is the counter-body's, turned over.
+
+    Returns:
+        The heights of both sides, and those of the counter-body; None where it is smooth.
+
+    Raises:
+        InputError: When one cannot be made or read, or they do not fit; names file and key.
+    """
+    own = sample_surface(scene, scene.surface, "surface")
+    if scene.counter_surface is None:
+        return own, None
+    counter = laid_counter_surface(scene, scene.counter_surface, own)
+    with located(scene, "counter_surface"):
+        return facing(own, counter), counter
+
+
+def laid_counter_surface(scene: Scene, section: CounterSurfaceSection, own: Surface) -> Surface:
+    """Return the counter-body's surface as it lies on the first one: turned over, turned and moved.
+
+    Args:
+        scene: The scene.
+        section: Its section on the counter-body's surface.
+        own: The first surface.
+
+    Raises:
+        InputError: When it cannot be made or read, or does not cover the first one; names file and
+            key.
+    """
+    counter = turned_over(sample_surface(scene, section, "counter_surface"))
+    if not section.is_moved:
+        return counter
+    key = "rotation" if section.rotation else "shift"
+    value: Any = section.rotation if section.rotation else list(section.shift)
+    allowed = "a map that continues periodically, or one that is larger by as much"
+    try:
+        laid = laid_on(own, counter, shift=section.shift, angle=section.rotation)
+    except InputError:
+        problem = "takes the counter-surface off the surface, which it must cover"
+    else:
+        if laid.periodic or not section.periodic:
+            return laid
+        problem = "leaves no counter-surface that continues periodically over these sides"
+        allowed = "multiples of 90 deg, of 180 deg on sides that differ"
+    raise InputError(
+        problem, key=f"counter_surface.{key}", value=value, allowed=allowed, file=scene.file
+    )
+
+
+def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
+    """Make or read the surface of one section of a scene.
+
+    Args:
+        scene: The scene.
+        section: The section.
+        key: Its dotted name, for errors.
+
+    Raises:
+        InputError: When it cannot be made or read; names file and key.
+    """
+    extent: dict[str, Any] = {"grid": section.grid, "lengths": section.lengths}
+    if section.spectrum is not None:
+        with located(scene, f"{key}.spectrum"):
+            surface = synthesise(section.spectrum.spectrum(), **extent)
+            surface = prepared(surface, section.preparation)
+    elif section.heights is not None:
+        with located(scene, f"{key}.heights"):
+            return surface_of(
+                section.heights.values,
+                lengths=section.lengths or (0.0, 0.0),
+                height_unit=section.height_unit or "mm",
+                periodic=section.periodic,
+                **asdict(section.preparation),
+            )
+    else:
+        extent |= {"height_unit": section.height_unit, "channel": section.channel}
+        extent |= {"periodic": section.periodic, **asdict(section.preparation)}
+        with located(scene, f"{key}.file"):
+            surface = read_surface(scene.path_of(section.file) or Path(), **extent)
+    if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
+        return replace(surface, periodic=True)
+    return surface
+
+
+@contextmanager
+def located(scene: Scene, key: str) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and a key.
+
+    Args:
+        scene: The scene.
+        key: The key.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise error.located(key=key, file=scene.file) from None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RegionSamples:
+    """The samples of one region of a contact face.
+
+    Attributes:
+        name: Name of the region.
+        surfaces: The samples, which continue periodically, with the heights of both sides.
+        materials: The materials on both sides there.
+        mirrored: Whether they do not continue periodically themselves, and are mirrored to do so.
+    """
+
+    name: str
+    surfaces: tuple[Surface, ...]
+    materials: MaterialPair
+    mirrored: bool = False
+
+
+def region_samples(
+    scene: Scene, materials: tuple[Material, ...], second: Material | None
+) -> tuple[RegionSamples, ...]:
+    """Return the samples of a contact face and of its further regions.
+
+    Args:
+        scene: The scene, with a law of samples.
+        materials: Elastic constants of the body at the contact face, and at its further regions.
+        second: Those of the counter-body; None where it is rigid.
+
+    Raises:
+        InputError: When a sample cannot be made or read; names file and key.
+    """
+    whole = str(scene.body.contact) if scene.body else WHOLE
+    parts: list[tuple[str, SurfaceSection, str]] = [(whole, scene.surface, "surface")]
+    parts += [(str(one.surface), one, "law.regions") for one in scene.law.regions]
+    above = scene.counter_surface
+    found = []
+    for (name, section, key), material in zip(parts, materials, strict=True):
+        surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
+        if above is not None:
+            laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
+            with located(scene, "counter_surface"):
+                surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
+        samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
+        pair = MaterialPair(first=material, second=second)
+        region = RegionSamples(
+            name=name,
+            surfaces=samples,
+            materials=pair,
+            mirrored=not all(one.periodic for one in surfaces),
+        )
+        found.append(region)
+    return tuple(found)
+
+
+def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSection]:
+    """Return the section of every seed; the section itself where it is no spectrum."""
+    if section.spectrum is None or not seeds:
+        return [section]
+    spectra = [section.spectrum.model_copy(update={"seed": seed}) for seed in seeds]
+    return [section.model_copy(update={"spectrum": spectrum}) for spectrum in spectra]

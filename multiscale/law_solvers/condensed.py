@@ -1,0 +1,219 @@
+"""Patch laws on the compliance of a block's patches, without its mesh, by Newton's method.
+
+Theory: docs/theory.md, section 11.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry import Control, NotConverged, PatchGrid
+from geometry.plane_equilibrium import UNSUPPORTED
+from geometry.rigid_plane import normal_stiffness, plane_failure
+from micro.model import Stiffness
+from multiscale.law_solvers.law_range import ROUNDING, beyond_law
+from multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from multiscale.laws.interpolation import LawPoint
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaws
+from multiscale.loading.load_step import LoadStep
+from multiscale.storage import packed, unpacked
+from support.checked_store import Arrays
+
+Array = NDArray[np.float64]
+
+_MOST_STEPS = 100
+_MOST_HALVINGS = 40
+_MEMORY = 4  # residuals that a step is compared with: at kinks of the laws it may rise for a while
+_DECREASE = 1e-4  # share of the predicted decrease that a step must bring
+_PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plane gains a support
+
+
+class CondensedLaws:
+    """Patch laws on the compliance of the block's patches; a load step is a small dense system.
+
+    The block is linear, so that its compliance says all that patchwise laws need to know of it.
+
+    Args:
+        table: The laws.
+        compliance: Mean displacement of patch i of the block by unit pressure on patch j, shape
+            (N, N) [mm/MPa].
+    """
+
+    past: Any = None
+    face: Any = None
+
+    def __init__(self, table: LawTable, compliance: Array) -> None:
+        self.table, self._laws = table, PatchLaws(table.laws)
+        self._compliance = compliance
+        self._last: DenseState | None = None
+        self._control = Control(approach=0.0)
+
+    def field_state(self, step: LoadStep) -> Any:
+        """Return what fields of the load step just accepted are made from: the pressures."""
+        return step.patches.pressure_MPa
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step; see `Solver.press`."""
+        patches, end = self.table.grid, self._laws.end
+        state = equilibrium(self._laws, self._compliance, patches, control, self._last)
+        worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
+        if state.local[worst] > end[worst] * (1.0 + ROUNDING):
+            problem = (
+                f"patch {patches.unravel(worst)} at a local approach of {state.local[worst]:.6g} "
+                f"mm (allowed: up to {end[worst]:.6g} mm)"
+            )
+            raise beyond_law(control, problem, self.table)
+        self._last, self._control = state, control
+        return LoadStep.of_patches(
+            patches,
+            plane=state.plane,
+            load=state.load,
+            closure=state.point.closure,
+            pressure=state.point.pressure,
+            area_fraction=state.point.contact_area_fraction,
+            separation=state.point.separation,
+            contacts=state.point.contacts,
+            stiffness=state.point.stiffness,
+            newton_iterations=state.iterations,
+        )
+
+    def stiffness(self) -> Stiffness:
+        """Return dF/dδ at the latest load step."""
+        if self._last is None:
+            return Stiffness(None, 0)
+        problem = LoadedPatches(self._laws, self._compliance, self.table.grid, self._control)
+        turns = self._control.tilt is None
+        return Stiffness(normal_stiffness(problem.stiffness(self._last), turns=turns), 1)
+
+    def state(self) -> Arrays:
+        """Return the latest equilibrium."""
+        return packed(self._last)
+
+    def restore(self, state: Arrays) -> None:
+        """Start from an equilibrium."""
+        self._last = unpacked(state, (DenseState, LawPoint))
+
+
+def equilibrium(
+    laws: PatchLaws,
+    compliance: Array,
+    patches: PatchGrid,
+    control: Control,
+    start: DenseState | None = None,
+) -> DenseState:
+    """Solve closure_i(s_i) = δ_i − Σ_j C_ij p_j(s_j) for the local approaches s of all patches.
+
+    The laws are given over the local approach, so that it does not matter whether their pressure
+    is a function of closure. Where the plane's force is prescribed, or its moment is zero, its
+    approach and slopes are unknowns beside s, eliminated by Schur's complement. Steps are halved
+    until the residual falls below the largest of the last few (Grippo, Lampariello & Lucidi 1986,
+    doi 10.1137/0723046). A plane that nothing supports moves on to the next touch.
+
+    Args:
+        laws: The laws.
+        compliance: C, mean displacement of patch i of the block by unit pressure on patch j, shape
+            (N, N) [mm/MPa].
+        patches: The partition.
+        control: What the load step prescribes.
+        start: A solution nearby.
+
+    Raises:
+        InputError: When the compliance is not a finite matrix of the size of the partition.
+        NotConverged: When neither the start nor one common approach of all laws leads to a
+            solution.
+    """
+    problem = LoadedPatches(laws, compliance, patches, control)
+    plane = np.zeros(3) if start is None else start.plane
+    if control.force == 0.0:
+        problem.control = problem.first_touch(plane)
+    plane = problem.control.prescribed(plane)
+    if start is not None:
+        try:
+            return _iterated(problem, start.local, plane)
+        except NotConverged:  # a law has a kink in between: try without the earlier solution
+            pass
+    return _iterated(problem, *problem.initial_guess(plane))
+
+
+def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
+    now = problem.at(local, plane)
+    recent: deque[float] = deque(maxlen=_MEMORY)
+    for iterations in range(_MOST_STEPS):
+        problem.force_scale = max(problem.force_scale, float(now.load[0]))
+        if problem.relative_residual(now) <= TOLERANCE:
+            return replace(now, iterations=iterations)
+        step, motion, supported = _newton_step(problem, now)
+        if supported:
+            recent.append(problem.norm(now))
+            now = _line_search(problem, now, step, motion, max(recent), iterations + 1)
+        else:
+            recent.clear()
+            now = problem.at(now.local + step, now.plane + motion)
+    raise problem.failure("DIVERGED_MAX_IT", _MOST_STEPS)
+
+
+def _newton_step(problem: LoadedPatches, now: DenseState) -> tuple[Array, Array, bool]:
+    """Return the change of s and of the plane, and whether it is Newton's."""
+    free = problem.control.free
+    unit, lever = problem.levers.unit[free], problem.levers.scaled(free)
+    solved = problem.tangent(now).solve(np.column_stack((now.residual, lever)))
+    step, columns = solved[:, 0], solved[:, 1:]
+    change = np.zeros(3)
+    if not free.any():
+        return step, change, True
+    loads = problem.area * lever.T * now.point.dpressure
+    stiffness = loads @ columns
+    values, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.T))
+    residual = vectors.T @ (problem.load_residual(now) - loads @ step)
+    loose = values <= UNSUPPORTED * max(values[-1], 0.0)
+    falling = loose & (np.abs(residual) > TOLERANCE * (problem.force_scale or 1.0))
+    if falling.any():
+        change[free] = unit * (vectors @ np.where(falling, residual, 0.0))
+        return *_to_next_touch(problem, now, change), False
+    motion = vectors @ np.divide(residual, values, out=np.zeros_like(residual), where=~loose)
+    change[free] = unit * motion
+    return step + columns @ motion, change, True
+
+
+def _to_next_touch(problem: LoadedPatches, now: DenseState, motion: Array) -> tuple[Array, Array]:
+    """Return the change of s and of the plane along a motion until one more patch is touched."""
+    rise = problem.levers.matrix @ motion
+    gap = problem.laws.first_touch - now.point.closure
+    coming = (now.point.pressure == 0.0) & (rise > 1e-9 * np.abs(rise).max()) & (gap < np.inf)
+    if not coming.any():
+        raise plane_failure(problem.control, "NO_SUPPORT")
+    largest = max(float(np.abs(problem.levers.matrix @ now.plane).max()), float(gap[coming].max()))
+    way = np.maximum(gap[coming], 0.0) + _PAST_TOUCH * largest
+    share = float(np.min(way / rise[coming]))
+    return share * rise, share * motion
+
+
+def _line_search(
+    problem: LoadedPatches,
+    now: DenseState,
+    step: Array,
+    motion: Array,
+    reference: float,
+    iterations: int,
+) -> DenseState:
+    """Shorten a Newton step until the residual falls, straight or along the laws.
+
+    A straight step is taken where it lowers the residual. Otherwise the better one of the straight
+    step and the one along the laws is taken where its residual is below the reference.
+    """
+    before = problem.norm(now)
+    for share in 0.5 ** np.arange(_MOST_HALVINGS):
+        part, plane = share * step, now.plane + share * motion
+        trial, enough = problem.at(now.local + part, plane), 1.0 - _DECREASE * share
+        if problem.norm(trial) <= enough * before:
+            return trial
+        trial = min(trial, problem.along_laws(now, part, plane), key=problem.norm)
+        if problem.norm(trial) <= enough * reference:
+            return trial
+    raise problem.failure("DIVERGED_LINE_SEARCH", iterations)

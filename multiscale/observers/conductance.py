@@ -1,0 +1,206 @@
+"""Conductance of load steps and of laws, where a scene asks for it.
+
+Theory: docs/theory.md, section 14.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micro.conductance import (
+    conductance_per_area,
+    gas_conductance,
+    pair_conductivity,
+    radiation_conductance,
+    total_conductance,
+)
+from multiscale.couplings.coupling import Coupling
+from multiscale.exports.sampling import Conducts
+from multiscale.loading.load_step import LoadStep
+from multiscale.observers.observer import StepObserver
+from multiscale.readable import Caution, quantity
+from multiscale.scene.conductance_section import ConductanceSection
+from support.collective import on_root
+
+Array = NDArray[np.float64]
+
+_MM2_PER_M2 = 1e6
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Conductances:
+    """Turns interfacial stiffnesses of a scene into conductances.
+
+    Args:
+        modulus: E* of the pair of materials [MPa].
+        areas: Nominal areas of the patches or regions, shape (N,) [mm²].
+        section: What the scene asks for.
+    """
+
+    modulus: float
+    areas: Array
+    section: ConductanceSection
+
+    @classmethod
+    def of(cls, coupling: Coupling, section: ConductanceSection) -> Self:
+        """Return that of a coupling, whose solver is made.
+
+        Args:
+            coupling: The coupling.
+            section: What its scene asks for.
+        """
+        modulus = coupling.materials.contact_modulus
+        return cls(modulus=modulus, areas=coupling.areas, section=section)
+
+    @property
+    def thermal(self) -> float | None:
+        """Conductivity of the pair [W/m/K]; None where it is not about heat."""
+        given = self.section.conductivity
+        return None if given is None else pair_conductivity(given)
+
+    @property
+    def electrical(self) -> float | None:
+        """Electrical conductivity of the pair [S/m]; None where it is not about currents."""
+        given = self.section.resistivity
+        return None if given is None else pair_conductivity([1.0 / one for one in given])
+
+    def per_area(self, stiffness: Array) -> dict[str, Array]:
+        """Return conductances per area by column name, of the contacts alone.
+
+        Args:
+            stiffness: Stiffnesses dp/dc of laws, of any shape [MPa/mm].
+        """
+        names = "thermal_conductance_W_per_m2K", "electrical_conductance_S_per_m2"
+        known = zip(names, (self.thermal, self.electrical), strict=True)
+        return {
+            name: conductance_per_area(stiffness, self.modulus, k)
+            for name, k in known
+            if k is not None
+        }
+
+
+class ConductanceObserver(StepObserver):
+    """Adds the conductances of contacts and gaps to load steps.
+
+    Without laws they are those of all contacts together on half-spaces, by one more linear
+    solution. With laws they are the sums over the patches, side by side.
+
+    Args:
+        coupling: What finds the load steps.
+        section: What its scene asks for.
+    """
+
+    def __init__(self, coupling: Coupling, section: ConductanceSection) -> None:
+        self._coupling, self._section = coupling, section
+
+    @cached_property
+    def _conductances(self) -> Conductances:
+        return Conductances.of(self._coupling, self._section)
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with its conductances."""
+        stiffness, pair = self._coupling.interface_stiffness(step), self._conductances
+        if stiffness is None:
+            return step
+        columns: dict[str, Any] = {}
+        if pair.thermal is not None:
+            gap = self._of_gaps(step)
+            columns["gap_conductance_W_per_K"] = gap
+            contacts = total_conductance(stiffness, pair.modulus, pair.thermal)
+            columns["thermal_conductance_W_per_K"] = contacts + gap
+        if pair.electrical is not None:
+            conductance = total_conductance(stiffness, pair.modulus, pair.electrical)
+            columns["electrical_conductance_S"] = conductance
+        return replace(step, **columns)
+
+    def _of_gaps(self, step: LoadStep) -> float:
+        """Return the conductance of gas and radiation outside of the contacts [W/K]."""
+        section, share = self._section, step.contact_area_fraction
+        jump, per_area = section.temperature_jump or 0.0, 0.0
+        if (gas := section.gas) is not None:
+
+            def through_gas() -> float:
+                gaps = self._coupling.gaps()
+                if gaps is not None:
+                    return gas_conductance(gaps, gas, jump)
+                # laws know the mean gap: the mean of k/(g + M) is no less
+                open_gap = step.mean_separation_mm / (1.0 - share) if share < 1.0 else 0.0
+                return (1.0 - share) * gas_conductance(open_gap, gas, jump)
+
+            per_area = on_root(self._coupling.comm, through_gas)
+        if section.temperature is not None and section.emissivity is not None:
+            radiation = radiation_conductance(section.temperature, section.emissivity)
+            per_area += (1.0 - share) * radiation
+        return per_area * float(self._conductances.areas.sum()) / _MM2_PER_M2
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of conductances."""
+        return conductance_notes(steps, self._section, with_laws=self._coupling.has_laws)
+
+
+def conducts_of(coupling: Coupling) -> Conducts | None:
+    """Return conductances per area at stiffnesses of laws; None where the scene asks for none.
+
+    Args:
+        coupling: The coupling.
+    """
+    section = coupling.scene.conductance
+    if section is None:
+        return None
+    modulus, none = coupling.materials.contact_modulus, np.zeros(0)
+    return Conductances(modulus=modulus, areas=none, section=section).per_area
+
+
+def conductance_notes(
+    steps: Sequence[LoadStep], section: ConductanceSection, *, with_laws: bool
+) -> Iterator[str]:
+    """Yield what a report says of conductances.
+
+    Args:
+        steps: The load steps.
+        section: What the scene asks for.
+        with_laws: Whether patch laws stand for the contacts.
+    """
+    known = [
+        step
+        for step in steps
+        if (step.thermal_conductance_W_per_K, step.electrical_conductance_S) != (None, None)
+    ]
+    if not known:
+        return
+    step, parts = known[-1], []
+    if step.thermal_conductance_W_per_K is not None:
+        gap = step.gap_conductance_W_per_K or 0.0
+        through = f", {quantity(gap, 'W/K')} of it through the gaps" if gap else ""
+        parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
+    if step.electrical_conductance_S is not None:
+        parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
+    what = (
+        "the sum over patches or regions side by side, without what the bodies add"
+        if with_laws
+        else "that of all contacts between half-spaces"
+    )
+    yield (
+        f"conductance at load step {step.step}: {'; '.join(parts)}; it is {what}, for which it "
+        "follows exactly from the stiffness (Barber 2003); finite bodies and oxide films are left "
+        "out"
+    )
+    if section.gas is None or not step.contact_area_fraction:
+        return
+    if with_laws:
+        yield (
+            "gas in the gaps: laws know the mean gap, and a layer as thick as that is the least "
+            "that the gas conducts (coupling.kind = 'concurrent' integrates over the gaps)"
+        )
+    elif not section.temperature_jump:
+        yield Caution(
+            "warning: gaps close towards contacts, where the gas conducts without bound as no "
+            "conductance.temperature_jump is stated: its conductance depends on the grid (air at "
+            "1 bar: about 0.4 um)"
+        )
