@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from support.checks import PROGRAM, address_space
-from support.cores import lendable, place
+from support.cores import node_cores
 from support.errors import InputError
 
 _LEAST_DATA = 0.5e9
@@ -88,16 +88,14 @@ def cores_statement(comm: Any) -> str:
     Note:
         Collective.
     """
-    places = [place()] if comm is None else comm.allgather(place())
-    own = sorted({one.own for one in places})
-    each = f"{own[0]}" if len(own) == 1 else f"{own[0]} to {own[-1]}"
-    text = f"{each} thread{'s' * (own != [1])}"
-    if len(places) == 1:
-        return f"one process with {text}"
-    nodes = len({one.node for one in places})
-    on = f" on {nodes} nodes" * (nodes > 1)
-    alone = lendable(places, [0], 0).own
-    return f"{len(places)} ranks{on} with {text} each; what one rank does for all takes {alone}"
+    here = node_cores(comm)
+    threads = f"{here.own} thread{'s' * (here.own != 1)}"
+    if comm is None or comm.size == 1:
+        return f"one process with {threads}"
+    on = f" on {here.nodes} nodes" * (here.nodes > 1)
+    return (
+        f"{comm.size} ranks{on} with {threads} each; what one rank does for all takes {here.alone}"
+    )
 
 
 def large_object_comm(comm: Any) -> Any:
@@ -182,15 +180,14 @@ class MemoryRequest:
         return f"{self.purpose} needs about {self.total / 1e9:.3g} GB of memory".lstrip()
 
 
-def memory_of_this_node(groups: Iterable[tuple[float, float]] | None = None) -> float:
+def memory_of_this_node(groups: Iterable[float] | None = None) -> float:
     """Return the memory of this node, or of this process's control groups if that is less [B].
 
     Args:
-        groups: Limit and use of memory of the control groups; by default `control_group_memory`.
+        groups: Limits of memory of the control groups; by default `control_group_memory`.
     """
     physical = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    limits = control_group_memory() if groups is None else groups
-    return min([float(physical), *(limit for limit, _ in limits)])
+    return min([float(physical), *(control_group_memory() if groups is None else groups)])
 
 
 def peak_memory() -> float:
@@ -301,8 +298,8 @@ def cluster_nodes(comm: Any) -> ClusterNodes:
 
 def control_group_memory(
     own: Path = Path("/proc/self/cgroup"), groups: Path = Path("/sys/fs/cgroup")
-) -> Iterator[tuple[float, float]]:
-    """Yield limit and use of memory of the control groups that this process is in [B].
+) -> Iterator[float]:
+    """Yield the limits of memory of the control groups that this process is in [B].
 
     Batch systems limit their jobs by control groups of either version. Groups without a limit are
     left out.
@@ -314,13 +311,12 @@ def control_group_memory(
     for line in own.read_text(encoding="utf-8").splitlines() if own.exists() else ():
         _, controllers, path = line.split(":", 2)
         if not controllers:
-            top, names = groups, ("memory.max", "memory.current")
+            top, name = groups, "memory.max"
         elif "memory" in controllers.split(","):
-            top, names = groups / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes")
+            top, name = groups / "memory", "memory.limit_in_bytes"
         else:
             continue
         group = top / path.strip("/")
         for folder in (group, *group.parents):
             with suppress(OSError, ValueError):  # above all groups, or the limit is "max"
-                limit, used = (float((folder / name).read_text("utf-8")) for name in names)
-                yield limit, used
+                yield float((folder / name).read_text("utf-8"))

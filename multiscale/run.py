@@ -32,8 +32,7 @@ from multiscale.results.yielding_notes import energy_notes, yielding_notes
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
-from multiscale.storage import digest
-from support.checked_store import Arrays
+from support.checked_store import fingerprint
 from support.collective import on_root
 from support.packages import optional_packages
 
@@ -66,7 +65,7 @@ class Run:
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
-        self._start: Arrays = {}
+        self._start: Any = None
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
@@ -102,9 +101,9 @@ class Run:
     def prepare(self) -> None:
         """Make what load steps need, once: laws, bodies, a start from the steps so far."""
         self.coupling.prepare()
-        if self._start:
+        if self._start is not None:
             self.coupling.restore(self._start)
-            self._start = {}
+            self._start = None
 
     def load_steps(self) -> Iterator[LoadStep]:
         """Yield the load steps as they are accepted, after making what they need.
@@ -150,19 +149,19 @@ class Run:
         """Values of the scene's auto keys."""
         return resolved_sections(self.coupling, self.given)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the coupling's next load step starts from.
 
         Note:
             Collective.
         """
-        return self._start or self.coupling.state()
+        return self.coupling.state() if self._start is None else self._start
 
     def resume(
         self,
         steps: Sequence[LoadStep],
         position: LoadPosition,
-        state: Arrays,
+        state: Any,
         laws: bytes,
         contacts: Sequence[ContactRecord] = (),
     ) -> None:
@@ -184,11 +183,9 @@ class Run:
     @cached_property
     def heights(self) -> str:
         """SHA-256 of the surface's heights, or of those of all samples."""
-        arrays = {"heights": self.coupling.surface.heights}
-        if self.coupling.regions is not None:
-            surfaces = enumerate(self.coupling.rough_surfaces)
-            arrays |= {f"{number}": surface.heights for number, surface in surfaces}
-        return digest(arrays)
+        samples = () if self.coupling.regions is None else self.coupling.rough_surfaces
+        surfaces = (self.coupling.surface, *samples)
+        return fingerprint([surface.heights for surface in surfaces])
 
     @property
     def laws(self) -> LawTable | None:

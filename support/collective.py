@@ -7,12 +7,12 @@ Only mpi4py's lower-case methods of the communicator are used, so that nothing h
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from heapq import heappop, heappush
 from itertools import chain
 from typing import Any, TypeVar
 
-from support.cores import lendable, lent, place
+from support.cores import allocated, node_cores
 
 T = TypeVar("T")
 
@@ -47,7 +47,7 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
 
 
 def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
-    """Do long work on rank 0, which is lent the cores of its node, and broadcast the result.
+    """Do long work on rank 0 with all cores of its node, and broadcast the result.
 
     Args:
         comm: MPI communicator, or None.
@@ -64,27 +64,22 @@ def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
     """
     if comm is None or comm.size == 1:
         return work()
-    done = _while_others_sleep(comm, range(1), lambda: _attempt(work))
+    here, done = node_cores(comm), None
+    if comm.rank == 0:
+        with allocated(here.alone, here.granted):
+            done = _attempt(work)
+    _sleep_until_all_arrive(comm)
     result, error = comm.bcast(done, root=0)
     if error is not None:
         raise error
     return result
 
 
-def _while_others_sleep(comm: Any, working: Collection[int], work: Callable[[], T]) -> T | None:
-    """Do work on some ranks, which are lent the cores of those that wait; return None on others.
-
-    Ranks sleep until all are done. In a collective call of MPI they would keep their cores busy.
-    """
-    places, result = comm.allgather(place()), None
-    if comm.rank in working:
-        here = lendable(places, working, comm.rank)
-        with lent(here.own, here.granted):
-            result = work()
-    done, began = comm.Ibarrier(), time.perf_counter()
-    while not done.Test():
+def _sleep_until_all_arrive(comm: Any) -> None:
+    """Wait for all ranks; in a collective call of MPI those that wait would keep cores busy."""
+    arrived, began = comm.Ibarrier(), time.perf_counter()
+    while not arrived.Test():
         time.sleep(min(_NAP, _SHARE * (time.perf_counter() - began)))
-    return result
 
 
 def together(comm: Any, work: Callable[[], T]) -> T:
@@ -120,13 +115,14 @@ def shared(
     costs: Sequence[float] | None = None,
     observe: Callable[[int], None] | None = None,
 ) -> list[T]:
-    """Do tasks of a list on all ranks; ranks that get none lend their cores to the others.
+    """Do tasks of a list on all ranks; a single one on rank 0 with all cores of its node.
 
     Args:
         comm: MPI communicator (mpi4py), or None.
         count: Number of tasks.
         work: Does the task of an index; must not communicate itself.
-        costs: What the tasks cost, relative to each other; see `dealt`. The same on all ranks.
+        costs: What the tasks cost, relative to each other, the same on all ranks; see
+            `distributed`.
         observe: Called on every rank after each task of its own, with the number of tasks that all
             ranks have done by then if they are equally quick.
 
@@ -140,7 +136,7 @@ def shared(
         Collective.
     """
     rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
-    parts = dealt(count, size, costs)
+    parts = distributed(count, size, costs)
 
     def work_off() -> list[T]:
         found = []
@@ -152,10 +148,12 @@ def shared(
 
     if size == 1:
         gathered = [work_off()]
+    elif count == 1:
+        return on_root_alone(comm, work_off)
     else:
-        working = [k for k in range(size) if parts[k]]
-        done = _while_others_sleep(comm, working, lambda: _attempt(work_off))
-        outcomes = comm.allgather(done or ([], None))
+        done = _attempt(work_off)
+        _sleep_until_all_arrive(comm)
+        outcomes = comm.allgather(done)
         failures = [error for _, error in outcomes if error is not None]
         if failures:
             raise failures[0]
@@ -164,10 +162,10 @@ def shared(
     return [results[index] for index in range(count)]
 
 
-def dealt(count: int, ranks: int, costs: Sequence[float] | None = None) -> list[list[int]]:
-    """Deal tasks to ranks: the costliest first, each to the rank with the least to do.
+def distributed(count: int, ranks: int, costs: Sequence[float] | None = None) -> list[list[int]]:
+    """Distribute tasks over ranks: the costliest first, each to the rank with the least to do.
 
-    The last rank then ends at most a third later than with the best of all deals.
+    The last rank then ends at most a third later than with the best of all distributions.
 
     Args:
         count: Number of tasks.

@@ -2,15 +2,15 @@
 
 The number is ``OMP_NUM_THREADS`` where that is set, as batch systems and users do, or the cores
 that Slurm gives each task. Otherwise it is the cores that the operating system grants this process,
-shared with the ranks beside it. Ranks that wait lend theirs to those of their node that work.
+shared with the ranks beside it. What one rank does for all, while the others wait, takes the cores
+of all ranks of its node.
 """
 
 from __future__ import annotations
 
 import os
 import platform
-import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, wait
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import cache
@@ -21,72 +21,106 @@ Result = TypeVar("Result")
 BLOCK = 2**20
 """Bytes of the rows or columns that are transformed at a time, so that they stay in the cache of a
 core; blocks of half or twice the size take 5 to 60 % longer on grids of 4096²."""
+_STATED = ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK")
 _RANKS_HERE = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "MV2_COMM_WORLD_LOCAL_SIZE")
 """Variables that launchers set to the number of ranks on this node: Open MPI's mpirun; Hydra, of
 MPICH and Intel MPI; MVAPICH."""
-_SLURM_TASKS = "SLURM_STEP_TASKS_PER_NODE"
-"""Variable that Slurm's srun sets to the numbers of tasks on all nodes, such as ``4(x2),3``."""
-_borrowed = 0
-_pool: tuple[int, ThreadPoolExecutor] | None = None
+_allocated = 0
 
 
-class Place(NamedTuple):
-    """Where a rank computes.
+class NodeCores(NamedTuple):
+    """The cores of the ranks on one node.
 
     Attributes:
-        node: Name of its node.
-        granted: Numbers of the cores that the operating system grants it.
-        own: How many it may use by itself.
+        nodes: Number of nodes that all ranks are on.
+        granted: Numbers of the cores that the operating system grants these ranks.
+        threads: How many threads all of them together may start by themselves.
+        own: How many this process may start by itself.
     """
 
-    node: str
+    nodes: int
     granted: frozenset[int]
+    threads: int
     own: int
+
+    @property
+    def alone(self) -> int:
+        """Threads that this process may start while the other ranks wait."""
+        return max(self.own, min(self.threads, len(self.granted)))
 
 
 def own_cores() -> int:
     """Return the number of cores that this process may use by itself."""
-    for name in ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK"):
-        if stated := _count(os.environ.get(name, "").partition(",")[0].strip()):
-            return stated
-    return max(1, len(_granted()) // _ranks_here())
+    stated = next(filter(None, map(_number, _STATED)), 0)
+    return stated or max(1, len(_granted()) // _ranks_here())
 
 
-def place() -> Place:
-    """Return where this process computes."""
-    return Place(platform.node(), _granted(), own_cores())
-
-
-def lendable(places: Sequence[Place], working: Collection[int], rank: int) -> Place:
-    """Return where a rank computes while some ranks work and all others wait.
+def node_cores(comm: Any) -> NodeCores:
+    """Return the cores of the ranks on this process's node.
 
     Args:
-        places: Where all ranks compute by themselves.
-        working: The ranks that work; those of one node share what the others there lend.
-        rank: One of them.
+        comm: MPI communicator (mpi4py), or None.
+
+    Note:
+        Collective.
     """
-    here = [k for k, one in enumerate(places) if one.node == places[rank].node]
-    granted = frozenset().union(*(places[k].granted for k in here))
-    all_own = min(sum(places[k].own for k in here), len(granted))
-    share = all_own // sum(k in working for k in here)
-    if share <= places[rank].own:
-        return places[rank]
-    return Place(places[rank].node, granted, share)
+    mine = platform.node(), _granted(), own_cores()
+    everywhere = [mine] if comm is None else comm.allgather(mine)
+    here = [(granted, own) for node, granted, own in everywhere if node == mine[0]]
+    granted = frozenset[int]().union(*(each for each, _ in here))
+    return NodeCores(
+        nodes=len({node for node, _, _ in everywhere}),
+        granted=granted,
+        threads=sum(own for _, own in here),
+        own=mine[2],
+    )
+
+
+def cores() -> int:
+    """Return the number of cores for the work at hand: this process's own, or those allocated."""
+    return _allocated or own_cores()
+
+
+@contextmanager
+def allocated(count: int, granted: Collection[int] = ()) -> Iterator[None]:
+    """Let this process use a number of cores, for threads of ours and of BLAS.
+
+    Args:
+        count: The number.
+        granted: Numbers of these cores; launchers bind ranks to cores, which threads that start
+            meanwhile may then leave. By default they stay where the process is bound to.
+    """
+    global _allocated
+    before, bound = _allocated, _granted()
+    _allocated = count
+    _bind(granted or bound)
+    try:
+        with blas_threads(count):
+            yield
+    finally:
+        _allocated = before
+        _bind(bound)
+
+
+def hold_blas() -> None:
+    """Let BLAS take as many threads as this process may, for the rest of it.
+
+    By default it takes a thread for every core of the node, on every rank.
+    """
+    blas_threads(own_cores())
 
 
 def _ranks_here() -> int:
-    for name in _RANKS_HERE:
-        if count := _count(os.environ.get(name, "")):
-            return count
-    tasks = []
-    for count, _, repeated in re.findall(r"(\d+)(\(x(\d+)\))?", os.environ.get(_SLURM_TASKS, "")):
-        tasks += [int(count)] * int(repeated or 1)
-    node = _count(os.environ.get("SLURM_NODEID", ""))
-    return max(1, tasks[node]) if node < len(tasks) else 1
+    """Return the number of ranks on this node, by what their launcher tells."""
+    if here := next(filter(None, map(_number, _RANKS_HERE)), 0):
+        return here
+    nodes = _number("SLURM_STEP_NUM_NODES")
+    return max(1, -(-_number("SLURM_STEP_NUM_TASKS") // nodes)) if nodes else 1
 
 
-def _count(text: str) -> int:
-    """Return the number that a text is; 0 for any other text."""
+def _number(variable: str) -> int:
+    """Return the number that a variable of the environment is; 0 for anything else."""
+    text = os.environ.get(variable, "").partition(",")[0].strip()
     return int(text) if text.isdecimal() else 0
 
 
@@ -97,51 +131,10 @@ def _granted() -> frozenset[int]:
     return frozenset(range(os.cpu_count() or 1))
 
 
-def cores() -> int:
-    """Return the number of cores for the work at hand: this process's own, or those it was lent."""
-    return _borrowed or own_cores()
-
-
-@contextmanager
-def lent(count: int, granted: Collection[int] = ()) -> Iterator[None]:
-    """Give this process the cores of ranks that wait meanwhile, for threads of ours and of BLAS.
-
-    Args:
-        count: How many it may use, its own included.
-        granted: Numbers of all of them, where launchers bind ranks to cores: its threads may then
-            leave those that it is bound to.
-    """
-    global _borrowed
-    before, _borrowed = _borrowed, count
-    try:
-        with _bound_to(granted), blas_threads(count):
-            yield
-    finally:
-        _borrowed = before
-
-
-@contextmanager
-def _bound_to(wanted: Collection[int]) -> Iterator[None]:
-    """Bind this thread, and those that it starts, to some cores; leave it as it is for none."""
-    bound = _granted()
-    if not wanted or bound == wanted:
-        yield
-        return
-    with suppress(OSError):  # a container may refuse
+def _bind(wanted: Collection[int]) -> None:
+    """Bind this thread, and those that it starts, to some cores."""
+    with suppress(OSError, AttributeError):  # a container may refuse; not every system can
         os.sched_setaffinity(0, wanted)
-    try:
-        yield
-    finally:
-        with suppress(OSError):
-            os.sched_setaffinity(0, bound)
-
-
-def hold_blas() -> None:
-    """Let BLAS take as many threads as this process may, for the rest of it.
-
-    By default it takes a thread for every core of the node, on every rank.
-    """
-    blas_threads(own_cores())
 
 
 def blocks(count: int, size: int) -> list[slice]:
@@ -167,8 +160,7 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
     Returns:
         The results, in the order of the tasks.
     """
-    global _pool
-    count, listed = cores(), list(tasks)
+    listed = list(tasks)
     results: dict[int, Result] = {}
     todo = iter(range(len(listed)))
 
@@ -176,14 +168,12 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         for task in todo:  # whoever is free takes the next
             results[task] = work(listed[task])
 
-    others = min(count, len(listed)) - 1
-    if others > 0 and (_pool is None or _pool[0] != count):
-        _pool = count, ThreadPoolExecutor(count)
-    if others <= 0 or _pool is None:
+    others = min(cores(), len(listed)) - 1
+    if others <= 0:
         share()
     else:
         with blas_threads(1):
-            helping = [_pool[1].submit(share) for _ in range(others)]
+            helping = [_pool(cores()).submit(share) for _ in range(others)]
             try:
                 share()
             finally:
@@ -191,6 +181,12 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         for helper in helping:
             helper.result()
     return [results[task] for task in range(len(listed))]
+
+
+@cache
+def _pool(count: int) -> ThreadPoolExecutor:
+    """Return threads, which are started once: that takes as long as a small transform."""
+    return ThreadPoolExecutor(count)
 
 
 def blas_threads(count: int) -> AbstractContextManager[object]:

@@ -1,9 +1,13 @@
-"""Packages that only parts of patchlaw need, and where each of them comes from."""
+"""Packages that only parts of patchlaw need, where each comes from, and which shadow others."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+import sys
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from traceback import walk_tb
 
 from support.errors import NotInstalled
@@ -26,6 +30,10 @@ _NEEDS = {
     for package in packages.split()
 }
 
+_SHARED = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")
+"""Packages that dolfinx and each other's compiled parts are built against."""
+_TOGETHER = ("numpy", "scipy.special", "h5py")
+
 
 @contextmanager
 def optional_packages() -> Iterator[None]:
@@ -46,6 +54,54 @@ def optional_packages() -> Iterator[None]:
         if not (isinstance(error, ModuleNotFoundError) and error.name == package):
             problem = f"cannot be imported ({' '.join(str(error).split())[:_LONGEST]})"
         raise NotInstalled(f"{package} {problem}, and {what} need it: {source}") from error
+
+
+def shadows(path: Sequence[str] | None = None) -> dict[str, str]:
+    """Return packages that stand before the distribution's, each with a sentence on it.
+
+    Only folders are looked at, which takes microseconds.
+
+    Args:
+        path: Folders that Python looks for packages in, in their order; by default `sys.path`.
+    """
+    sentences = {}
+    folders = [folder for folder in (sys.path if path is None else path) if folder]
+    for name in _SHARED:
+        places = [one for one in folders if os.path.isfile(os.path.join(one, name, "__init__.py"))]
+        if len(places) > 1 and os.path.basename(places[-1]) == "dist-packages":
+            sentences[name] = (
+                f"{name} in {places[0]} shadows the distribution's in {places[-1]}, which dolfinx "
+                "and others are built against"
+            )
+    return sentences
+
+
+def removal(names: Iterable[str]) -> str:
+    """Return the command that removes packages.
+
+    Args:
+        names: Their names.
+    """
+    return f"remove with: {sys.executable} -m pip uninstall {' '.join(names)}"
+
+
+def conflict() -> str:
+    """Return what is wrong with packages that shadow the distribution's; empty where all work.
+
+    Only where something shadows is anything imported.
+    """
+    if not (shadowing := shadows()):
+        return ""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of versions that do not fit
+            for name in _TOGETHER:
+                import_module(name)
+    except Exception as error:  # of any family: ABI, attributes, libraries
+        problem = (str(error).splitlines() or ["?"])[0]
+        told = "; ".join(shadowing.values())
+        return f"{told}; together they fail: {problem}; {removal(shadowing)}"
+    return ""
 
 
 def _failed_import(error: Exception) -> str:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import os
-from collections.abc import Callable, Iterator
+import shutil
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
+from typing import Any
 from uuid import uuid4
 
 from support.errors import NotWritten
@@ -27,12 +31,12 @@ def written(path: Path) -> Iterator[None]:
         raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
-def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
+def write_bytes(path: Path, content: bytes) -> Path:
     """Write a file under a temporary name beside it and rename it when it is complete.
 
     Args:
         path: Final name; its folder is made when missing.
-        write: Writes the file whose name it is given; the suffix is that of the final name.
+        content: What the file is to hold.
 
     Returns:
         The final name.
@@ -45,7 +49,7 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         try:
-            write(partial)
+            partial.write_bytes(content)
             with partial.open("rb") as file:
                 os.fsync(file.fileno())  # lest a crash of the machine leave the name without data
             partial.replace(path)
@@ -54,11 +58,60 @@ def write_whole(path: Path, write: Callable[[Path], object]) -> Path:
     return path
 
 
-def write_bytes(path: Path, content: bytes) -> Path:
-    """Write bytes.
+def write_text(path: Path, text: str) -> Path:
+    """Write a text as UTF-8.
 
     Args:
         path: File to write.
-        content: Its content.
+        text: Its content.
     """
-    return write_whole(path, lambda partial: partial.write_bytes(content))
+    return write_bytes(path, text.encode())
+
+
+def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> Path:
+    """Write rows; numbers keep all their digits (Python's shortest exact form).
+
+    Args:
+        path: File to write.
+        header: Names of the columns.
+        rows: Their values; an unknown value, None or NaN, leaves its cell empty.
+    """
+    text = StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(header)
+    writer.writerows([_plain(value) for value in row] for row in rows)
+    return write_text(path, text.getvalue())
+
+
+def remove(path: Path) -> None:
+    """Remove a file, or a folder written by ADIOS2, if it is there; leave all other folders.
+
+    Args:
+        path: Its name.
+    """
+    if path.suffix == ".bp" and path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
+
+
+def remove_partial(folder: Path) -> None:
+    """Remove the half-written files of runs that were killed.
+
+    Args:
+        folder: Folder of results; no other run may be writing there.
+    """
+    for path in folder.glob(".*.partial-*"):
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
+            path.unlink(missing_ok=True)
+
+
+def _plain(value: Any) -> Any:
+    """Return what stands in a cell: numpy's scalars as Python's own, nothing for NaN.
+
+    The text of Python's numbers is the same on every numpy release.
+    """
+    plain = value.item() if hasattr(value, "item") else value
+    return None if plain != plain else plain

@@ -8,12 +8,10 @@ root could write it: where several users share a directory, each reads its own f
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,7 +20,7 @@ import numpy as np
 from mpi4py.util import pkl5
 from numpy.typing import NDArray
 
-from support.checked_store import read_record, write_record
+from support.checked_store import fingerprint, read_record, write_record
 from support.errors import InputError, NotWritten
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -33,7 +31,6 @@ VARIABLE = "PATCHLAW_CACHE"
 MOST_BYTES = 500_000_000
 """Largest size of all files together; beyond it the least recently used are removed [B]."""
 
-_FORMAT = 4  # of the files; sources are part of the key anyway
 _SUFFIX = ".arrays"
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 _ROOT = 0  # user number of the administrator, who may fill a directory for all
@@ -80,8 +77,8 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     Note:
         Collective.
     """
-    words, place = _place(kind, key)  # on every rank, so that a wrong key raises on all of them
-    path = place if comm.rank == 0 else None
+    words = fingerprint((sources_digest(), kind, key))  # a wrong key raises on every rank
+    path = _file(kind, words) if comm.rank == 0 else None
     large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
     found: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)
     if found is not None:
@@ -96,7 +93,8 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
 
 def is_cached(kind: str, key: tuple[object, ...]) -> bool:
     """Tell whether this process finds arrays in the cache; see `cached`."""
-    words, path = _place(kind, key)
+    words = fingerprint((sources_digest(), kind, key))
+    path = _file(kind, words)
     return path is not None and _read(path, words) is not None
 
 
@@ -114,21 +112,10 @@ def sources_digest(top: Path = _TOP) -> str:
     return found.hexdigest()
 
 
-def _place(kind: str, key: tuple[object, ...]) -> tuple[str, Path | None]:
-    """Return all that arrays depend on as a text, and their file."""
+def _file(kind: str, words: str) -> Path | None:
+    """Return the file of arrays by the fingerprint of all that they depend on."""
     directory = cache_directory()
-    words = json.dumps((_FORMAT, sources_digest(), kind, key), default=_spelled)
-    digest = hashlib.sha256(words.encode()).hexdigest()[:32]
-    return words, directory / f"{kind}-{digest}{_SUFFIX}" if directory else None
-
-
-def _spelled(value: object) -> object:
-    """Return what JSON does not know in parts that it knows."""
-    if isinstance(value, np.generic):
-        return value.item()
-    if is_dataclass(value) and not isinstance(value, type):
-        return [type(value).__name__, {f.name: getattr(value, f.name) for f in fields(value)}]
-    raise TypeError(f"{type(value).__name__} in a key of the cache")
+    return directory / f"{kind}-{words[:32]}{_SUFFIX}" if directory else None
 
 
 def _read(path: Path, words: str) -> Arrays | None:
@@ -140,9 +127,10 @@ def _read(path: Path, words: str) -> Arrays | None:
         if facts.st_uid not in (os.geteuid(), _ROOT):
             return None
         found = read_record(file.read())
-        if found.facts == words:
+        if found["key"] == words:
             os.utime(path)  # marks it as recently used
-            return found.arrays
+            arrays: Arrays = found["arrays"]
+            return arrays
     return None
 
 
@@ -156,7 +144,7 @@ def _write(path: Path, words: str, arrays: Arrays) -> None:
     if sum(array.nbytes for array in arrays.values()) > MOST_BYTES:
         return
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-    write_record(path, words, arrays)
+    write_record(path, {"key": words, "arrays": arrays})
     path.chmod(0o600)
 
 

@@ -10,12 +10,11 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from multiscale.cli.signals import ended_if_told, signals_raise
 from multiscale.cli.words import UsageError, command_parser
 from multiscale.output.streams import sturdy_streams
+from multiscale.restart.interruption import ended_if_told, signals_raise
 
 _INTERRUPTED = 130  # exit code after SIGINT, as shells have it
-_WRONG_INPUT = 2  # and of what is installed; errors with exit codes need numpy
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -60,14 +59,12 @@ def _run(words: list[str]) -> int:
         choice = command_parser().parse_args(words[:cut])
     except UsageError as error:  # for rank 0 to say, which is known once MPI has started
         choice = str(error)
-    from multiscale.installation import works_together
-
-    if not works_together():
-        return _WRONG_INPUT
     from support.errors import NotInstalled
-    from support.packages import optional_packages
+    from support.packages import conflict, optional_packages
 
     try:
+        if problem := conflict():
+            raise NotInstalled(problem)
         with optional_packages():
             from multiscale.cli.execution import execute
     except NotInstalled as error:  # what other errors are written with may be missing

@@ -17,13 +17,13 @@ from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
 from multiscale.results.html_page import filled
-from multiscale.storage import write_text
 from multiscale.studies import errors
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.running import CaseResult
 from support.collective import on_root
 from support.errors import InputError, NotConverged
+from support.whole_files import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

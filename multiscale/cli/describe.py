@@ -29,10 +29,9 @@ from multiscale.scene.identity import identity
 from multiscale.scene.keys import Key, scene_keys
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
-from multiscale.storage import write_text
 from support.collective import on_root, on_root_alone
 from support.errors import InputError
-from support.whole_files import write_whole
+from support.whole_files import write_text
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,7 +94,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
-            laws = write_whole(folder / "laws.h5", lambda path: write_laws(path, table))
+            laws = write_laws(folder / "laws.h5", table)
             pictures = pictures_of("laws", draw)
             run.remark(filter(None, [pictures.problem]))
             files = [laws, *write_pictures(folder, pictures.files)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
@@ -12,20 +11,18 @@ from rich.console import Console
 from rich.markup import escape
 
 from multiscale import compiled_forms, doctor
-from multiscale.doctor import Check, CheckResult, examine, refuse_failures
+from multiscale.doctor import Check, CheckResult, examine
 from multiscale.output import terminal
+from support.errors import InputError
 
 CHECKS: dict[str, Check] = {
     "packages": doctor.packages,
     "PETSc": doctor.petsc,
-    "BLAS": doctor.blas,
     "launcher": doctor.launcher,
     "ranks": doctor.ranks,
     "threads": doctor.threads,
-    "memory": doctor.memory,
-    "form compiler": compiled_forms.compiler_works,
-    "form cache": compiled_forms.cache,
-    "test solve": compiled_forms.known_solve,
+    "form cache": compiled_forms.form_cache,
+    "test solve": doctor.known_solve,
 }
 """Topics and checks of the doctor, in the order in which they are made and shown."""
 
@@ -33,7 +30,7 @@ _COLOUR = {"ok": "green", "warning": "yellow", "fail": "bold red"}
 
 
 def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Check versions, MPI, threads, form compiler and memory; solve a small block.
+    """Check versions, MPI, threads, memory and compiled forms; solve a problem of known answer.
 
     Args:
         choice: Parsed words of the command line.
@@ -41,16 +38,18 @@ def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -
         comm: MPI communicator; None for a process on its own.
 
     Raises:
-        InputError: When a check failed; exit code 2.
+        InputError: When a check failed, as a run would end with the same exit code or a worse one.
     """
-    results = examine(comm, CHECKS)
-    if terminal.speaks(comm):
-        if choice.json:
-            listed = [{"topic": topic} | asdict(result) for topic, result in results.items()]
-            print(json.dumps(listed, indent=2))
-        else:
-            show(results)
-    refuse_failures(results)
+    results = {}
+    for topic, result in examine(comm, CHECKS):
+        results[topic] = result
+        if terminal.speaks(comm) and not choice.json:
+            show(topic, result)
+    if terminal.speaks(comm) and choice.json:
+        listed = [{"topic": topic} | asdict(result) for topic, result in results.items()]
+        print(json.dumps(listed, indent=2))
+    if failed := [topic for topic, result in results.items() if result.state == "fail"]:
+        raise InputError(f"not fit to run: {', '.join(failed)}", key="doctor")
 
 
 def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -65,16 +64,14 @@ def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     terminal.say(comm, f"{count} compiled forms in {folder}")
 
 
-def show(results: Mapping[str, CheckResult]) -> None:
-    """Print a line for each result, and its remedy below it.
+def show(topic: str, result: CheckResult) -> None:
+    """Print a line for a result, and its remedy below it.
 
     Args:
-        results: The results by topic.
+        topic: What was checked.
+        result: The result.
     """
-    console = Console(highlight=False, soft_wrap=True)
-    for topic, result in results.items():
-        colour = _COLOUR[result.state]
-        head = f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]"
-        console.print(f"{head}{escape(result.text)}")
-        if result.remedy:
-            console.print(f"{'':22}→ {escape(result.remedy)}")
+    console, colour = Console(highlight=False, soft_wrap=True), _COLOUR[result.state]
+    console.print(f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]{escape(result.text)}")
+    if result.remedy:
+        console.print(f"{'':22}→ {escape(result.remedy)}")

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import itertools
-import os
 import sys
 import time
 import traceback
@@ -12,7 +10,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from multiscale.cli.signals import ended_if_told
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -20,6 +17,7 @@ from multiscale.machine import (
     world,
 )
 from multiscale.output import terminal
+from multiscale.restart.interruption import ended_if_told
 from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.cores import hold_blas
@@ -27,7 +25,6 @@ from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from support.packages import optional_packages
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
-_OPTION_FILES = ("-options_file", "-options_file_yaml")
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
 
 
@@ -58,11 +55,9 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             command(choice, _start_petsc(options), comm)
     except PatchlawError as error:
-        if _all_arrive(meeting):
-            terminal.complain(comm, error)
-            return error.exit_code
-        terminal.complain(None, error)
-        return _end_all(comm, error.exit_code)
+        together = _all_arrive(meeting)
+        terminal.complain(comm if together else None, error)
+        return error.exit_code if together else _end_all(comm, error.exit_code)
     except KeyboardInterrupt as error:
         if comm is None:
             raise
@@ -154,10 +149,6 @@ def _start_petsc(options: list[str]) -> list[str]:
     prefixed = [
         f"-patchlaw_{word[1:]}" if word.startswith(_SOLVER_OPTIONS) else word for word in options
     ]
-    for name, value in itertools.pairwise([*options, ""]):
-        # PETSc would not start without its file of options, and say so at great length
-        if name in _OPTION_FILES and not os.access(value, os.R_OK):
-            raise InputError("this file of options cannot be read", key=name, value=value)
     try:
         # a misspelt option is no error for PETSc: -options_left names unused options at the end
         petsc4py.init(["patchlaw", *prefixed, "-options_left"])

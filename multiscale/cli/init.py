@@ -23,9 +23,9 @@ from multiscale.scene.new_scene import (
 )
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import changed, overridden
-from multiscale.storage import write_text
 from support.collective import on_root
 from support.errors import InputError
+from support.whole_files import write_text
 
 _KEYS = {
     "force": "load.force",

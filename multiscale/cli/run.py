@@ -10,8 +10,8 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import Checkpoint, CheckpointWriter
-from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
+from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (
     find_checkpoint,
     is_finished,
@@ -34,75 +34,53 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    with Interruption(comm, choice.max_time) as interruption:
+    with watching(comm, choice.max_time) as interruption:
         scene, folder = scene_and_folder(choice, comm)
         with locked(folder, comm) as lock:
-            found = on_root(comm, lambda: _earlier(choice, folder, scene))
+            kept, notice = on_root(comm, lambda: _earlier(choice, folder, scene))
+            if choice.resume and kept is None and _is_finished(folder, scene, comm):
+                terminal.say(comm, f"this run is finished; its results are in {folder}")
+                return
             with terminal.following(comm) as (begun, _):
                 begun("setting up the problem")
-                run = Run(scene, comm, None if found is None else found.resolved)
+                run = Run(scene, comm, None if kept is None else kept.resolved)
+            if kept is not None:
+                run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+            terminal.show_plan(comm, run.coupling)
+            if notice:
+                terminal.say(comm, notice)
             with CheckpointWriter(folder, run, lock.hold) as checkpoints:
-                if _announce(choice.resume, found, run, checkpoints):
-                    _run(run, checkpoints, interruption, options)
+                failure = _make_load_steps(run, checkpoints, interruption)
+                if run.steps:
+                    checkpoints.finish()  # writing results may fail
+                _write(folder, run, failure, options)
+                if failure is not None:
+                    raise failure
+                checkpoints.remove()
 
 
-def _earlier(choice: argparse.Namespace, folder: Path, scene: Scene) -> Checkpoint | None:
-    """Return the interrupted run of the same scene in a folder, which this one goes on from.
+def _earlier(
+    choice: argparse.Namespace, folder: Path, scene: Scene
+) -> tuple[Checkpoint | None, str]:
+    """Return the interrupted run of the same scene in a folder, and what to say of what is there.
 
     Nothing that another scene left there is replaced unless the user says so.
     """
-    anew = choice.overwrite and not choice.resume
-    found = None if anew else find_checkpoint(folder, scene)
-    if found is None and not choice.overwrite:
+    kept = None if choice.overwrite and not choice.resume else find_checkpoint(folder, scene)
+    if kept is not None:
+        anew = "" if choice.resume else " (to begin anew: --overwrite)"
+        return kept, f"goes on after load step {len(kept.steps)}, kept in {folder}{anew}"
+    if not choice.overwrite:
         refuse_other_results(folder, identity(scene))
-    return found
+    if choice.resume:
+        return None, f"nothing to resume in {folder}: begins with the first load step"
+    interrupted = (folder / FILE_NAME).exists()
+    return None, f"replaces the interrupted run in {folder}" * interrupted
 
 
-def _announce(
-    resume: bool, found: Checkpoint | None, run: Run, checkpoints: CheckpointWriter
-) -> bool:
-    """Say what will be done, and resume if asked to; return False if nothing is left to do."""
-    comm, folder, notice = run.comm, checkpoints.path.parent, None
-    if found is not None:
-        run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
-        anew = "" if resume else " (to begin anew: --overwrite)"
-        notice = f"goes on after load step {len(run.steps)}, kept in {folder}{anew}"
-    elif resume and on_root(comm, lambda: is_finished(folder, run.identity)):
-        terminal.say(comm, f"this run is finished; its results are in {folder}")
-        return False
-    elif resume:
-        notice = f"nothing to resume in {folder}: begins with the first load step"
-    elif on_root(comm, checkpoints.path.exists):
-        notice = f"replaces the interrupted run in {folder}"
-    terminal.show_plan(comm, run.coupling)
-    if notice:
-        terminal.say(comm, notice)
-    return True
-
-
-def _run(
-    run: Run, checkpoints: CheckpointWriter, interruption: Interruption, options: list[str]
-) -> None:
-    """Make the load steps and write the results, also of a run that ends early."""
-    comm, folder = run.comm, checkpoints.path.parent
-    failure = _make_load_steps(run, checkpoints, interruption)
-    if run.steps:
-        checkpoints.write_pending()  # writing results may fail
-    if failure is not None and on_root(comm, lambda: is_finished(folder, run.identity)):
-        terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
-    elif run.steps:
-        run.finish()
-        files = write_results(folder, run, options=options)
-        if run.scene.output.fields:
-            files += write_fields(folder, run)
-        terminal.show_history(comm, run.history())
-        terminal.show_times(comm, run.clock.times)
-        terminal.show_files(comm, files)
-    if isinstance(failure, NotConverged):
-        raise failure.advised(f"a changed scene needs --overwrite, or another folder than {folder}")
-    if failure is not None:
-        raise failure
-    checkpoints.remove()
+def _is_finished(folder: Path, scene: Scene, comm: Any) -> bool:
+    """Tell whether the results in a folder are those of a finished run of a scene, on all ranks."""
+    return on_root(comm, lambda: is_finished(folder, identity(scene)))
 
 
 def _make_load_steps(
@@ -114,20 +92,40 @@ def _make_load_steps(
         try:
             if run.coupling.has_laws:
                 run.make_laws()
-            checkpoints.write()
+            checkpoints.accept()
             interruption.check("before the block was made")
             with optional_packages():
                 run.prepare()
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
-                checkpoints.accept()
+                checkpoints.accept(step)
                 advance(step)
                 if not run.finished:
                     interruption.check(f"after load step {step.step}", step.wall_s)
-        except (Stopped, NotConverged) as error:  # the load steps before it are written
+        except Stopped as error:  # the load steps before it are written
             return error
+        except NotConverged as error:
+            folder = checkpoints.path.parent
+            return error.advised(
+                f"a changed scene needs --overwrite, or another folder than {folder}"
+            )
         except (InputError, NotInstalled):
             if not run.steps:  # wrong input leaves nothing behind
                 checkpoints.remove()
             raise
     return None
+
+
+def _write(folder: Path, run: Run, failure: PatchlawError | None, options: list[str]) -> None:
+    """Write and show the results, also of a run that ended early."""
+    comm = run.comm
+    if failure is not None and _is_finished(folder, run.given, comm):
+        terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
+    elif run.steps:
+        run.finish()
+        files = write_results(folder, run, options=options)
+        if run.scene.output.fields:
+            files += write_fields(folder, run)
+        terminal.show_history(comm, run.history())
+        terminal.show_times(comm, run.clock.times)
+        terminal.show_files(comm, files)

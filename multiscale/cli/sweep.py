@@ -15,12 +15,12 @@ from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
 from multiscale.output.results import pictures_of, write_pictures, write_records
 from multiscale.restart.results_folder import locked
-from multiscale.storage import remove
 from multiscale.studies.cases import Case, sweep_cases, values_from_text
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root
 from support.errors import InputError, NotConverged
+from support.whole_files import remove
 
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""

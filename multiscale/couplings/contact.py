@@ -25,7 +25,6 @@ from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.inputs.block import FIELD_CELLS, LAW_BLOCK_CELLS, Cells
 from multiscale.loading.load_step import LoadStep
 from multiscale.scene.scene import Scene
-from support.checked_store import Arrays
 
 Array = NDArray[np.float64]
 
@@ -65,11 +64,11 @@ class ConcurrentCoupling(MicroCoupling):
     def past(self, value: Any) -> None:
         self._solver.past = value
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest solution; it is whole on rank 0 alone."""
         return self._solver.state()
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a solution."""
         self._solver.restore(state)
 

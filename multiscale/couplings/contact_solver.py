@@ -11,12 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, overlaps
-from micro import START_KINDS, HalfSpaceModel, HalfSpaceState, MicroModel
+from micro import HalfSpaceModel, HalfSpaceState, MicroModel
 from micro.contact_detail import ContactDetail
 from micro.model import SolvedContact, Stiffness
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 from support.collective import on_root, on_root_alone
 
 Array = NDArray[np.float64]
@@ -165,10 +163,10 @@ class ContactSolver:
         """
         return on_root_alone(self._comm, lambda: latest.detail)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest solution; it is whole on rank 0 alone."""
-        return packed(self._start)
+        return self._start
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a solution."""
-        self._start = unpacked(state, START_KINDS)
+        self._start = state

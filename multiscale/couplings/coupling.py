@@ -47,7 +47,6 @@ from multiscale.readable import Detail, percent
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
-from support.checked_store import Arrays
 
 Array = NDArray[np.float64]
 Facts = tuple[BodyFacts | None, BodyFacts | None]
@@ -366,15 +365,17 @@ class Coupling(SceneParts, ABC):
         self._past = value
 
     @abstractmethod
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the next load step starts from; it does not depend on the number of ranks.
+
+        It is made of numbers, texts, arrays and records of them, or None where there is nothing.
 
         Note:
             Collective.
         """
 
     @abstractmethod
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a state, in a coupling newly made from the same scene.
 
         Args:

@@ -17,7 +17,6 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Solver
 from multiscale.readable import Observer
 from multiscale.scene.scene import Scene
-from support.checked_store import Arrays
 
 
 class LawSolver(Solver, Protocol):
@@ -34,10 +33,10 @@ class LawSolver(Solver, Protocol):
     def field_state(self, step: LoadStep) -> Any:
         """Return what fields of the load step just accepted are made from."""
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the next load step starts from."""
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a state."""
 
 
@@ -114,11 +113,11 @@ class LawCoupling(Coupling):
         """Return dF/dδ at the latest load step, where it is known."""
         return self._solver.stiffness()
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return what the next load step starts from."""
         return self._solver.state()
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from a state."""
         self._solver.restore(state)
 

@@ -35,8 +35,6 @@ from multiscale.loading.stepper import step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.scene.scene import Scene
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import MeshQuality, UnilateralContactProblem, UnilateralContactState
@@ -205,16 +203,15 @@ class ReferenceCoupling(PressedSurface):
         )
         return step, contact
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the plane on every mesh."""
-        return packed(tuple((state.approach, *state.tilt) for state in self._last))
+        return tuple((state.approach, *state.tilt) for state in self._last)
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Press every mesh by its plane again."""
-        planes = unpacked(state, ()) if state else ()
         self._last = tuple(
             problem.solve(Control(approach=approach, tilt=(tx, ty)))
-            for problem, (approach, tx, ty) in zip(self._problems, planes, strict=False)
+            for problem, (approach, tx, ty) in zip(self._problems, state, strict=False)
         )
 
     def with_mesh_errors(

@@ -17,8 +17,7 @@ from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.storage import remove, write_text
-from support.whole_files import written
+from support.whole_files import remove, write_text, written
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""

@@ -18,12 +18,9 @@ from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
 from multiscale.law_solvers.law_range import ROUNDING, beyond_law
 from multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
-from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 Array = NDArray[np.float64]
 
@@ -91,13 +88,13 @@ class CondensedLaws:
         turns = self._control.tilt is None
         return Stiffness(normal_stiffness(problem.stiffness(self._last), turns=turns), 1)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest equilibrium."""
-        return packed(self._last)
+        return self._last
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Start from an equilibrium."""
-        self._last = unpacked(state, (DenseState, LawPoint))
+        self._last = state
 
 
 def equilibrium(

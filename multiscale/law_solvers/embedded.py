@@ -15,8 +15,6 @@ from micro.model import Stiffness
 from multiscale.law_solvers.law_range import beyond_law
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.storage import packed, unpacked
-from support.checked_store import Arrays
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LawContactState, LoadedFace
@@ -101,18 +99,18 @@ class EmbeddedLaws:
         """Return nothing: the stiffness on the mesh is not solved for."""
         return Stiffness(None, 0)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return {} if last is None else packed((last.approach, last.tilt, last.pressure))
+        return None if last is None else (last.approach, last.tilt, last.pressure)
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
 
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
-        if state:
-            approach, tilt, pressure = unpacked(state, ())
+        if state is not None:
+            approach, tilt, pressure = state
             if isinstance(self.table.patches, PatchGrid) or not hasattr(self.face.body, "counter"):
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))

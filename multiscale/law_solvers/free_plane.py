@@ -17,7 +17,6 @@ from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
-from support.checked_store import Arrays
 
 _OTHER_MODEL = 0.05
 """Residual of closures, relative to the largest local approach, that shows that the laws were made
@@ -105,11 +104,11 @@ class FreePlaneLaws:
         rates = self._along(self._approach).dpressure
         return Stiffness(self.table.grid.area * float(rates.sum()), 0)
 
-    def state(self) -> Arrays:
+    def state(self) -> Any:
         """Return nothing: every load step is found without those before it."""
-        return {}
+        return None
 
-    def restore(self, state: Arrays) -> None:
+    def restore(self, state: Any) -> None:
         """Do nothing; see `state`."""
 
     def _force(self, approach: float) -> float:

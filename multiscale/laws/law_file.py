@@ -6,20 +6,24 @@ Theory: docs/theory.md, section 10.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import fields
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.law_table import LawTable, part_key
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.removed import refuse_removed_laws
-from multiscale.storage import checksummed, stored_numbers, verified
+from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
+from support.whole_files import write_bytes
 
 FORMAT = "patchlaw laws 3"
 _COLUMNS = {one.metadata.get("stored", one.name): one for one in fields(LawRows)}
@@ -35,14 +39,17 @@ _PATH = "path"
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
-def write_laws(path: Path, table: LawTable) -> None:
-    """Write all laws to one HDF5 file, see `law_bytes`.
+def write_laws(path: Path, table: LawTable) -> Path:
+    """Write all laws to one HDF5 file, whole or not at all; see `law_bytes`.
 
     Args:
         path: File to write; one that exists is replaced.
         table: The laws.
+
+    Raises:
+        NotWritten: When the system refuses.
     """
-    path.write_bytes(law_bytes(table))
+    return write_bytes(path, law_bytes(table))
 
 
 @lru_cache(maxsize=1)  # every checkpoint asks for the same
@@ -51,7 +58,7 @@ def law_bytes(table: LawTable) -> bytes:
 
     It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
     and a group for the path of the plane where there is one. A checksum stands before the content;
-    see `multiscale.storage`.
+    see `support.checked_store`.
 
     Args:
         table: The laws.
@@ -84,7 +91,7 @@ def law_bytes(table: LawTable) -> bytes:
             for name, unit in _PATH_UNITS.items():
                 group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
 
-    return checksummed(fill)
+    return hdf5_bytes(fill)
 
 
 def read_laws(path: str | Path | BinaryIO) -> LawTable:
@@ -106,7 +113,9 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
     if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
         raise InputError("is not a readable law file: there is no such file", file=name)
     try:
-        with h5py.File(verified(path), "r") as file:
+        content = path.read_bytes() if isinstance(path, Path) else path.read()
+        check_hdf5(content)
+        with h5py.File(BytesIO(content), "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise InputError("is not a law file of patchlaw", file=name)
             return _table(file)
@@ -140,7 +149,7 @@ def _table(file: Any) -> LawTable:
     laws = [_law(file[part_key(patches, index)]) for index in range(patches.count)]
     if made_by.get("coupling") != "consistent":
         laws = [repaired_law(law) for law in laws]
-    path = {name: stored_numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
+    path = {name: _numbers(file[_PATH][name]) for name in _PATH_UNITS if _PATH in file}
     return LawTable(
         patches=patches,
         laws=tuple(laws),
@@ -151,11 +160,36 @@ def _table(file: Any) -> LawTable:
 
 
 def _law(group: Any) -> PatchLaw:
+    if not isinstance(group, h5py.Group):  # h5py would look for names among all its numbers
+        raise InputError(f"{group.name} is no group of columns")
     found = {
-        one.name: stored_numbers(group[name])
+        one.name: _numbers(group[name])
         for name, one in _COLUMNS.items()
         if name in group or not one.metadata.get("optional")
     }
     scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
     scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
     return PatchLaw(rows=LawRows(**found), **scalars)
+
+
+def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
+    """Return the bytes of an HDF5 file with a checksum before its content.
+
+    Args:
+        fill: Writes the content into the open `h5py.File` that it is given.
+    """
+    image = BytesIO()  # HDF5 itself may not survive a full disk
+    with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
+        fill(file)
+    return checksum_hdf5(image.getvalue())
+
+
+def _numbers(item: Any) -> NDArray[Any]:
+    """Return the numbers of an HDF5 dataset, if the file itself holds as many as it promises."""
+    kind = getattr(getattr(item, "dtype", None), "kind", "")
+    if not kind or kind not in "biuf":
+        raise InputError(f"{item.name} is not a column of numbers")
+    # our columns are not compressed and lie in the file itself: larger than it, they are damaged
+    if item.nbytes > item.id.get_storage_size() or item.external:
+        raise InputError(f"{item.name} is not whole", value=item.shape)
+    return np.asarray(item[()])

@@ -14,10 +14,9 @@ from xml.etree import ElementTree
 import h5py
 
 from multiscale.run import Run
-from multiscale.storage import remove
 from support.collective import on_root
 from support.errors import NotWritten, PatchlawError
-from support.whole_files import written
+from support.whole_files import remove, written
 
 PARTIAL_FOLDER = ".fields.partial-files"
 """Folder of files that are not complete; `remove_partial` knows it by ``.partial-``."""

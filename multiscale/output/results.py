@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from importlib import import_module
@@ -10,17 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from multiscale.couplings.coupling import Coupling
-from multiscale.laws.law_file import write_laws
+from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from multiscale.storage import checksummed, remove, write_csv, write_json, write_text
 from support.collective import on_root, shared
 from support.errors import NotInstalled
 from support.packages import optional_packages
-from support.whole_files import write_bytes, write_whole, written
+from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,9 +71,10 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     history, table = run.history(), run.laws
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
-        files.append(write_whole(folder / "laws.h5", lambda path: write_laws(path, table)))
+        files.append(write_laws(folder / "laws.h5", table))
     files += write_pictures(folder, pictures)
-    files.append(write_json(folder / "provenance.json", provenance(run, options=options)))
+    content = json.dumps(provenance(run, options=options), indent=2)
+    files.append(write_text(folder / "provenance.json", content + "\n"))
     if run.scene.output.report:
         files.append(
             write_text(folder / "report.html", report_html(run, pictures, options=options))
@@ -143,14 +144,8 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
                     group.create_dataset(name, data=data, compression=_COMPRESSION)
 
     if contacts[0].pressure_MPa is not None:
-        files.append(write_bytes(folder / "contact.h5", checksummed(fill)))
+        files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
-
-
-def has_block_figure(run: Run) -> bool:
-    """Tell whether the pressures of a surface's cells are known, which ``block.png`` shows."""
-    pressure = run.contacts[-1].pressure_MPa if run.contacts else None
-    return pressure is not None and pressure.shape == run.coupling.surface.grid
 
 
 class Pictures(NamedTuple):
@@ -214,11 +209,13 @@ def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
         figures["pressures"] = _from("contact", "pressure_figure", history)
     if face is not None:
         figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
-    if run.scene.output.figures == "all" and has_block_figure(run):
-        ratio = coupling.materials.first.poisson_ratio
-        figures["block"] = _from("block", "contact_block", surface, run.contacts[-1], ratio)
     if run.contacts:
-        figures["contact"] = run.contacts[-1].plot
+        contact = run.contacts[-1]
+        figures["contact"] = contact.plot
+        of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
+        if run.scene.output.figures == "all" and of_cells:
+            ratio = coupling.materials.first.poisson_ratio
+            figures["block"] = _from("block", "contact_block", surface, contact, ratio)
     if coupling.table is not None:
         figures["laws"] = _from("curves", "law_figure", run.laws)
     return figures

@@ -2,22 +2,11 @@
 
 from __future__ import annotations
 
-import codecs
 import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
-
-_ASCII_SPELLING = str.maketrans(
-    {
-        **dict.fromkeys("µμ", "u"),
-        **{"×": "x", "·": "*", "−": "-", "–": "-", "→": "->", "…": "...", "±": "+-"},
-        **{"≤": "<=", "≥": ">=", "²": "^2", "³": "^3", "½": "1/2", "¼": "1/4", "é": "e"},
-        **{"α": "alpha", "δ": "delta", "κ": "kappa", "λ": "lambda", "ν": "nu", "σ": "sigma"},
-    }
-)
-_ERROR_HANDLER = "patchlaw"
 
 
 class SturdyStream:
@@ -34,7 +23,7 @@ class SturdyStream:
         self._stream = stream
         self.failure: OSError | None = None
         if hasattr(stream, "reconfigure"):
-            stream.reconfigure(errors=_ERROR_HANDLER)
+            stream.reconfigure(errors="backslashreplace")
 
     def write(self, text: str) -> int:
         """Write a text, or drop it after an error."""
@@ -73,8 +62,8 @@ class SturdyStream:
 def sturdy_streams() -> Iterator[tuple[SturdyStream, SturdyStream]]:
     """Replace the standard streams, so that an error of printing does not end a computation.
 
-    Characters that a stream cannot encode are spelt in ASCII. Closed file descriptors are opened
-    on the null device: otherwise the next file would get the number of a standard stream.
+    Characters that a stream cannot encode are escaped. Closed file descriptors are opened on the
+    null device: otherwise the next file would get the number of a standard stream.
 
     Yields:
         Output and error stream; their `failure` shows afterwards whether all text was written.
@@ -84,7 +73,6 @@ def sturdy_streams() -> Iterator[tuple[SturdyStream, SturdyStream]]:
             os.fstat(number)
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # It gets the lowest free number, which is this one.
-    codecs.register_error(_ERROR_HANDLER, _spell)
     former = sys.stdout, sys.stderr
     output, errors = SturdyStream(sys.stdout), SturdyStream(sys.stderr)
     sys.stdout, sys.stderr = output, errors
@@ -94,11 +82,3 @@ def sturdy_streams() -> Iterator[tuple[SturdyStream, SturdyStream]]:
         for stream in (output, errors):
             stream.flush()
         sys.stdout, sys.stderr = former
-
-
-def _spell(error: UnicodeError) -> tuple[str | bytes, int]:
-    """Spell characters that a stream cannot encode; an error handler of `codecs`."""
-    if not isinstance(error, UnicodeEncodeError):
-        raise error
-    text = error.object[error.start : error.end].translate(_ASCII_SPELLING)
-    return text.encode("ascii", "backslashreplace").decode("ascii"), error.end

@@ -9,7 +9,6 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TimeElapsedColumn
 from rich.table import Table
 
 from multiscale.couplings.coupling import Coupling
@@ -151,43 +150,6 @@ def _tenths(comm: Any) -> Observer:
     return observe
 
 
-@contextmanager
-def progress(
-    comm: Any, load_history: LoadHistory, done: int = 0
-) -> Iterator[tuple[Callable[[LoadStep], None], Observer]]:
-    """Show the progress of a run: by a bar, or under ``mpirun`` by lines.
-
-    Args:
-        comm: MPI communicator, or None.
-        load_history: The load steps to come.
-        done: Number of load steps that were accepted before.
-
-    Yields:
-        The functions to call with every load step, and with what the run is at before and beside.
-    """
-    # Halved load steps make the total unknown.
-    steps = None if load_history.force_change else load_history.count
-    pace = Pace(0 if steps is None else steps - done)
-
-    def described(step: LoadStep) -> str:
-        return _summary(step) + pace.left(step.wall_s)
-
-    if comm is not None:
-        total = "" if steps is None else f"/{steps}"
-        yield (
-            lambda step: say(comm, f"load step {step.step}{total}: {described(step)}"),
-            _tenths(comm),
-        )
-        return
-    columns = ("[bold]load steps", BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, "{task.description}") as bar:
-        task = bar.add_task("", total=steps, completed=done)
-        yield (
-            lambda step: bar.update(task, advance=1, description=described(step)),
-            counting(lambda text: bar.update(task, description=text)),
-        )
-
-
 class Pace:
     """The pace of a task, which tells how long the rest of it will take.
 
@@ -209,10 +171,6 @@ class Pace:
         return f"; about {duration(rest * self._spent / self._done)} left" if rest > 0 else ""
 
 
-def _summary(step: LoadStep) -> str:
-    return f"{quantity(step.approach_mm, 'mm', 3)}, {quantity(step.force_N, 'N')}"
-
-
 @contextmanager
 def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
     """Show which part of a long task is under way, and print a line on every part that is done.
@@ -232,6 +190,33 @@ def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str]
             lambda text: status.update(escape(text)),
             lambda text: console.print(escape(text)),
         )
+
+
+@contextmanager
+def progress(
+    comm: Any, load_history: LoadHistory, done: int = 0
+) -> Iterator[tuple[Callable[[LoadStep], None], Observer]]:
+    """Show the progress of a run: what it is at, or under ``mpirun`` a line for each load step.
+
+    Args:
+        comm: MPI communicator, or None.
+        load_history: The load steps to come.
+        done: Number of load steps that were accepted before.
+
+    Yields:
+        The functions to call with every load step, and with what the run is at before and beside.
+    """
+    # Halved load steps make the total unknown.
+    steps = None if load_history.force_change else load_history.count
+    pace, total = Pace(0 if steps is None else steps - done), "" if steps is None else f"/{steps}"
+    with following(comm) as (begun, ended):
+        show = begun if comm is None else ended
+
+        def advance(step: LoadStep) -> None:
+            reached = f"{quantity(step.approach_mm, 'mm', 3)}, {quantity(step.force_N, 'N')}"
+            show(f"load step {step.step}{total}: {reached}{pace.left(step.wall_s)}")
+
+        yield advance, counting(begun) if comm is None else _tenths(comm)
 
 
 def show_history(comm: Any, history: History) -> None:

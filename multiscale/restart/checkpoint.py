@@ -1,31 +1,31 @@
 """The checkpoint of a run: what it needs to go on, in a checked file that is replaced whole.
 
-The load steps so far stand in a log beside it, which grows by a line for each: what a checkpoint
-writes does not grow with the run.
+The load steps so far stand in a log beside it, which grows by a record for each: what a checkpoint
+writes does not grow with the run. The checkpoint says which records of the log belong to it. What a
+killed run wrote behind them does not count, and is overwritten when the run goes on.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import numpy as np
-
-from multiscale.loading.load_step import LoadStep
+from micro import START_KINDS
+from multiscale.law_solvers.loaded_patches import DenseState
+from multiscale.laws.interpolation import LawPoint
+from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
-from multiscale.restart.step_log import StepLog, read_steps
 from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
-from multiscale.storage import packed, remove_partial, unpacked
-from support.checked_store import Arrays, Mark, read_record, write_record
+from support.checked_store import START, Mark, append, read_record, unsealed, write_record
 from support.collective import on_root
 from support.errors import InputError, NotWritten
+from support.whole_files import remove_partial
 
-FORMAT = "patchlaw checkpoint 8"
 FILE_NAME = "checkpoint.state"
 FORMER_NAME = "checkpoint.h5"
 """Name of the checkpoints of earlier versions, which nothing goes on from."""
@@ -51,6 +51,7 @@ class Checkpoint:
         position: Where the load history has come to.
         state: What the coupling's next load step starts from.
         contacts: The contacts recorded so far.
+        log: How far the log beside the file belongs to it.
     """
 
     identity: dict[str, Any]
@@ -58,11 +59,16 @@ class Checkpoint:
     laws: bytes
     steps: tuple[LoadStep, ...] = ()
     position: LoadPosition
-    state: Arrays
+    state: Any
     contacts: tuple[ContactRecord, ...] = ()
+    log: Mark = START
 
 
-def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
+_KINDS = (Checkpoint, Mark, LoadPosition, ContactRecord, DenseState, LawPoint, *START_KINDS)
+"""What a checkpoint may consist of: its own records, and those of the states of couplings."""
+
+
+def checkpoint_of(run: Run, state: Any) -> Checkpoint:
     """Return all that is needed to go on with a run from its latest load step.
 
     Args:
@@ -80,29 +86,18 @@ def checkpoint_of(run: Run, state: Arrays) -> Checkpoint:
     )
 
 
-def write_checkpoint(path: Path, checkpoint: Checkpoint, log: StepLog | None = None) -> Path:
-    """Write a checkpoint whole, or leave the earlier one.
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> Path:
+    """Write a checkpoint whole, or leave the earlier one, with a new log of its load steps.
 
     Args:
         path: File to write.
         checkpoint: Its content.
-        log: The log of its load steps; by default it is written anew.
 
     Raises:
         NotWritten: When a file cannot be written.
     """
-    log = log or StepLog(path.with_suffix(LOG_SUFFIX))
-    log.write(checkpoint.steps)
-    facts = {
-        "format": FORMAT,
-        "identity": checkpoint.identity,
-        "resolved": checkpoint.resolved,
-        "log": asdict(log.mark),
-    }
-    run = packed((checkpoint.position, checkpoint.contacts))
-    arrays = {f"run/{name}": array for name, array in run.items()}
-    arrays |= {f"state/{name}": array for name, array in checkpoint.state.items()}
-    return write_record(path, facts, arrays | {"laws": np.frombuffer(checkpoint.laws, np.uint8)})
+    _write(path, checkpoint, START)
+    return path
 
 
 def read_checkpoint(path: Path) -> Checkpoint:
@@ -112,59 +107,62 @@ def read_checkpoint(path: Path) -> Checkpoint:
         path: The file.
 
     Raises:
-        InputError: When it is none, is of another format or damaged.
+        InputError: When it is none, is of another version or damaged.
     """
     try:
         if not path.is_file():  # a pipe would be waited for
             raise InputError("is no file")
-        return _read(path)
+        found = read_record(path.read_bytes(), _KINDS)
+        if not isinstance(found, Checkpoint):
+            raise InputError("is no checkpoint")
+        return replace(found, steps=read_steps(path.with_suffix(LOG_SUFFIX), found.log))
     except InputError as error:
-        found = error
+        problem = error.problem
     except OSError as error:
-        found = InputError(f"cannot be read: {error}")
-    except Exception as error:  # the checksum fits content that this version does not know
-        found = InputError(f"is not understood: {error!r}")
-    problem = f"{found.problem}; remove it, or begin anew with --overwrite"
-    raise InputError(problem, file=str(path), value=found.value, allowed=found.allowed)
+        problem = f"cannot be read: {error}"
+    raise InputError(f"{problem}; remove it, or begin anew with --overwrite", file=str(path))
 
 
-def _read(path: Path) -> Checkpoint:
-    facts, arrays = read_record(path.read_bytes())
-    form = facts.get("format") if isinstance(facts, dict) else None
-    if form != FORMAT:
-        raise InputError("was written by another patchlaw", value=form, allowed=FORMAT)
+def write_steps(path: Path, steps: Sequence[LoadStep], mark: Mark = START) -> Mark:
+    """Write those load steps to a log that are not in it yet.
 
-    def group(name: str) -> Arrays:
-        found = (key.partition("/") for key in arrays if key.startswith(f"{name}/"))
-        return {key: arrays[f"{name}/{key}"] for _, _, key in found}
+    Args:
+        path: The file.
+        steps: All load steps so far. Where the file has gone, or is another run's, all are written
+            again.
+        mark: How far the file is written.
 
-    position, contacts = unpacked(group("run"), (LoadPosition, ContactRecord))
-    return Checkpoint(
-        identity=facts["identity"],
-        resolved=facts["resolved"],
-        laws=arrays["laws"].tobytes(),
-        steps=read_steps(path.with_suffix(LOG_SUFFIX), Mark(**facts["log"])),
-        position=position,
-        state=group("state"),
-        contacts=contacts,
-    )
+    Returns:
+        How far it is written now.
+
+    Raises:
+        NotWritten: When the file cannot be written; what was in it counts as before.
+    """
+    here = path.stat().st_size if path.is_file() else 0
+    mark = mark if here >= mark.size else START
+    new = steps[mark.records :]
+    return append(path, new, mark) if new else mark
 
 
-class _Accepted(NamedTuple):
-    """A run after a load step; the steps and contacts in it do not change any more."""
+def read_steps(path: Path, mark: Mark) -> tuple[LoadStep, ...]:
+    """Read the load steps of a log.
 
-    position: LoadPosition
-    state: Arrays
-    steps: int
-    contacts: int
+    Args:
+        path: The file.
+        mark: How far it is to be read.
 
-    def checkpoint(self, run: Run) -> Checkpoint:
-        return replace(
-            checkpoint_of(run, self.state),
-            position=self.position,
-            steps=tuple(run.steps[: self.steps]),
-            contacts=run.contacts[: self.contacts],
-        )
+    Raises:
+        InputError: When bytes are missing, or are not those that were written.
+    """
+    if mark == START:
+        return ()
+    steps = []
+    with suppress(InputError):
+        for step, here in unsealed(path.read_bytes()[: mark.size], (LoadStep, PatchState)):
+            steps.append(step)
+            if here == mark:
+                return tuple(steps)
+    raise InputError(f"is damaged: {path.name} beside it does not have the bytes it had")
 
 
 class CheckpointWriter:
@@ -187,8 +185,8 @@ class CheckpointWriter:
     def __init__(self, folder: Path, run: Run, hold: Callable[[], None]) -> None:
         self.path = folder / FILE_NAME
         self._run, self._hold = run, hold
-        self._log = StepLog(self.path.with_suffix(LOG_SUFFIX))
-        self._pending: _Accepted | None = None
+        self._log = START
+        self._pending: Checkpoint | None = None
         self._due = 0.0
 
     def __enter__(self) -> CheckpointWriter:
@@ -200,8 +198,11 @@ class CheckpointWriter:
         with suppress(NotWritten, MemoryError):
             self._write_pending()
 
-    def accept(self) -> None:
-        """Keep the load steps that the run has accepted so far, and write them if it is time.
+    def accept(self, step: LoadStep | None = None) -> None:
+        """Keep the run after a load step, and write it if it is time; an observer of load steps.
+
+        Args:
+            step: The load step, which the run has accepted; None before the first.
 
         Raises:
             NotWritten: When that fails; the earlier file stays.
@@ -212,18 +213,13 @@ class CheckpointWriter:
         run, state = self._run, self._run.state()
 
         def keep() -> None:
-            self._pending = _Accepted(run.position, state, len(run.steps), len(run.contacts))
+            self._pending = checkpoint_of(run, state)
             if time.monotonic() >= self._due:
                 self._write_pending()
 
         on_root(run.comm, keep)
 
-    def write(self) -> None:
-        """Write the run as it is now, like `accept`, but at once."""
-        self._due = 0.0
-        self.accept()
-
-    def write_pending(self) -> None:
+    def finish(self) -> None:
         """Write what was accepted since the last write.
 
         Raises:
@@ -243,7 +239,7 @@ class CheckpointWriter:
         self._pending = None
 
         def unlink() -> None:
-            for path in (self.path, self._log.path):
+            for path in (self.path, self.path.with_suffix(LOG_SUFFIX)):
                 path.unlink(missing_ok=True)
 
         on_root(self._run.comm, unlink)
@@ -257,8 +253,15 @@ class CheckpointWriter:
         except InputError as error:  # the folder was good when the run began
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
-        write_checkpoint(self.path, self._pending.checkpoint(self._run), self._log)
+        self._log = _write(self.path, self._pending, self._log)
         self.path.with_name(FORMER_NAME).unlink(missing_ok=True)
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))
+
+
+def _write(path: Path, checkpoint: Checkpoint, mark: Mark) -> Mark:
+    """Write a checkpoint, and its load steps behind a mark of their log; return the new mark."""
+    mark = write_steps(path.with_suffix(LOG_SUFFIX), checkpoint.steps, mark)
+    write_record(path, replace(checkpoint, steps=(), log=mark))
+    return mark

@@ -1,4 +1,7 @@
-"""Stops a run between two load steps: by a signal, or before its time is over."""
+"""Signals end a command at once, or stop a run between two load steps; so does the end of its time.
+
+Only the standard library is imported here: signals are watched before anything else is loaded.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,8 @@ import os
 import signal
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -32,6 +36,10 @@ _LEAST_RESERVE, _MOST_RESERVE = 1.0, 20.0
 _GROWTH = 1.5
 """Wall time that the next load step is expected to take, over that of the last one."""
 
+_told: list[int] = []  # signals since the command began
+
+Handler = Callable[[int, FrameType | None], None]
+
 
 class Stopped(PatchlawError, RuntimeError):
     """A run was stopped between two load steps and can go on from there.
@@ -49,12 +57,88 @@ class Stopped(PatchlawError, RuntimeError):
         return str(self.args[0])
 
 
-class Interruption:
-    """Watches on any rank for SIGINT, SIGTERM, SIGHUP, SIGUSR1, and for the end of the time.
+class Ended(KeyboardInterrupt):
+    """A signal told this process to end now.
+
+    Args:
+        number: The signal.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(number)
+        self.exit_code = 128 + number
+
+
+@contextmanager
+def signals_raise() -> Iterator[None]:
+    """Let SIGINT, SIGTERM and SIGHUP raise `Ended`, so that files and child processes are cleared.
+
+    The former handlers come back at the end.
+    """
+    _told.clear()
+
+    def end(number: int, frame: FrameType | None) -> None:
+        _told.append(number)
+        raise Ended(number)
+
+    with _handled(ENDING, end):
+        yield
+
+
+@contextmanager
+def ended_if_told() -> Iterator[None]:
+    """Raise `Ended` in place of any error that follows a signal.
+
+    A compiled module whose import is interrupted raises an error of its own instead.
+    """
+    try:
+        yield
+    except Exception as error:
+        if _told:
+            raise Ended(_told[-1]) from error
+        raise
+
+
+@contextmanager
+def watching(comm: Any, limit: float | None = None) -> Iterator[Interruption]:
+    """Watch on any rank for SIGINT, SIGTERM, SIGHUP, SIGUSR1, and for the end of the time.
 
     The first signal asks for a stop after the load step under way. A second one, except SIGUSR1,
-    ends the process as if nobody had watched. A signal that is ignored, as SIGHUP is under
-    ``nohup``, stays ignored.
+    ends the process as if nobody had watched. A notice of the time limit, by SIGUSR1, that comes
+    after the end of the run must not kill.
+
+    Args:
+        comm: MPI communicator, or None.
+        limit: Wall time that the run may take from now on [s]; None sets no limit.
+    """
+    interruption = Interruption(comm, limit)
+    with _handled((*ENDING, signal.SIGUSR1), interruption.see):
+        yield interruption
+
+
+@contextmanager
+def _handled(numbers: Iterable[int], handler: Handler) -> Iterator[None]:
+    """Let a function handle signals; the former handlers come back at the end.
+
+    A signal that is ignored, as SIGHUP is under ``nohup``, stays ignored, and SIGUSR1, which would
+    end a process by default, is ignored from then on.
+    """
+    former: dict[int, Any] = {}
+    if threading.current_thread() is threading.main_thread():  # no other may set handlers
+        for number in numbers:
+            ignored = signal.getsignal(number) in (None, signal.SIG_IGN)  # None: not of Python
+            if number == signal.SIGUSR1 or not ignored:
+                former[number] = signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, before in former.items():
+            late = number == signal.SIGUSR1 and before == signal.SIG_DFL
+            signal.signal(number, signal.SIG_IGN if late else before)
+
+
+class Interruption:
+    """What a run was told, and how much time is left of it; see `watching`.
 
     Args:
         comm: MPI communicator, or None.
@@ -65,25 +149,6 @@ class Interruption:
         self._comm, self._limit = comm, limit
         self._began = time.monotonic()
         self._seen = 0
-        self._former: dict[int, Any] = {}
-
-    def __enter__(self) -> Interruption:
-        """Begin to watch."""
-        if threading.current_thread() is threading.main_thread():  # no other may set handlers
-            self._former = {
-                number: signal.signal(number, self._see)
-                for number in (*ENDING, signal.SIGUSR1)
-                if number == signal.SIGUSR1
-                or signal.getsignal(number) not in (None, signal.SIG_IGN)  # None: not of Python
-            }
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        """Give the signals back; a notice of the time limit that comes now must not kill."""
-        for number, handler in self._former.items():
-            late_notice = number == signal.SIGUSR1 and handler == signal.SIG_DFL
-            signal.signal(number, signal.SIG_IGN if late_notice else handler)
-        self._former.clear()
 
     def check(self, where: str, last_step: float = 0.0) -> None:
         """Raise on all ranks when any of them was told to stop, or time is too short to go on.
@@ -105,16 +170,17 @@ class Interruption:
             code = 4 if reason in _IN_TIME else 128 + int(reason)
             raise Stopped(f"{_REASONS[reason]}: stopped {where}; go on with --resume", code)
 
-    def _is_late(self, last_step: float) -> bool:
-        if self._limit is None:
-            return False
-        reserve = min(max(_RESERVE * self._limit, _LEAST_RESERVE), _MOST_RESERVE)
-        return time.monotonic() + _GROWTH * last_step + reserve > self._began + self._limit
-
-    def _see(self, number: int, frame: FrameType | None) -> None:
+    def see(self, number: int, frame: FrameType | None) -> None:
+        """Take note of a signal; a handler of `signal`."""
         self._seen = max(self._seen, number)
         if number != signal.SIGUSR1:
             signal.signal(number, signal.SIG_DFL)
             # not through Python's buffers, which the interrupted code may be using
             with suppress(OSError):  # standard error may be full
                 os.write(2, b"\npatchlaw: stops after this load step; once more ends it at once\n")
+
+    def _is_late(self, last_step: float) -> bool:
+        if self._limit is None:
+            return False
+        reserve = min(max(_RESERVE * self._limit, _LEAST_RESERVE), _MOST_RESERVE)
+        return time.monotonic() + _GROWTH * last_step + reserve > self._began + self._limit

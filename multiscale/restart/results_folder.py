@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from multiscale.removed import without_removed
 from multiscale.restart.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
@@ -31,8 +31,9 @@ _NAME = ".lock"
 _PATIENCE = 0.2  # for another run that is just ending, or others that remove the folder [s]
 _NAP = 0.02
 _OUTPUT = "output."
-_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
-_NO_FOLDERS = (errno.EBADF, errno.EISDIR, errno.EINVAL, *_NO_LOCKS)
+_READ_OR_MAKE = os.O_RDWR | os.O_CREAT
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EISDIR, errno.EINVAL)
+"""Errors of file systems without locks, or, the latter, without locks on folders."""
 
 
 @contextmanager
@@ -83,31 +84,24 @@ class FolderLock:
         Raises:
             InputError: When another process holds it, or the folder cannot be written to.
         """
-        if self._is_held():
-            return
-        self._close()
         until = time.monotonic() + _PATIENCE
-        while True:
+        while not self._is_held():
+            problem, passing = "is removed by another run", True
             try:
                 self._make_folder()
-                self._take()
-                if self._handle is None or self._is_held():
+                if not self._take() or self._is_held():
                     return
-                problem = "is removed by another run"
             except BlockingIOError:
                 problem = "another run is writing to this folder"
             except (FileExistsError, NotADirectoryError):
-                problem, until = "is not a folder", 0.0
-            except OSError as error:
+                problem, passing = "is not a folder", False
+            except OSError as error:  # a folder may be removed between two of these calls
                 problem = f"cannot be written to: {error.strerror}"
-                if not isinstance(error, FileNotFoundError):  # removed between two of these calls
-                    until = 0.0
-            self._close()
-            if time.monotonic() > until:
-                break
+                passing = isinstance(error, FileNotFoundError)
+            if not passing or time.monotonic() > until:
+                self.release()
+                raise InputError(problem, key="--out", value=str(self._folder))
             time.sleep(_NAP)
-        self.release()
-        raise InputError(problem, key="--out", value=str(self._folder))
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
@@ -126,26 +120,21 @@ class FolderLock:
         if not os.access(self._folder, os.W_OK | os.X_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
-    def _take(self) -> None:
-        """Lock the folder or, where it cannot be locked, the file in it."""
-        self._locked = self._folder
-        try:
-            self._lock(os.O_RDONLY)
-        except OSError as error:
-            if error.errno not in _NO_FOLDERS:
-                raise
-            self._locked = self._folder / _NAME
-            try:
-                self._lock(os.O_RDWR | os.O_CREAT)
-            except OSError as none:
-                if none.errno not in _NO_LOCKS:
-                    raise
-                self._close()
-
-    def _lock(self, flags: int) -> None:
+    def _take(self) -> bool:
+        """Lock the folder or, where that cannot be, the file in it; return False without locks."""
         self._close()
-        self._handle = os.open(self._locked, flags, 0o666)
-        fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _NAME, _READ_OR_MAKE)):
+            handle = os.open(path, flags, 0o666)
+            try:
+                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                os.close(handle)
+                if error.errno not in _NO_LOCKS:
+                    raise
+            else:
+                self._locked, self._handle = path, handle
+                return True
+        return False
 
     def _close(self) -> None:
         if self._handle is not None:
@@ -181,8 +170,8 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
         )
     if not path.exists():
         return None
-    found = read_checkpoint(path)
-    for key, new, old in changes(identity(scene), found.identity):
+    checkpoint = read_checkpoint(path)
+    for key, new, old in changes(identity(scene), checkpoint.identity):
         if not key.startswith(_OUTPUT):
             raise InputError(
                 f"is not what the run in {folder} began with; restore it, or begin anew with "
@@ -191,7 +180,7 @@ def find_checkpoint(folder: Path, scene: Scene) -> Checkpoint | None:
                 value=new,
                 allowed=repr(old),
             )
-    return found
+    return checkpoint
 
 
 def is_finished(folder: Path, now: Mapping[str, Any]) -> bool:
@@ -201,8 +190,8 @@ def is_finished(folder: Path, now: Mapping[str, Any]) -> bool:
         folder: The folder.
         now: Identity of the scene.
     """
-    found = _provenance(folder)
-    return found is not None and found.finished and not _differing(now, found.identity)
+    then, finished = _results(folder)
+    return finished and not _differing(now, then)
 
 
 def refuse_other_results(folder: Path, now: Mapping[str, Any]) -> None:
@@ -217,9 +206,7 @@ def refuse_other_results(folder: Path, now: Mapping[str, Any]) -> None:
             that it names; says what differs. Results of the same scene, and what is not understood,
             may be replaced.
     """
-    found = _provenance(folder)
-    differing = [] if found is None else _differing(now, found.identity)
-    if differing:
+    if differing := _differing(now, _results(folder)[0]):
         raise InputError(
             f"holds results of another scene, where {told(differing)}",
             key="--out",
@@ -228,32 +215,28 @@ def refuse_other_results(folder: Path, now: Mapping[str, Any]) -> None:
         )
 
 
-class _Provenance(NamedTuple):
-    """What results say of themselves: the identity of their scene, and if its run was finished."""
+def _results(folder: Path) -> tuple[dict[str, Any], bool]:
+    """Return the identity of the scene whose results a folder holds, and if its run was finished.
 
-    identity: dict[str, Any]
-    finished: bool
-
-
-def _provenance(folder: Path) -> _Provenance | None:
-    """Return what the results in a folder say of themselves; None where they say nothing."""
+    The identity is empty where results say nothing of it.
+    """
     try:
-        found = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
-        scene = without_removed(found["scene_given"])
-        then = flat_identity(scene, found.get("files", {}), found["patchlaw"])
-        return _Provenance(then, found["finished"] is True)
+        content = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
+        scene = without_removed(content["scene_given"])
+        then = flat_identity(scene, content.get("files", {}), content["patchlaw"])
+        return then, content["finished"] is True
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return None
+        return {}, False
 
 
 def _differing(now: Mapping[str, Any], then: Mapping[str, Any]) -> list[Change]:
-    """Return the changes by which results are those of another scene.
+    """Return the changes by which results are those of another scene; none from an empty identity.
 
     A key that an earlier version did not have is no difference, nor is the version itself. A file
     whose content was not recorded is one.
     """
     return [
         (key, new, old)
-        for key, new, old in changes(now, then)
+        for key, new, old in changes(now if then else {}, then)
         if (key in then or key.startswith(CONTENT)) and not key.startswith((VERSION, _OUTPUT))
     ]

@@ -25,7 +25,7 @@ from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
 from multiscale.scene.identity import changes, told
 from multiscale.scene.scene import Scene
-from support.checked_store import START, Record, append, end_of, unsealed
+from support.checked_store import START, append, end_of, unsealed
 from support.collective import on_root, together
 from support.errors import InputError, NotConverged
 from support.whole_files import written
@@ -60,19 +60,6 @@ class CaseResult:
     failure: str = ""
     measured: Mapping[str, Any] = field(default_factory=dict)
     arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, record: Record) -> CaseResult:
-        """Return the result that a record of a file holds."""
-        try:
-            return cls(**record.facts, arrays=record.arrays)
-        except TypeError:
-            raise InputError("holds cases as another version of patchlaw wrote them") from None
-
-    def record(self) -> Record:
-        """Return the record of a file that holds the result."""
-        facts = {one.name: getattr(self, one.name) for one in fields(self)}
-        return Record(facts, facts.pop("arrays"))
 
 
 def run_case(
@@ -187,10 +174,10 @@ class Journal:
             InputError: When they are cases of another scene, or the file is damaged.
         """
         try:
-            for record, mark in unsealed(path.read_bytes()):
+            for value, mark in unsealed(path.read_bytes()):
                 if mark.records > 1:
-                    yield CaseResult.of(record)
-                elif differing := list(changes(self._identity, record.facts)):
+                    yield _result(value)
+                elif differing := list(changes(self._identity, value)):
                     raise InputError(
                         f"holds the cases of another scene, where {told(differing)}", key="--out",
                         value=str(path.parents[2]), allowed="another folder, or --overwrite",
@@ -218,8 +205,9 @@ class Journal:
 
         def store(result: CaseResult) -> None:
             nonlocal mark
-            head = [Record(self._identity)] if mark == START else []
-            mark = append(path, [*head, result.record()], mark)
+            head = [self._identity] if mark == START else []
+            facts = {one.name: getattr(result, one.name) for one in fields(result)}
+            mark = append(path, [*head, facts], mark)
 
         return store
 
@@ -293,6 +281,14 @@ def _read(
     before = {number for numbers in held[:rank] for number in numbers}
     first = {number: one for number, one in mine.items() if number not in before}
     return first, set().union(*held)
+
+
+def _result(value: dict[str, Any]) -> CaseResult:
+    """Return the result that a record holds."""
+    try:
+        return CaseResult(**value)
+    except TypeError:
+        raise InputError("was written by another patchlaw") from None
 
 
 def part_name(part: tuple[int, int]) -> str:

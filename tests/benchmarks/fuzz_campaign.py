@@ -138,12 +138,14 @@ def doors(folder):
         lambda words: command_words.called(write(scene, set_), words),
         0.05,
     )
-    for name, whole, reader in zip(
-        ("law files", "checkpoints"), (laws, checkpoint), stored_inputs.READERS, strict=True
-    ):
+    damages = {
+        "law files": st.one_of(stored_inputs.flipped(laws), stored_inputs.rewritten(laws)),
+        "checkpoints": stored_inputs.flipped(checkpoint),
+    }
+    for (name, damage), reader in zip(damages.items(), stored_inputs.READERS, strict=True):
         yield (
             name,
-            st.one_of(stored_inputs.flipped(whole), stored_inputs.rewritten(whole)),
+            damage,
             lambda content, reader=reader: stored_inputs.read(
                 write(folder / "stored.h5", content), reader
             ),

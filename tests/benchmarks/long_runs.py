@@ -71,7 +71,7 @@ def run(name: str, steps: int) -> None:
         taken, shown = [], {10**k for k in range(2, 7)} | {steps}
         before = counted("written")
         with CheckpointWriter(Path(folder) / "out", whole, lock.hold) as checkpoints:
-            checkpoints.write()
+            checkpoints.accept()
             whole.prepare()
             began = time.perf_counter()
             for step in whole.load_steps():

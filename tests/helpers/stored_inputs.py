@@ -10,7 +10,7 @@ from multiscale.laws.law_file import read_laws, write_laws
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.storage import checksum
+from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
 ODD = (
@@ -62,7 +62,7 @@ def rewritten(draw, whole):
                     file.create_group(name)
                 elif change == "link":
                     file[name] = h5py.ExternalLink("/etc/passwd", "/")
-    return checksum(image.getvalue())
+    return checksum_hdf5(image.getvalue())
 
 
 def read(path, reader):

@@ -37,9 +37,9 @@ def one_sided(*arguments):
     raise NotConverged("one rank alone", reason="DIVERGED", iterations=1, remedy="none")
 
 
-def signalled(self):
+def signalled(self, step=None):
     """Send a signal to this rank alone."""
-    accept(self)
+    accept(self, step)
     if next(accepted) == 2:
         os.kill(os.getpid(), signal.SIGUSR1)
 

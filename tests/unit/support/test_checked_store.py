@@ -1,15 +1,17 @@
 """The checked store: every bit comes back, and no damaged byte is believed."""
 
+from dataclasses import dataclass, fields, is_dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from support.checked_store import (
     START,
-    Record,
     append,
     end_of,
+    fingerprint,
     read_record,
     sealed,
     unsealed,
@@ -18,52 +20,115 @@ from support.checked_store import (
 from support.errors import InputError
 
 
+class Pair(NamedTuple):
+    """A named tuple."""
+
+    first: object
+    second: object = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Whole:
+    """A record of all that is stored."""
+
+    number: int
+    nan: float
+    nested: tuple
+    of_json: dict
+    bits: bytes
+    pair: Pair
+    a: np.ndarray
+    of_fortran: np.ndarray
+
+
+KINDS = (Whole, Pair)
+
+
 def records(count=4):
     """Return records with arrays of all kinds and shapes."""
     dice = np.random.default_rng(3)
     return [
-        Record(
-            {"number": k, "text": "µ\n", "nan": float("nan"), "nested": [[1.5, None], {"a": True}]},
-            {"a": dice.normal(size=(k, 2)), "b": np.arange(k), "c": np.array(1 + 2j),
-             "texts": np.array(["a", "bcd"]), "of Fortran": np.asfortranarray(np.eye(3) * k)},
+        Whole(
+            number=k, nan=float("nan"), nested=((1.5, None), (True, "µ\n")),
+            of_json={"list": [1, [2]], "b": np.arange(k)}, bits=bytes(range(k)),
+            pair=Pair(np.array(1 + 2j), np.array(["a", "bcd"])),
+            a=dice.normal(size=(k, 2)), of_fortran=np.asfortranarray(np.eye(3) * k),
         )
         for k in range(count)
     ]  # fmt: skip
 
 
 def same(found, wanted):
-    assert repr(found.facts) == repr(wanted.facts)  # NaN is not equal to itself
-    assert list(found.arrays) == list(wanted.arrays)
-    for name, array in wanted.arrays.items():
-        np.testing.assert_array_equal(found.arrays[name], array)
-        assert found.arrays[name].dtype == array.dtype
-        assert found.arrays[name].flags.writeable
+    """Compare two values to the last bit, types included."""
+    assert type(found) is type(wanted)
+    if isinstance(wanted, np.ndarray):
+        np.testing.assert_array_equal(found, wanted)
+        assert found.dtype == wanted.dtype and found.flags.writeable
+    elif is_dataclass(wanted):
+        for field in fields(wanted):
+            same(getattr(found, field.name), getattr(wanted, field.name))
+    elif isinstance(wanted, dict):
+        assert list(found) == list(wanted)
+        for name in wanted:
+            same(found[name], wanted[name])
+    elif isinstance(wanted, tuple | list):
+        for one, other in zip(found, wanted, strict=True):
+            same(one, other)
+    else:
+        assert repr(found) == repr(wanted)  # NaN is not equal to itself
 
 
 def test_records_come_back_to_the_last_bit(tmp_path):
     content, mark = sealed(records())
     assert (mark.records, mark.size) == (4, len(content))
-    for (found, _), wanted in zip(unsealed(content), records(), strict=True):
+    for (found, _), wanted in zip(unsealed(content, KINDS), records(), strict=True):
         same(found, wanted)
-    assert mark == end_of(content)
-    path = write_record(tmp_path / "one", *records()[3])
-    same(read_record(path.read_bytes()), records()[3])
+    path = write_record(tmp_path / "one", records()[3])
+    same(read_record(path.read_bytes(), KINDS), records()[3])
 
 
 def test_a_file_grows_and_forgets_what_a_killed_process_left(tmp_path):
-    path, mark = tmp_path / "log", START
-    for record in records():
-        mark = append(path, [record], mark)
+    path, mark, values = tmp_path / "log", START, [{"a": np.arange(k)} for k in range(4)]
+    for value in values:
+        mark = append(path, [value], mark)
         with path.open("ab") as file:
-            file.write(sealed([record], mark)[0][:-1])  # the next one, not quite written
+            file.write(sealed([value], mark)[0][:-1])  # the next one, not quite written
         assert end_of(path.read_bytes()) == mark
     mark = append(path, [], mark)
-    assert path.read_bytes() == sealed(records())[0]
+    assert path.read_bytes() == sealed(values)[0]
 
 
 def test_objects_are_not_stored():
-    with pytest.raises(TypeError, match="array a of object cannot be stored"):
-        sealed([Record(None, {"a": np.array([None])})])
+    with pytest.raises(TypeError, match="an array of object cannot be stored"):
+        sealed([{"a": np.array([None])}])
+    with pytest.raises(TypeError, match="Object of type set is not JSON serializable"):
+        sealed([{"a": {1, 2}}])
+
+
+def test_no_other_class_is_called():
+    content, _ = sealed(records(1))
+    for kinds in ((), (Pair,), (Whole,)):
+        with pytest.raises(InputError, match=r"^was written by another patchlaw$"):
+            read_record(content, kinds)
+
+
+def test_records_whose_fields_differ_are_of_another_version(monkeypatch):
+    content, _ = sealed([Pair(1.0)])
+
+    class Renamed(NamedTuple):
+        first: float
+        third: float = 0.0
+
+    Renamed.__name__ = "Pair"
+    with pytest.raises(InputError, match="was written by another patchlaw"):
+        read_record(content, (Renamed,))
+
+
+def test_a_fingerprint_is_of_every_bit_and_name():
+    values = [{"a": 0.1}, {"b": 0.1}, {"a": np.nextafter(0.1, 1.0)}, {"a": np.array(0.1)},
+              Pair(0.1), Pair(0.1, 1)]  # fmt: skip
+    assert len({fingerprint(value) for value in values}) == len(values)
+    assert fingerprint({"a": np.float64(0.1), "b": np.int64(2)}) == fingerprint({"a": 0.1, "b": 2})
 
 
 def damaged(content, dice, bounds):
@@ -86,12 +151,12 @@ def damaged(content, dice, bounds):
 def test_no_damage_is_believed():
     """What is read of a damaged file is the beginning of what was written, or nothing."""
     content, _ = sealed(records())
-    ends = [0, *(mark.size for _, mark in unsealed(content))]
+    ends = [0, *(mark.size for _, mark in unsealed(content, KINDS))]
     bounds, dice, ways = list(pairwise(ends)), np.random.default_rng(1), set()
     for _ in range(600):
         changed, found, way = damaged(content, dice, bounds), [], "to its end"
         try:
-            found.extend(record for record, _ in unsealed(changed))
+            found.extend(record for record, _ in unsealed(changed, KINDS))
         except InputError as error:
             assert "is damaged" in str(error)
             way = "refused"
@@ -100,5 +165,5 @@ def test_no_damage_is_believed():
         assert len(found) <= 4
         ways.add((way, len(found)))
         with pytest.raises(InputError, match="is damaged"):
-            read_record(changed)  # which holds more or less than one record
+            read_record(changed, KINDS)  # which holds more or less than one record
     assert {way for way, _ in ways} == {"refused", "to its end"}

@@ -7,12 +7,12 @@ import pytest
 from threadpoolctl import threadpool_info
 
 from support import cores as module
-from support.cores import Place, cores, hold_blas, in_threads, lendable, lent, own_cores, place
+from support.cores import allocated, cores, hold_blas, in_threads, node_cores, own_cores
 
 GRANTED = len(os.sched_getaffinity(0))
 VARIABLES = (
     "OMP_NUM_THREADS", "OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "MV2_COMM_WORLD_LOCAL_SIZE",
-    "SLURM_STEP_TASKS_PER_NODE", "SLURM_NODEID", "SLURM_CPUS_PER_TASK",
+    "SLURM_STEP_NUM_TASKS", "SLURM_STEP_NUM_NODES", "SLURM_CPUS_PER_TASK",
 )  # fmt: skip
 
 
@@ -54,14 +54,13 @@ def test_own_cores(monkeypatch, stated, ranks, expected):
         ({"OMPI_COMM_WORLD_LOCAL_SIZE": "4"}, 3),  # Open MPI
         ({"MPI_LOCALNRANKS": "3"}, 4),  # Hydra: MPICH, Intel MPI
         ({"MV2_COMM_WORLD_LOCAL_SIZE": "6"}, 2),
-        ({"SLURM_STEP_TASKS_PER_NODE": "4(x2),3", "SLURM_NODEID": "0"}, 3),
-        ({"SLURM_STEP_TASKS_PER_NODE": "4(x2),3", "SLURM_NODEID": "1"}, 3),
-        ({"SLURM_STEP_TASKS_PER_NODE": "4(x2),3", "SLURM_NODEID": "2"}, 4),
-        ({"SLURM_STEP_TASKS_PER_NODE": "4(x2),3", "SLURM_NODEID": "9"}, 12),
-        ({"SLURM_CPUS_PER_TASK": "6", "SLURM_STEP_TASKS_PER_NODE": "2"}, 6),  # bound to them
+        ({"SLURM_STEP_NUM_TASKS": "12", "SLURM_STEP_NUM_NODES": "3"}, 3),
+        ({"SLURM_STEP_NUM_TASKS": "11", "SLURM_STEP_NUM_NODES": "3"}, 3),  # 4, 4 and 3
+        ({"SLURM_STEP_NUM_TASKS": "11"}, 12),
+        ({"SLURM_CPUS_PER_TASK": "6", "SLURM_STEP_NUM_TASKS": "2"}, 6),  # bound to them
         ({"SLURM_CPUS_PER_TASK": "6", "OMP_NUM_THREADS": "1"}, 1),  # what the user says counts
         # mpirun inside a job of Slurm: the launcher that started the ranks counts
-        ({"OMPI_COMM_WORLD_LOCAL_SIZE": "2", "SLURM_STEP_TASKS_PER_NODE": "1"}, 6),
+        ({"OMPI_COMM_WORLD_LOCAL_SIZE": "2", "SLURM_STEP_NUM_TASKS": "1"}, 6),
     ],
 )
 def test_launchers_tell_the_ranks_beside_it(monkeypatch, variables, expected):
@@ -71,32 +70,40 @@ def test_launchers_tell_the_ranks_beside_it(monkeypatch, variables, expected):
     assert own_cores() == expected
 
 
-def ranks(*nodes, own=1, each=4):
-    """Return the places of ranks that share the cores of their nodes."""
-    return [Place(node, frozenset(range(each)), own) for node in nodes]
+class Ranks:
+    """A rank of a job whose nodes, granted cores and own threads are known."""
+
+    def __init__(self, *everywhere):
+        self.everywhere = everywhere
+
+    def allgather(self, mine):
+        return list(self.everywhere)
+
+
+def job(nodes, *, own=1, bound=False):
+    """Return the rank of a job on node "a", of four cores, with ranks on the given nodes."""
+    return Ranks(*(
+        (node, frozenset([rank] if bound else range(4)), own) for rank, node in enumerate(nodes)
+    ))  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("places", "working", "expected"),
+    ("ranks", "own", "nodes", "threads", "alone"),
     [
-        (ranks("a", "a"), [0], 2),
-        (ranks("a", "a", "a", own=2), [0], 4),  # no more than the node has
-        (ranks("a", "b"), [0], 1),  # a waiting rank on another node lends nothing
-        (ranks("a", "b", "a", "b"), [0], 2),
-        (ranks("a", "a", "a", "a"), [0, 1], 2),
-        (ranks("a", "a", "a", "a"), [0, 1, 2], 1),
-        (ranks("a", "a", own=3), [0, 1], 3),  # what the user stated stays, cores or not
+        (job("aa"), 1, 1, 2, 2),
+        (job("aaa", own=2), 2, 1, 6, 4),  # no more than the node has
+        (job("ab"), 1, 2, 1, 1),  # those of another node are not to be had
+        (job("abab"), 1, 2, 2, 2),
+        (job("a", own=6), 6, 1, 6, 6),  # what the user stated stays, cores or not
+        (job("aab", bound=True), 1, 2, 2, 2),
     ],
 )
-def test_waiting_ranks_lend_their_cores(places, working, expected):
-    for rank in working:
-        assert lendable(places, working, rank).own == expected
-
-
-def test_a_rank_that_is_bound_to_its_core_may_use_those_of_others():
-    bound = [Place("a", frozenset([k]), 1) for k in range(3)]
-    assert lendable(bound, [0], 0) == Place("a", frozenset(range(3)), 3)
-    assert lendable(bound, [0, 1, 2], 1) == bound[1]
+def test_one_rank_alone_takes_the_cores_of_its_node(monkeypatch, ranks, own, nodes, threads, alone):
+    monkeypatch.setattr(module.platform, "node", lambda: "a")
+    monkeypatch.setenv("OMP_NUM_THREADS", str(own))
+    here = node_cores(ranks)
+    assert (here.nodes, here.threads, here.own, here.alone) == (nodes, threads, own, alone)
+    assert here.granted == frozenset(range(2 if ranks.everywhere[0][1] == {0} else 4))
 
 
 @pytest.mark.skipif(GRANTED < 2, reason="needs two cores")
@@ -104,7 +111,7 @@ def test_threads_leave_the_core_that_the_rank_is_bound_to():
     whole = os.sched_getaffinity(0)
     os.sched_setaffinity(0, {min(whole)})
     try:
-        with lent(2, frozenset(whole)):
+        with allocated(2, frozenset(whole)):
             assert os.sched_getaffinity(0) == whole
         assert os.sched_getaffinity(0) == {min(whole)}
     finally:
@@ -122,19 +129,19 @@ def test_threads_of_blas_times_ours_are_the_cores(monkeypatch):
     assert blas_threads() <= {2}  # the reference BLAS has none to tell of
     in_threads(lambda task: seen.append(blas_threads()), range(4))
     assert all(threads <= {1} for threads in seen)
-    with lent(3):
+    with allocated(3):
         assert blas_threads() <= {3}
     assert blas_threads() <= {2}
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     hold_blas()
     assert blas_threads() <= {1}
-    assert place().own == 1
+    assert node_cores(None).own == 1
 
 
-def test_lent_cores_go_back():
-    with pytest.raises(ValueError, match="broken"), lent(7):
+def test_allocated_cores_go_back():
+    with pytest.raises(ValueError, match="broken"), allocated(7):
         assert cores() == 7
-        with lent(2):
+        with allocated(2):
             assert cores() == 2
         assert cores() == 7
         raise ValueError("broken")
@@ -144,7 +151,7 @@ def test_lent_cores_go_back():
 @pytest.mark.parametrize("count", [1, 4])
 def test_every_task_is_done_once(count):
     done, threads = [], set()
-    with lent(count):
+    with allocated(count):
         in_threads(lambda task: (done.append(task), threads.add(threading.get_ident())), range(50))
     assert sorted(done) == list(range(50))
     assert len(threads) <= count
@@ -152,5 +159,5 @@ def test_every_task_is_done_once(count):
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_errors_come_out(count):
-    with lent(count), pytest.raises(ZeroDivisionError):
+    with allocated(count), pytest.raises(ZeroDivisionError):
         in_threads(lambda task: 1 / task, [1, 0, 2])

@@ -78,7 +78,7 @@ def test_a_killed_run_of_another_scene_is_kept(scene, capsys):
     folder.mkdir(parents=True)
     run = Run(Scene.load(scene))
     with CheckpointWriter(folder, run, lambda: None) as checkpoints:
-        checkpoints.write()
+        checkpoints.accept()
     assert (folder / FILE_NAME).is_file()
     assert main(["run", "scene.toml", "--set", STIFFER]) == 2
     error = capsys.readouterr().err

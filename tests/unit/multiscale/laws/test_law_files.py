@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
-from multiscale.storage import checksum, checksummed
+from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
 SCALARS = (
@@ -85,10 +85,10 @@ def test_other_files_are_refused(tmp_path):
     path = tmp_path / "laws.h5"
     with pytest.raises(InputError, match="is not a readable law file"):
         read_laws(path)
-    path.write_bytes(checksum(b"no HDF5"))
+    path.write_bytes(checksum_hdf5(b"no HDF5"))
     with pytest.raises(InputError, match=r"laws.h5: is not a readable law file: "):
         read_laws(path)
-    path.write_bytes(checksummed(lambda file: file.create_dataset("x", data=1)))
+    path.write_bytes(hdf5_bytes(lambda file: file.create_dataset("x", data=1)))
     with pytest.raises(InputError, match=r"laws.h5: is not a law file of patchlaw"):
         read_laws(path)
 
@@ -116,7 +116,7 @@ def change(path, what):
     """Change the content of a law file, with a checksum that fits."""
     with h5py.File(path, "r+") as file:
         what(file)
-    path.write_bytes(checksum(path.read_bytes()))
+    path.write_bytes(checksum_hdf5(path.read_bytes()))
 
 
 def test_missing_column_is_refused(table, tmp_path):

@@ -5,7 +5,8 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import fields
+from dataclasses import asdict, dataclass, fields
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from multiscale.auto import keys as auto_keys
 from multiscale.cli.command_line import main
 from multiscale.output.field_files import write_fields
 from multiscale.restart.checkpoint import (
-    FORMAT,
     CheckpointWriter,
     checkpoint_of,
     read_checkpoint,
@@ -24,7 +24,7 @@ from multiscale.restart.checkpoint import (
 )
 from multiscale.restart.results_folder import FolderLock, find_checkpoint
 from multiscale.scene.sections import MicroSection
-from support.checked_store import read_record, write_record
+from support.checked_store import write_record
 from support.errors import InputError, NotConverged, NotWritten
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -126,7 +126,7 @@ def interrupted(folder, ended, steps=2):
     run = Run(ended.scene)
     lock = FolderLock(folder)
     with CheckpointWriter(folder, run, lock.hold) as writer:
-        writer.write()
+        writer.accept()
         for step in run.load_steps():
             writer.accept()
             if step.step == steps:
@@ -152,7 +152,7 @@ def test_load_steps_of_the_last_second_are_written_when_the_run_ends(tmp_path, e
         pytest.raises(RuntimeError, match="a bug"),
         CheckpointWriter(path.parent, run, lock.hold) as w,
     ):
-        w.write()
+        w.accept()
         for _ in run.load_steps():
             w.accept()
             if len(run.steps) == 2:
@@ -168,7 +168,8 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
     run, lock = Run(ended.scene), FolderLock(tmp_path / "out")
     with CheckpointWriter(tmp_path / "out", run, lock.hold) as writer:
         for step in run.load_steps():
-            writer.write()
+            writer.accept(step)
+            writer.finish()
             assert len(read_checkpoint(writer.path).steps) == step.step
         writer.remove()
     lock.release()
@@ -180,10 +181,11 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
     [
         (lambda path: path.write_bytes(path.read_bytes()[:3000]), "its bytes do not fit their"),
         (lambda path: path.write_bytes(b"nothing of the kind\n"), "its bytes do not fit their"),
-        (lambda path: write_record(path, ["a list"]), "None: was written by another pa"),
-        (lambda path: write_record(path, {"format": FORMAT}), "is not understood: "),
+        (lambda path: write_record(path, ["a list"]), "is no checkpoint"),
+        (lambda path: write_record(path, asdict(read_checkpoint(path))), "is no checkpoint"),
         (lambda path: flip(path), "its bytes do not fit their"),
-        (lambda path: relabel(path), "'patchlaw checkpoint 2': was written by another pa"),
+        (lambda path: in_another_layout(path), "was written by another patchlaw"),
+        (lambda path: write_record(path, Gone()), "was written by another patchlaw"),
         (lambda path: path.with_suffix(".steps").unlink(), "cannot be read: .*No such file"),
         (lambda path: change_log(path, lambda log: log[:-1]), "checkpoint.steps beside it does no"),
         (lambda path: change_log(path, lambda log: b"[" + log[1:]), "checkpoint.steps beside it "),
@@ -192,9 +194,10 @@ def test_checkpoint_is_replaced_whole_and_removed(tmp_path, ended):
         "cut",
         "foreign",
         "no checkpoint",
-        "empty",
+        "its content alone",
         "a bit flipped",
-        "another format",
+        "another layout",
+        "another class",
         "no log",
         "log cut",
         "log changed",
@@ -222,9 +225,17 @@ def flip(path):
     path.write_bytes(content)
 
 
-def relabel(path):
-    facts, arrays = read_record(path.read_bytes())
-    write_record(path, facts | {"format": "patchlaw checkpoint 2"}, arrays)
+@dataclass
+class Gone:
+    """A record that this version does not know."""
+
+    number: int = 1
+
+
+def in_another_layout(path):
+    """Replace a checkpoint by one of the layout of 0.9: facts, and the shapes of arrays."""
+    line = b'[{"format": "patchlaw checkpoint 8"}, {}]\n'
+    path.write_bytes(f"{sha256(line).hexdigest()} {len(line)}\n".encode() + line)
 
 
 def test_checkpoints_of_earlier_versions_are_neither_read_nor_lost(tmp_path, ended, capsys):
@@ -327,7 +338,7 @@ def test_folder_that_vanishes_comes_back_whole(tmp_path, ended):
     lock = FolderLock(folder)
     lock.hold()
     with CheckpointWriter(folder, run, lock.hold) as writer:
-        writer.write()
+        writer.accept()
         for step in run.load_steps():
             if step.step == 2:
                 shutil.rmtree(folder)
@@ -343,7 +354,7 @@ def test_folder_that_becomes_a_file_under_way_ends_with_5(tmp_path, ended):
     shutil.rmtree(path.parent)
     path.parent.touch()
     with pytest.raises(NotWritten, match="out: is not a folder") as error:
-        CheckpointWriter(path.parent, ended, lock.hold).write()
+        CheckpointWriter(path.parent, ended, lock.hold).accept()
     assert error.value.exit_code == 5
     lock.release()
 
@@ -370,7 +381,7 @@ def test_full_disk_leaves_the_earlier_checkpoint(tmp_path, ended, monkeypatch):
     with pytest.raises(
         NotWritten, match=r"checkpoint.state: cannot be written: No space left"
     ) as error:
-        CheckpointWriter(path.parent, run, FolderLock(path.parent).hold).write()
+        CheckpointWriter(path.parent, run, FolderLock(path.parent).hold).accept()
     assert error.value.exit_code == 5
     assert path.read_bytes() == before
     names = {"checkpoint.state", "checkpoint.steps"}

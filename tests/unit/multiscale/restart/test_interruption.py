@@ -12,8 +12,7 @@ import pytest
 from multiscale import Run
 from multiscale.cli import describe
 from multiscale.cli.command_line import main
-from multiscale.cli.signals import Ended, signals_raise
-from multiscale.restart.interruption import Interruption, Stopped
+from multiscale.restart.interruption import Ended, Stopped, signals_raise, watching
 from multiscale.scene.quantities import parse_duration
 from support.errors import InputError
 
@@ -84,7 +83,7 @@ def test_signal_stops_after_the_load_step(
 
 
 def test_second_signal_is_not_held_back():
-    with Interruption(None) as interruption:
+    with watching(None) as interruption:
         os.kill(os.getpid(), signal.SIGINT)
         assert signal.getsignal(signal.SIGINT) == signal.SIG_DFL
         with pytest.raises(Stopped, match="stopped here"):
@@ -138,8 +137,8 @@ def test_what_is_no_duration(capsys, text, problem):
 def test_a_notice_after_the_end_does_not_kill():
     """A batch system tells the end of the time whenever it likes."""
     code = (
-        "import os, signal; from multiscale.restart.interruption import Interruption\n"
-        "with Interruption(None): pass\n"
+        "import os, signal; from multiscale.restart.interruption import watching\n"
+        "with watching(None): pass\n"
         "os.kill(os.getpid(), signal.SIGUSR1)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
@@ -148,7 +147,7 @@ def test_a_notice_after_the_end_does_not_kill():
 def test_nohup_is_obeyed():
     former = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
-        with signals_raise(), Interruption(None) as interruption:
+        with signals_raise(), watching(None) as interruption:
             assert signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
             os.kill(os.getpid(), signal.SIGHUP)
             interruption.check("here")
@@ -237,8 +236,8 @@ def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, cap
 def test_a_signal_is_seen_though_standard_error_is_full():
     code = (
         "import os, signal\n"
-        "from multiscale.restart.interruption import Interruption, Stopped\n"
-        "with Interruption(None) as watch:\n"
+        "from multiscale.restart.interruption import Stopped, watching\n"
+        "with watching(None) as watch:\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         "    try: watch.check('after load step 1')\n"
         "    except Stopped as told: os._exit(told.exit_code)\n"

@@ -91,7 +91,7 @@ def test_every_load_step_writes_as_much_as_the_first_ones(tmp_path, monkeypatch)
     monkeypatch.setattr(checkpoint, "LEAST_RATIO", 0.0)
     run, lock = Run(cyclic(CASES["summits"], 30)), FolderLock(tmp_path / "out")
     with CheckpointWriter(tmp_path / "out", run, lock.hold) as writer:
-        writer.write()
+        writer.accept()
         counted = []
         for _ in run.load_steps():
             writer.accept()

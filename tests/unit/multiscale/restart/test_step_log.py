@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.restart.step_log import StepLog, read_steps
-from support.checked_store import Mark
+from multiscale.restart.checkpoint import read_steps, write_steps
+from support.checked_store import START, Mark
 from support.errors import InputError, NotWritten
 
 
@@ -39,56 +39,51 @@ def same(found, steps):
                 assert mine == its or (mine != mine and its != its)
 
 
-def test_load_steps_come_back_to_the_last_bit(tmp_path):
-    log = StepLog(tmp_path / "log")
-    marks = []
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "log"
+
+
+def test_load_steps_come_back_to_the_last_bit(log):
+    marks, mark = [], START
     for count in (0, 1, 1, 4, 7):
-        log.write(STEPS[:count])
-        marks.append(log.mark)
+        mark = write_steps(log, STEPS[:count], mark)
+        marks.append(mark)
     assert [mark.records for mark in marks] == [0, 1, 1, 4, 7]
     for mark in marks:  # an earlier checkpoint stays good when a later one was not written
-        same(read_steps(log.path, mark), STEPS[: mark.records])
-    assert log.path.stat().st_size == log.mark.size
+        same(read_steps(log, mark), STEPS[: mark.records])
+    assert log.stat().st_size == mark.size
 
 
-def test_each_load_step_is_written_once(tmp_path):
-    log, written = StepLog(tmp_path / "log"), []
-    sizes = [0]
+def test_each_load_step_is_written_once(log):
+    mark, sizes, written = START, [0], []
     for count in range(1, 8):
-        log.write(STEPS[:count])
-        sizes.append(log.path.stat().st_size)
-        written.append(log.mark.size)
+        mark = write_steps(log, STEPS[:count], mark)
+        sizes.append(log.stat().st_size)
+        written.append(mark.size)
     assert sizes[1:] == written
     assert max(np.diff(sizes)) <= 1.5 * min(np.diff(sizes))
 
 
-def test_what_a_killed_run_wrote_behind_its_checkpoint_goes(tmp_path):
-    log = StepLog(tmp_path / "log")
-    log.write(STEPS[:3])
-    mark = log.mark
-    with log.path.open("ab") as file:
+def test_what_a_killed_run_wrote_behind_its_checkpoint_goes(log):
+    mark = write_steps(log, STEPS[:3])
+    with log.open("ab") as file:
         file.write(b'{"step": 4, "appr')
-    same(read_steps(log.path, mark), STEPS[:3])
-    log.write(STEPS[:5])
-    same(read_steps(log.path, log.mark), STEPS[:5])
-    resumed = StepLog(log.path)  # of another process: it knows nothing of the file
-    resumed.write([*STEPS[:3], replace(STEPS[3], contacts=9)])
-    assert read_steps(log.path, resumed.mark)[3].contacts == 9
-    same(read_steps(log.path, mark), STEPS[:3])
+    same(read_steps(log, mark), STEPS[:3])
+    same(read_steps(log, write_steps(log, STEPS[:5], mark)), STEPS[:5])
+    anew = write_steps(log, [*STEPS[:3], replace(STEPS[3], contacts=9)])  # of another process
+    assert read_steps(log, anew)[3].contacts == 9
+    same(read_steps(log, mark), STEPS[:3])
 
 
-def test_log_that_vanished_is_written_whole(tmp_path):
-    log = StepLog(tmp_path / "log")
-    log.write(STEPS[:3])
-    log.path.unlink()
-    log.write(STEPS[:4])
-    same(read_steps(log.path, log.mark), STEPS[:4])
+def test_log_that_vanished_is_written_whole(log):
+    mark = write_steps(log, STEPS[:3])
+    log.unlink()
+    same(read_steps(log, write_steps(log, STEPS[:4], mark)), STEPS[:4])
 
 
-def test_failed_write_leaves_the_mark(tmp_path, monkeypatch):
-    log = StepLog(tmp_path / "log")
-    log.write(STEPS[:3])
-    mark = log.mark
+def test_failed_write_leaves_what_was_written(log, monkeypatch):
+    mark = write_steps(log, STEPS[:3])
 
     def full(number):
         raise OSError(28, "No space left on device")
@@ -96,15 +91,12 @@ def test_failed_write_leaves_the_mark(tmp_path, monkeypatch):
     with monkeypatch.context() as broken:
         broken.setattr("support.checked_store.os.fsync", full)
         with pytest.raises(NotWritten, match="log: cannot be written: No space left on device"):
-            log.write(STEPS)
-    assert log.mark == mark
-    same(read_steps(log.path, mark), STEPS[:3])
-    log.write(STEPS)
-    same(read_steps(log.path, log.mark), STEPS)
+            write_steps(log, STEPS, mark)
+    same(read_steps(log, mark), STEPS[:3])
+    same(read_steps(log, write_steps(log, STEPS, mark)), STEPS)
 
 
-def test_promise_of_more_bytes_than_there_are_is_refused(tmp_path):
-    log = StepLog(tmp_path / "log")
-    log.write(STEPS[:2])
+def test_promise_of_more_bytes_than_there_are_is_refused(log):
+    mark = write_steps(log, STEPS[:2])
     with pytest.raises(InputError, match="is damaged: log beside it"):
-        read_steps(log.path, Mark(records=2, size=10**18, checksum=log.mark.checksum))
+        read_steps(log, Mark(records=2, size=10**18, checksum=mark.checksum))

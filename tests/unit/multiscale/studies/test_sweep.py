@@ -15,7 +15,7 @@ from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import sweep_cases, values_from_text
-from support.checked_store import START, Record, sealed, unsealed
+from support.checked_store import START, sealed, unsealed
 from support.errors import InputError, NotConverged
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
@@ -275,8 +275,8 @@ def test_cases_of_another_version_are_refused(scene, tmp_path):
     sweep(scene, {SEED: [1]}, folder=tmp_path)
     journal = tmp_path / "cases" / "1-of-1" / "rank-0.cases"
     (head, _), (case, _) = unsealed(journal.read_bytes())
-    journal.write_bytes(sealed([head, Record({**case.facts, "files": {}})])[0])
-    with pytest.raises(InputError, match=r"another version .* its cases are computed again"):
+    journal.write_bytes(sealed([head, {**case, "files": {}}])[0])
+    with pytest.raises(InputError, match="another patchlaw; remove it, and its cases are computed"):
         sweep(scene, {SEED: [1]}, folder=tmp_path)
 
 

@@ -2,6 +2,7 @@
 
 import csv
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +12,8 @@ from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.output.results import write_tables
 from multiscale.output.terminal import show_history
 from multiscale.results.history import PATCH_COLUMNS, History
-from multiscale.storage import write_csv, write_text
 from support.errors import NotWritten
-from support.whole_files import write_whole
+from support.whole_files import write_csv, write_text
 
 
 @pytest.fixture
@@ -82,15 +82,17 @@ def test_columns_are_attributes(history):
         _ = history.forze_N
 
 
-def test_failed_write_leaves_the_old_file(tmp_path):
+def test_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = write_text(tmp_path / "report.html", "old")
 
-    def fail(partial):
+    def fail(partial, content):
         partial.write_text("half", encoding="utf-8")
         raise OSError("disk full")
 
-    with pytest.raises(NotWritten, match=r"report.html: cannot be written: disk full"):
-        write_whole(path, fail)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "write_bytes", fail)
+        with pytest.raises(NotWritten, match=r"report.html: cannot be written: disk full"):
+            write_text(path, "new")
     assert path.read_text(encoding="utf-8") == "old"
     assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).with_name("lent_cores_script.py")
+SCRIPT = Path(__file__).with_name("allocated_cores_script.py")
 CORES = len(os.sched_getaffinity(0))
 
 
@@ -36,5 +36,5 @@ def test_same_numbers_on_any_number_of_ranks_and_threads(found, ranks, threads):
     (alone,), more = found(1, 1)["found"], found(ranks, threads)
     # transforms do not depend on threads, and products of BLAS do by rounding
     np.testing.assert_allclose(more["found"], [alone] * ranks, rtol=1e-12, atol=1e-15)
-    lent = max(threads, min(ranks * threads, CORES))
-    assert more["cores"] == [lent] + [0] * (ranks - 1)
+    allocated = max(threads, min(ranks * threads, CORES))
+    assert more["cores"] == [allocated] + [0] * (ranks - 1)

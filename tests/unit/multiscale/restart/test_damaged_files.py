@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from multiscale.laws.law_file import read_laws
 from multiscale.restart.checkpoint import read_checkpoint
-from multiscale.storage import checksum
+from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
 few = settings(
@@ -47,7 +47,7 @@ def changed_laws(tmp_path, whole, change):
     path.write_bytes(whole[0])
     with h5py.File(path, "r+") as file:
         change(file)
-    path.write_bytes(checksum(path.read_bytes()))
+    path.write_bytes(checksum_hdf5(path.read_bytes()))
     with pytest.raises(InputError) as refusal:
         read_laws(path)
     return str(refusal.value).removeprefix(f"{path}: ")
@@ -62,11 +62,16 @@ def test_columns_are_numbers_that_the_file_holds(tmp_path, whole):
         del file["patch_0_0/pressure"]
         file["patch_0_0/pressure"] = np.array([b"a", b"b"])
 
+    def no_group(file):
+        del file["patch_0_0"]
+        file.create_dataset("patch_0_0", (10**6, 10**6), "f8", chunks=(100, 100))
+
     def grid(file):
         file.attrs["patch_grid"] = (10**9, 10**9)
 
     assert "/patch_0_0/pressure is not whole" in changed_laws(tmp_path, whole, promise)
     assert "/patch_0_0/pressure is not a column of numbers" in changed_laws(tmp_path, whole, words)
+    assert changed_laws(tmp_path, whole, no_group) == "/patch_0_0 is no group of columns"
     lacking = changed_laws(tmp_path, whole, grid)
     assert lacking == "(1000000000, 1000000000): lacks laws (allowed: 4 groups)"
 
