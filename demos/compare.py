@@ -2,9 +2,9 @@
 # # Which way to compute a scene?
 #
 # What one learns: which error remains after which time, in every sensible way to compute the
-# paper's scene and a surface with many waves. `patchlaw compare` runs them all, each in a process
-# of its own, and takes the best one, three meshes of the roughness, as the reference. That one
-# knows its own error; below it, no two ways can be ranked.
+# paper's scene and a surface with many waves. `patchlaw compare` runs them all, each from nothing,
+# and takes the best one, three meshes of the roughness, as the reference. That one knows its own
+# error; below it, no two ways can be ranked.
 #
 #     error of the force: the largest of the curve, over its largest force, at least the truth's own
 #
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from multiscale import Scene
-from multiscale.comparison.compare import compare
 from multiscale.figures.style import COLOURS, ERROR_BAND, FULL_WIDTH, MARKERS, new_figure, use_style
+from multiscale.studies.comparison import compare
 
 parser = argparse.ArgumentParser()
 parser.add_argument("--quick", action="store_true")

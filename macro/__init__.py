@@ -1,7 +1,7 @@
 """Elastic bodies in dolfinx, in contact with a rigid plane or with each other.
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → ContactState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → FaceContactState for every load step.
 A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block;
 TaggedMesh → write_mesh → a file that ranks read in parts.
 
@@ -15,7 +15,7 @@ from macro.compat import vector_space
 from macro.compliance.face_compliance import FaceCompliance, face_compliance
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.contact_problem import ContactProblem
-from macro.contact.contact_state import ContactState
+from macro.contact.face_contact_state import FaceContactState
 from macro.contact.face_pair import FacePair
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
@@ -45,9 +45,9 @@ __all__ = [
     "ContactFacets",
     "ContactLaw",
     "ContactProblem",
-    "ContactState",
     "ElasticBody",
     "FaceCompliance",
+    "FaceContactState",
     "FacePair",
     "Interface",
     "LawContactProblem",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.materials import von_mises
 from macro import compat
-from macro.contact.contact_state import ContactState
+from macro.contact.face_contact_state import FaceContactState
 from macro.contact.loaded_face import LoadedFace
 from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
@@ -75,7 +75,7 @@ def write_fields(
 def write_rough_fields(
     path: Path | str,
     problem: UnilateralContactProblem,
-    steps: Iterable[tuple[int, ContactState]],
+    steps: Iterable[tuple[int, FaceContactState]],
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of a rough block as XDMF.
 
@@ -153,7 +153,7 @@ def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
     return pressures
 
 
-def _vertex_pressures(problem: UnilateralContactProblem, state: ContactState) -> Any:
+def _vertex_pressures(problem: UnilateralContactProblem, state: FaceContactState) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
     Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no

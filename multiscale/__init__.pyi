@@ -1,7 +1,5 @@
 """Public names of the package and their modules, for type checkers and for `multiscale` itself."""
 
-from multiscale.comparison.compare import compare as compare
-from multiscale.comparison.comparison import Comparison as Comparison
 from multiscale.couplings.reference import ReferenceCoupling as ReferenceCoupling
 from multiscale.exports.export import export_laws as export_laws
 from multiscale.law_solvers.condensed import CondensedLaws as CondensedLaws
@@ -24,5 +22,7 @@ from multiscale.run import Run as Run
 from multiscale.run import run as run
 from multiscale.scene.scene import Scene as Scene
 from multiscale.setup import make_setup as make_setup
-from multiscale.sweeps.sweep import sweep as sweep
-from multiscale.sweeps.sweep_results import SweepResults as SweepResults
+from multiscale.studies.comparison import Comparison as Comparison
+from multiscale.studies.comparison import compare as compare
+from multiscale.studies.sweep import SweepResults as SweepResults
+from multiscale.studies.sweep import sweep as sweep

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
-from macro.contact.contact_state import ContactState
+from macro.contact.face_contact_state import FaceContactState
 from macro.contact.loaded_face import ContactFace
 from macro.contact.sampling import Sampling
 from support.collective import together
@@ -198,7 +198,7 @@ class ContactForces:
         """
         return self.levers.loads(self._sampling.weight * pressure)
 
-    def state(self, closure: Array, **known: Any) -> ContactState:
+    def state(self, closure: Array, **known: Any) -> FaceContactState:
         """Return the contact under the plane as it is now.
 
         Args:
@@ -208,7 +208,7 @@ class ContactForces:
         pressure, areas = self.pressure(closure), self._face.areas
         (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
-        return ContactState(
+        return FaceContactState(
             plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
             force=float(force),
             moment=np.array(moment),

@@ -19,7 +19,7 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTangent
-from macro.contact.contact_state import ContactState
+from macro.contact.face_contact_state import FaceContactState
 from macro.contact.interface_parts import ChosenFace, InterfaceLaws, chosen_face, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode
 from macro.contact.sampling import crown_depth
@@ -137,7 +137,7 @@ class Interface:
         self._load = sampling.operator.createVecLeft()
         self._masked = self._load.duplicate()
         self._free: PETSc.Vec | None = None
-        self._state: ContactState | None = None
+        self._state: FaceContactState | None = None
 
     @property
     def comm(self) -> Any:
@@ -263,7 +263,7 @@ class Interface:
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 
-    def evaluate(self, x: Any) -> ContactState:
+    def evaluate(self, x: Any) -> FaceContactState:
         """Evaluate the contact at displacements; the properties then give its parts.
 
         Args:
@@ -274,7 +274,7 @@ class Interface:
         return self._state
 
     @property
-    def state(self) -> ContactState:
+    def state(self) -> FaceContactState:
         """The contact at the latest `evaluate`.
 
         Raises:

@@ -17,8 +17,8 @@ from geometry.rigid_plane import Control
 from macro import compat
 from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
-from macro.contact.contact_state import ContactState
 from macro.contact.equations import Equilibrium
+from macro.contact.face_contact_state import FaceContactState
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
 from macro.contact.newton import Newton
@@ -85,7 +85,7 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def solve(self, control: Control) -> ContactState:
+    def solve(self, control: Control) -> FaceContactState:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without

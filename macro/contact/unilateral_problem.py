@@ -17,7 +17,7 @@ from macro import compat
 from macro.bodies import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
-from macro.contact.contact_state import ContactState, NodalContact
+from macro.contact.face_contact_state import FaceContactState, NodalContact
 from macro.contact.face_nodes import TopNodes
 from macro.contact.initial_guess import Extrapolation
 from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace
@@ -76,7 +76,7 @@ class UnilateralContactProblem:
         self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(face, self.top, self._plane)
         self._history = Extrapolation(self.body.owned_dofs, self.method.points)
 
-    def solve(self, control: Control) -> ContactState:
+    def solve(self, control: Control) -> FaceContactState:
         """Find the contact of one load step, with an initial guess from the steps before.
 
         A force and a moment of zero are met to `macro.linear_solvers.constrained.TOLERANCE` of the
@@ -98,7 +98,7 @@ class UnilateralContactProblem:
         compat.collect_garbage(self.body.stiffness.comm)
         return state
 
-    def _state(self, solution: ContactSolution) -> ContactState:
+    def _state(self, solution: ContactSolution) -> FaceContactState:
         """Return the state of a solution; collective."""
         body, top, (plane, moved, _) = self.body, self.top, solution.end
         displacement = body.stiffness.createVecRight()
@@ -114,7 +114,7 @@ class UnilateralContactProblem:
         pressure, patch_force = top.pressure(nodal_force), top.patch_sums(solution.nodal_force)
         whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
         (approach, tx, ty), (xc, yc) = map(float, plane), map(float, self._plane.centre)
-        return ContactState(
+        return FaceContactState(
             plane=RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)),
             force=float(loads[0]),
             moment=loads[1:],
@@ -145,7 +145,7 @@ class UnilateralContactProblem:
         )
 
 
-def nodal_contact(problem: UnilateralContactProblem, state: ContactState) -> NodalContact:
+def nodal_contact(problem: UnilateralContactProblem, state: FaceContactState) -> NodalContact:
     """Gather the contact of all nodes of the top, in the order of their places.
 
     Args:

@@ -7,6 +7,7 @@ import difflib
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from multiscale.inputs.memory import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures
+from multiscale.output.results import pictures_of, surface_picture, write_pictures
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
@@ -82,7 +83,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         assert table is not None
 
         def draw() -> Figure:
-            from multiscale.output.figures import law_figure
+            from multiscale.figures.curves import law_figure
 
             return law_figure(table)
 
@@ -122,13 +123,8 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         coupling = _coupling(scene, comm)
         terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
 
-        def draw() -> Figure:
-            from multiscale.output.figures import surface_figure_of
-
-            return surface_figure_of(coupling)
-
         def write() -> list[Path]:
-            pictures = pictures_of("surface", draw)
+            pictures = pictures_of("surface", partial(surface_picture, coupling))
             if pictures.problem:
                 terminal.say(None, pictures.problem)
             return write_pictures(folder, pictures.files)

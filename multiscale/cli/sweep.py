@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import itertools
 import math
 import os
 import time
@@ -14,15 +13,14 @@ from typing import Any
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures
+from multiscale.output.results import pictures_of, write_pictures, write_records
 from multiscale.restart.results_folder import locked
-from multiscale.sweeps.cases import Case, sweep_cases, values_from_text
-from multiscale.sweeps.journal import CaseResult
-from multiscale.sweeps.sweep import JOURNAL, part_name, sweep
-from multiscale.sweeps.sweep_results import SweepResults
+from multiscale.studies.cases import Case, sweep_cases, values_from_text
+from multiscale.studies.running import JOURNAL, CaseResult, part_name
+from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root
 from support.errors import InputError, NotConverged
-from support.whole_files import remove, write_csv
+from support.whole_files import remove
 
 MOST_LINES = 20
 """Ensembles that are told in the terminal; the files hold all of them."""
@@ -58,17 +56,17 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
                 if result.failure:
                     ended(f"case {case.number}: {result.failure}")
 
-            found = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = _write(folder, found, comm, figures=bool(scene.output.figures))
-    for text in _summary(found):
+            done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
+        files = on_root(comm, lambda: _write(folder, done, figures=bool(scene.output.figures)))
+    for text in _summary(done):
         terminal.say(comm, text)
     terminal.show_files(comm, files)
-    if found.unfinished:
-        terminal.say(comm, f"{found.unfinished} of {len(found)} cases are left to other parts")
-    if failures := found.failures:
+    if done.unfinished:
+        terminal.say(comm, f"{done.unfinished} of {len(done)} cases are left to other parts")
+    if failures := done.failures:
         name, reason = next(iter(failures.items()))
         raise NotConverged(
-            f"{len(failures)} of {len(found)} cases, the first with {name}: {reason}",
+            f"{len(failures)} of {len(done)} cases, the first with {name}: {reason}",
             reason="CASES_FAILED",
             iterations=0,
             remedy="cases.csv has the reason of each",
@@ -90,74 +88,44 @@ def _remove_results(folder: Path) -> None:
         remove(path)
 
 
-def _write(folder: Path, found: SweepResults, comm: Any, *, figures: bool) -> list[Path]:
-    """Write the tables and the figure of the cases that are done; rank 0 writes for all."""
+def _write(folder: Path, done: SweepResults, *, figures: bool) -> list[Path]:
+    """Write the tables and the figure of the cases that are done."""
+    statistics = done.statistics_records() if _statistics(done) else []
     files = [
-        *_write_table(folder / "cases.csv", found.case_records(), comm),
-        *_write_table(folder / "history.csv", found.records(), comm),
+        write_records(folder / f"{name}.csv", records)
+        for name, records in (
+            ("cases", done.case_records()),
+            ("history", done.records()),
+            ("statistics", iter(statistics)),
+        )
     ]
-    statistics = _statistics_records(found)
-    files += _write_table(folder / "statistics.csv", iter(statistics), comm)
     if figures and statistics:
-        pictures = pictures_of("sweep", found.plot)
+        pictures = pictures_of("sweep", done.plot)
         if pictures.problem:
-            terminal.say(comm, pictures.problem)
-        files += on_root(comm, lambda: write_pictures(folder, pictures.files))
-    return files
+            terminal.say(None, pictures.problem)
+        files += write_pictures(folder, pictures.files)
+    return [path for path in files if path is not None]
 
 
-def _write_table(path: Path, records: Iterator[dict[str, Any]], comm: Any) -> list[Path]:
-    """Write records as they come from all ranks; none make no file. All ranks fail together."""
-
-    def write() -> list[Path]:
-        first = next(records, None)
-        if first is None or not (comm is None or comm.rank == 0):
-            return []
-        rows = (list(record.values()) for record in itertools.chain([first], records))
-        return [write_csv(path, list(first), rows)]
-
-    files: list[Path] = []
-    failure: Exception | None = None
-    try:
-        files = write()
-    except Exception as error:  # the other ranks still send what they have
-        failure = error
-    for _ in records:
-        pass
-
-    def outcome() -> list[Path]:
-        if failure is not None:
-            raise failure
-        return files
-
-    return on_root(comm, outcome)
-
-
-def _summary(found: SweepResults) -> Iterator[str]:
+def _summary(done: SweepResults) -> Iterator[str]:
     """Yield a line on the last load step of each ensemble."""
-    yield f"{len(found) - found.unfinished} of {len(found)} cases are done"
-    records = _statistics_records(found)
-    last = max((record["step"] for record in records), default=0)
-    chosen = {
-        name: [one for one in records if one["step"] == last and one["column"] == name]
-        for name in ("force_N", "approach_mm")
-    }
-    pairs = zip(chosen["force_N"], chosen["approach_mm"], strict=True)
-    for force, approach in itertools.islice(pairs, MOST_LINES):
-        values = "".join(f"{key} = {force[key]}, " for key in found.keys if key in force)
-        yield (f"{values}at last: force {_spread(force)} N, approach {_spread(approach, 1e3)} µm")
+    yield f"{len(done) - done.unfinished} of {len(done)} cases are done"
+    for values, part in _statistics(done)[:MOST_LINES]:
+        said = "".join(f"{key} = {value}, " for key, value in values.items())
+        force, approach = _spread(part, "force_N"), _spread(part, "approach_mm", 1e3)
+        yield f"{said}at last: force {force} N, approach {approach} µm"
 
 
-def _spread(record: dict[str, Any], scale: float = 1.0) -> str:
+def _spread(part: Statistics, column: str, scale: float = 1.0) -> str:
     """Return a mean and, where the cases of an ensemble differ, the band about it."""
-    low, middle, high = (scale * record[name] for name in ("low", "mean", "high"))
+    low, middle, high = (scale * part.of(column, name)[-1] for name in ("low", "mean", "high"))
     same = high - low <= 1e-6 * abs(middle)
     return f"{middle:.4g}" if same else f"{middle:.4g} (5 to 95 %: {low:.4g} … {high:.4g})"
 
 
-def _statistics_records(found: SweepResults) -> list[dict[str, Any]]:
-    """Return the statistics; none before all cases are done, or where steps were halved."""
+def _statistics(done: SweepResults) -> list[tuple[dict[str, Any], Statistics]]:
+    """Return the statistics of ensembles; none before all are done, or where steps were halved."""
     try:
-        return [] if found.unfinished else found.statistics_records()
+        return [] if done.unfinished else [one for one in done.statistics if len(one[1].values)]
     except InputError:
         return []

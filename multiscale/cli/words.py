@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from multiscale.comparison import AGAINST
 from multiscale.exports import FORMATS
+from multiscale.studies import AGAINST
 from support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"
@@ -140,8 +140,6 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
     budget = "wall time for all configurations, such as 5min; by default any"
     compare.add_argument("--budget", help=budget, **_TIME)
-    ranks = "processes of each configuration, under mpirun"
-    compare.add_argument("--ranks", type=int, default=1, metavar="N", help=ranks)
     sweep = command(
         "sweep",
         "sweep.sweep_scene",

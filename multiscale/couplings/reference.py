@@ -38,7 +38,7 @@ from multiscale.results.reference_record import ReferenceRecord, reference_recor
 from multiscale.scene.scene import Scene
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactState, MeshQuality, UnilateralContactProblem
+    from macro import FaceContactState, MeshQuality, UnilateralContactProblem
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ class ReferenceCoupling(PressedSurface):
     """
 
     rough_meshes: ReferenceMeshes
-    _last: tuple[ContactState, ...] = field(default=(), init=False)
+    _last: tuple[FaceContactState, ...] = field(default=(), init=False)
 
     @classmethod
     def from_scene(
@@ -185,7 +185,7 @@ class ReferenceCoupling(PressedSurface):
         """
         from macro import nodal_contact
 
-        latest: ContactState = state
+        latest: FaceContactState = state
 
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)

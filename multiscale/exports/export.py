@@ -2,26 +2,90 @@
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Callable, Iterator
+from functools import partial
+from io import StringIO
 from pathlib import Path
 
-from geometry import InputError
+import numpy as np
+
+from geometry import InputError, Regions
 from multiscale.exports import FORMATS
-from multiscale.exports.keywords import abaqus_text, calculix_text
+from multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
 from multiscale.exports.law_module import law_modules
-from multiscale.exports.sampling import Conducts
-from multiscale.exports.tables import csv_text
+from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw
 from support.whole_files import remove, write_text, written
 
 TOLERANCE = 1e-4
 """Error of straight lines between the rows of tables; that of the laws themselves is larger."""
 
-_TABLES = {
-    "csv": ("laws.csv", csv_text),
-    "abaqus": ("laws_abaqus.inp", abaqus_text),
-    "calculix": ("laws_calculix.inp", calculix_text),
-}
 _MODULES = "laws_4c"
+
+CSV_COLUMNS = (
+    "approach_mm", "closure_mm", "pressure_MPa", "stiffness_MPa_per_mm",
+    "contact_area_fraction", "separation_mm", "contacts",
+)  # fmt: skip
+"""Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
+
+Conductances per area follow where they are asked for.
+Laws of regions have the scatter of pressures between their samples as a last column.
+"""
+_STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
+
+
+def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
+    """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
+
+    Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
+    they are the rows of the law. A patch that stays open has none.
+
+    Args:
+        table: The laws.
+        tolerance: Largest error of straight lines between rows, as in `LawSample`.
+        conducts: Conductances per area at stiffnesses; further columns where given.
+    """
+    text = StringIO()
+    writer = csv.writer(text)
+    regions = isinstance(table.patches, Regions)
+    where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
+    names = () if conducts is None else tuple(conducts(np.zeros(1)))
+    writer.writerow((*where, *CSV_COLUMNS, *names, *scatter))
+    for place, law in zip(places(table), table.laws, strict=True):
+        for row in _rows_of(law, tolerance):
+            more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
+            conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
+            writer.writerow((*place.cells, *row, *map(float, conductances), *more))
+    return text.getvalue()
+
+
+def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:
+    """Yield the rows of one law, from the approach on."""
+    try:
+        chosen = sample_law(law, tolerance=tolerance).approach
+    except InputError:  # the pressure is a function of closure nowhere
+        chosen = law.rows.approach[:1]
+    approach = np.union1d(chosen, law.rows.approach[law.rising_rows :])
+    point = law.along(approach)
+    columns = (
+        approach,
+        point.closure,
+        point.pressure,
+        point.stiffness,
+        point.contact_area_fraction,
+        point.separation,
+        point.contacts,
+    )
+    yield from zip(*(column.tolist() for column in columns), strict=True)
+
+
+_TABLES: dict[str, tuple[str, Callable[..., str]]] = {
+    "csv": ("laws.csv", csv_text),
+    "abaqus": ("laws_abaqus.inp", partial(keyword_text, ABAQUS)),
+    "calculix": ("laws_calculix.inp", partial(keyword_text, CALCULIX)),
+}
 
 
 def export_laws(

@@ -18,8 +18,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from multiscale.exports.places import made_by, places, zero_text
-from multiscale.exports.sampling import LEAST_PRESSURE, Conducts, LawSample, sample_patch
+from multiscale.exports.sampling import (
+    LEAST_PRESSURE,
+    Conducts,
+    LawSample,
+    made_by,
+    places,
+    sample_law,
+    zero_text,
+)
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
@@ -46,80 +53,54 @@ With the other types CalculiX 2.20 finds no pressure in such a table, and says n
 _OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
-class Heat(NamedTuple):
-    """Gap conductance of surface interactions.
+class Program(NamedTuple):
+    """How a program takes surface interactions.
 
     Attributes:
-        remark: What is said before its table, as a comment.
-        mark: What every line of the table begins with.
-        conducts: Conductances per area at stiffnesses; None writes no table.
+        remarks: What is said of them at the beginning.
+        rows: Rows of a table at most; beyond the last the tangent continues; None for any.
+        heat: What is said before a table of conductance, as a comment.
+        mark: What every line of that table begins with.
     """
 
-    remark: str
+    remarks: str
+    rows: int | None
+    heat: str
     mark: str
-    conducts: Conducts | None
-
-    def lines(self, law: PatchLaw, sample: LawSample) -> Iterator[str]:
-        """Yield the lines of a law: conductance [N/(mm s K)] over pressure [MPa], from zero on.
-
-        Args:
-            law: The law.
-            sample: Its rows.
-        """
-        if self.conducts is None:
-            return
-        found = self.conducts(law.along(sample.approach).stiffness).get(_HEAT)
-        if found is None:
-            return
-        yield from _comments(f"{_HEAT_UNITS}{self.remark}")
-        yield f"{self.mark}*GAP CONDUCTANCE, PRESSURE"
-        rows = zip(
-            np.maximum(_PER_W_PER_M2K * found, 0.0).tolist(), sample.pressure.tolist(), strict=True
-        )
-        yield from (f"{self.mark}{heat:.12e}, {pressure:.12e}" for heat, pressure in rows)
 
 
-def abaqus_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
-    """Return the surface interactions of all laws for Abaqus.
+ABAQUS = Program(_ABAQUS, None, "", "")
+CALCULIX = Program(_CALCULIX, _CALCULIX_ROWS - 1, _BY_HAND, "** ")
+
+
+def keyword_text(
+    program: Program, table: LawTable, tolerance: float, conducts: Conducts | None = None
+) -> str:
+    """Return the surface interactions of all laws.
 
     Args:
+        program: The program that reads them.
         table: The laws.
-        tolerance: Largest error of straight lines between rows, as in `LawSample`.
+        tolerance: Largest error of straight lines between rows, as in `LawSample`; larger where the
+            program's rows do not suffice.
         conducts: Conductances per area at stiffnesses; none are written when not given.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
     """
-    return _text(table, tolerance, _ABAQUS, None, Heat("", "", conducts))
-
-
-def calculix_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
-    """Return the surface interactions of all laws for CalculiX.
-
-    Args:
-        table: The laws.
-        tolerance: Error of straight lines between rows; larger where 199 rows do not suffice.
-        conducts: Conductances per area at stiffnesses; none are written when not given.
-
-    Raises:
-        InputError: When the pressure of a law is a function of closure nowhere.
-    """
-    return _text(table, tolerance, _CALCULIX, _CALCULIX_ROWS - 1, Heat(_BY_HAND, "** ", conducts))
-
-
-def _text(table: LawTable, tolerance: float, remarks: str, most: int | None, heat: Heat) -> str:
     head = _HEAD.format(zero=zero_text(table), least=LEAST_PRESSURE)
-    lines = _comments(f"{head}\n{remarks}\nMade by: {made_by(table)}")
+    lines = _comments(f"{head}\n{program.remarks}\nMade by: {made_by(table)}")
     for place, law in zip(places(table), table.laws, strict=True):
         lines += _comments("", f"Law of {place.subject} {place.extent}".rstrip())
         lines += _comments(f"mean plane {law.initial_separation:.9g} mm below overclosure 0")
-        sample = sample_patch(law, place, tolerance=tolerance, most=most)
+        sample = sample_law(law, tolerance=tolerance, most=program.rows, subject=place.subject)
         if not len(sample):
             lines += _comments(_OPEN.format(law.first_touch))
             continue
         name = f"{place.kind}_{place.label}".upper()
-        lines += _interaction(name, law, sample, extended=most is not None)
-        lines += heat.lines(law, sample)
+        lines += _interaction(name, law, sample, extended=program.rows is not None)
+        if conducts is not None:
+            lines += _heat(program, law, sample, conducts)
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -140,6 +121,18 @@ def _interaction(name: str, law: PatchLaw, sample: LawSample, *, extended: bool)
         slope = float(law.stiffness(end))
         rows.append((rows[-1][0] + max(slope, 0.0) * (further - end), further))
     yield from (f"{pressure:.12e}, {closure:.12e}" for pressure, closure in rows)
+
+
+def _heat(program: Program, law: PatchLaw, sample: LawSample, conducts: Conducts) -> Iterator[str]:
+    """Yield the lines of conductance [N/(mm s K)] over pressure [MPa], from zero on."""
+    known = conducts(law.along(sample.approach).stiffness).get(_HEAT)
+    if known is None:
+        return
+    yield from _comments(f"{_HEAT_UNITS}{program.heat}")
+    yield f"{program.mark}*GAP CONDUCTANCE, PRESSURE"
+    heat = np.maximum(_PER_W_PER_M2K * known, 0.0).tolist()
+    for row in zip(heat, sample.pressure.tolist(), strict=True):
+        yield program.mark + "{:.12e}, {:.12e}".format(*row)
 
 
 def _comments(*texts: str) -> list[str]:

@@ -13,8 +13,7 @@ import inspect
 from bisect import bisect_right
 from collections.abc import Callable
 
-from multiscale.exports.places import made_by, places, zero_text
-from multiscale.exports.sampling import no_function
+from multiscale.exports.sampling import made_by, no_function, places, zero_text
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
@@ -114,7 +113,7 @@ def law_modules(table: LawTable) -> dict[str, str]:
     texts = {}
     for place, law in zip(places(table), table.laws, strict=True):
         if law.is_flat:
-            raise no_function(place)
+            raise no_function(place.subject)
         name = f"law_{place.label}.py"
         head = _HEAD.format(
             subject=place.subject,

@@ -1,16 +1,19 @@
-"""Rows of a patch law between which straight lines are close enough to it."""
+"""What is exported of a law: where it holds, and rows between which straight lines are close to it.
+
+Names of places are plain ASCII, which every program reads.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError
-from multiscale.exports.places import Place
-from multiscale.laws.interpolation import LawPoint
+from geometry import InputError, Regions
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 
 Array = NDArray[np.float64]
@@ -26,6 +29,80 @@ _CHECKS = 3  # between two candidates, where the error is measured
 _SHARE = 0.98  # of the tolerance, for what errors exceed those at the candidates by
 _RELAXATION = 1.1  # of the tolerance at least, until the rows are few enough
 _LEAST_RISE = 1e-9  # of a pressure from row to row, relative to the largest
+_LONGEST = 40  # characters of a region's name; keyword programs take 80 with what stands before
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Place:
+    """Where a law holds.
+
+    Attributes:
+        kind: ``"patch"`` or ``"region"``.
+        label: What names of files and interactions end with: letters, digits and underscores.
+        subject: The patch or region, as prose.
+        extent: The rectangle of a patch; a region, which may be of any outline, has none.
+        cells: What says in a row of a table where the law holds.
+    """
+
+    kind: str
+    label: str
+    subject: str
+    extent: str
+    cells: tuple[int | str, ...]
+
+
+def places(table: LawTable) -> list[Place]:
+    """Return the places of the laws, in their order.
+
+    Regions keep their names where these make different labels, and are numbered otherwise.
+
+    Args:
+        table: The laws.
+    """
+    if isinstance(table.patches, Regions):
+        names = table.patches.names
+        labels = [re.sub(r"\W+", "_", plain(name).replace("?", " ")).strip("_") for name in names]
+        short = [label[:_LONGEST].lower() for label in labels]
+        if not all(short) or len(set(short)) < len(short):
+            short = [str(index) for index in range(len(names))]
+        return [
+            Place(
+                kind="region", label=label, subject=f"region '{plain(name)}'", extent="",
+                cells=(name,),
+            )
+            for name, label in zip(names, short, strict=True)
+        ]  # fmt: skip
+    of_patches = []
+    for index in range(table.patches.count):
+        (ix, iy), (x, y) = table.patches.unravel(index), table.patches.bounds(index)
+        extent = f"{x[0]:.9g} < x < {x[1]:.9g}, {y[0]:.9g} < y < {y[1]:.9g} [mm]"
+        of_patches.append(
+            Place(
+                kind="patch", label=f"{ix}_{iy}", subject=f"patch ({ix}, {iy})", extent=extent,
+                cells=(ix, iy),
+            )
+        )  # fmt: skip
+    return of_patches
+
+
+def made_by(table: LawTable) -> str:
+    """Return how laws were made, on one line."""
+    return plain(", ".join(f"{name} {value}" for name, value in table.made_by.items()))
+
+
+def zero_text(table: LawTable) -> str:
+    """Return what the closures of laws count from, as prose."""
+    named = {
+        "first touch": "the highest point of the roughness",
+        "mean plane": "the mean of the heights of the roughness",
+    }
+    return named.get(table.zero, f"the {table.zero} of the heights of the roughness")
+
+
+def plain(text: str) -> str:
+    """Return a text that can stand in comments and docstrings: ASCII on one line, no quotes."""
+    ascii_text = text.encode("ascii", "replace").decode().replace("\\", "/").replace('"', "'")
+    return " ".join(ascii_text.split())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,33 +128,15 @@ class LawSample:
         return len(self.closure)
 
 
-def sample_patch(
-    law: PatchLaw, place: Place, *, tolerance: float, most: int | None = None
-) -> LawSample:
-    """Choose rows on the law of a patch or region, see `sample_law`.
-
-    Args:
-        law: The law.
-        place: Where it holds.
-        tolerance: Largest error, as in `LawSample`.
-        most: Rows at most; the tolerance is raised until they suffice.
-
-    Raises:
-        InputError: When the pressure is a function of closure nowhere; names the place.
-    """
-    try:
-        return sample_law(law, tolerance=tolerance, most=most)
-    except InputError:
-        raise no_function(place) from None
-
-
-def no_function(place: Place) -> InputError:
+def no_function(subject: str) -> InputError:
     """Return the error of a law that contact programs cannot take."""
-    problem = f"the pressure of {place.subject} is no function of closure from first touch on"
+    problem = f"the pressure of {subject} is no function of closure from first touch on"
     return InputError(problem, allowed="csv, or consistent laws, or larger patches")
 
 
-def sample_law(law: PatchLaw, *, tolerance: float, most: int | None = None) -> LawSample:
+def sample_law(
+    law: PatchLaw, *, tolerance: float, most: int | None = None, subject: str = "the law"
+) -> LawSample:
     """Choose rows on a law, as far apart as a tolerance lets them be.
 
     A row follows the one before it at the largest distance at which the chord is within the
@@ -88,6 +147,7 @@ def sample_law(law: PatchLaw, *, tolerance: float, most: int | None = None) -> L
         law: The law. A patch that stays open has no rows.
         tolerance: Largest error, as in `LawSample`.
         most: Rows at most; the tolerance is raised until they suffice.
+        subject: What errors call the patch or region.
 
     Raises:
         InputError: When the pressure is a function of closure nowhere.
@@ -97,7 +157,7 @@ def sample_law(law: PatchLaw, *, tolerance: float, most: int | None = None) -> L
         return LawSample(approach=nothing, closure=nothing, pressure=nothing, error=0.0, repair=0.0)
     rising = repaired_law(law)
     if law.is_flat or rising.is_flat:
-        raise InputError("the pressure is no function of closure from first touch on")
+        raise no_function(subject)
     approach, closure, pressure = _candidates(rising)
     scale = np.maximum(pressure, LEAST_PRESSURE * pressure[-1])
     scale *= _SHARE
@@ -123,7 +183,7 @@ def _candidates(law: PatchLaw) -> tuple[Array, Array, Array]:
     within = knots[1:-1, None] + np.diff(knots[1:])[:, None] * steps
     begun = knots[0] + (knots[1] - knots[0]) * first
     approach = np.concatenate((begun, within.ravel(), knots[-1:]))
-    point: LawPoint = law.along(approach)
+    point = law.along(approach)
     ascends = np.append(True, point.closure[1:] > np.maximum.accumulate(point.closure)[:-1])
     return approach[ascends], point.closure[ascends], point.pressure[ascends]
 

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from geometry import Surface
 from geometry.materials import von_mises
 from micro.half_space.stresses_below import stresses_below
+from multiscale.figures.contact import record_text
+from multiscale.figures.maps import blocks_of
 from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
 
 Array = NDArray[np.float64]
@@ -61,6 +63,18 @@ def block_figure(
     return figure
 
 
+def contact_block(surface: Surface, record: Any, poisson_ratio: float) -> Figure:
+    """Draw a rough surface with the contact of a load step, see `block_figure`.
+
+    Args:
+        surface: The surface.
+        record: A `multiscale.results.contact_record.ContactRecord` with pressures of its cells.
+        poisson_ratio: Poisson's ratio of the body.
+    """
+    pressure = np.asarray(record.pressure_MPa)
+    return block_figure(surface, pressure, poisson_ratio, title=record_text(record))
+
+
 class BlockView:
     """Everything that is drawn, in µm; seen from the front right corner above.
 
@@ -73,9 +87,9 @@ class BlockView:
     def __init__(self, surface: Surface, pressure: Array, poisson_ratio: float) -> None:
         lengths = 1e3 * np.asarray(surface.lengths)
         steps = [-(-count // _MOST_CELLS) for count in surface.grid]
-        height = _blocks(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
-        largest = _blocks(pressure, steps).max(axis=(1, 3))
-        loads = _blocks(pressure, steps).mean(axis=(1, 3))
+        height = blocks_of(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
+        largest = blocks_of(pressure, steps).max(axis=(1, 3))
+        loads = blocks_of(pressure, steps).mean(axis=(1, 3))
         row = int(loads.sum(axis=0).argmax())
         # what lies behind the cut is shown: the larger part, from the other side if need be
         self.turned = row >= largest.shape[1] / 2
@@ -202,13 +216,6 @@ class BlockView:
         axes.plot(*self.seen(*np.transpose([at, np.add(at, out)])), color="0.25", lw=0.7)
         px, py = self.seen(*np.add(at, np.multiply(1.6, out)))
         axes.text(px, py, text, fontsize=7, ha=ha, va=va)
-
-
-def _blocks(field: Array, steps: list[int]) -> Array:
-    """Return a field in blocks of cells, shape (mx, steps x, my, steps y); the rest is cut off."""
-    mx, my = (n // step for n, step in zip(field.shape, steps, strict=True))
-    whole = field[: mx * steps[0], : my * steps[1]]
-    return whole.reshape(mx, steps[0], my, steps[1])
 
 
 def _means(field: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The contact at one load step: maps of pressure and gap, sizes of spots, share of pressures."""
+"""The contact at one load step: maps of pressures and gaps, sizes of spots, share of pressures."""
 
 from __future__ import annotations
 
@@ -8,17 +8,22 @@ import numpy as np
 from matplotlib.collections import EllipseCollection
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
-from multiscale.figures.maps import coarsened, colour_bar, map_axes
+from geometry.patches import PatchGrid
+from geometry.surface import Surface
+from multiscale.figures.maps import coarsened, colour_bar, draw_face, draw_pressures, map_axes
 from multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
     GAPS,
+    ONE_COLUMN,
     PRESSURES,
     VERMILLION,
     new_figure,
     styled,
 )
+from multiscale.figures.surface import draw_surface
 from multiscale.readable import quantity, usual_unit
 
 _SHOWN = 0.99
@@ -27,6 +32,16 @@ _PER_DECADE = 8
 """Bars of the histogram per factor of ten in the area."""
 _MOST_OUTLINED = 500
 """Spots that have outlines; those of more would hide their colours."""
+
+
+def load_text(step: Any) -> str:
+    """Return approach and force of a load step, as titles say them."""
+    return f"approach {quantity(step.approach_mm, 'mm')}, force {quantity(step.force_N, 'N')}"
+
+
+def record_text(record: Any) -> str:
+    """Return what a recorded contact is of, as titles say it."""
+    return f"load step {record.step}: {load_text(record)}, {len(record.spots)} spots"
 
 
 @styled()
@@ -46,10 +61,7 @@ def contact_figure(record: Any) -> Figure:
         _draw_gaps(panels[1], record)
         _draw_shares(panels[3], record)
     _draw_sizes(panels[2 if fields else 1], record)
-    figure.suptitle(
-        f"load step {record.step}: approach {quantity(record.approach_mm, 'mm')}, "
-        f"force {quantity(record.force_N, 'N')}, {len(record.spots)} spots"
-    )
+    figure.suptitle(record_text(record))
     return figure
 
 
@@ -155,3 +167,65 @@ def _in_unit(values: Any, unit: str) -> tuple[str, Any]:
     """Return the unit that suits the largest of values, and the values in it."""
     name, size = usual_unit([float(np.max(values, initial=0.0))], unit)
     return name, values / size
+
+
+@styled()
+def pressure_figure(history: Any) -> Figure:
+    """Draw the patch pressures of the last load step as a map, with their values.
+
+    Args:
+        history: A `multiscale.results.history.History`.
+    """
+    figure = new_figure(ONE_COLUMN, 2.9)
+    axes = figure.add_subplot()
+    last = history.steps[-1]
+    draw_pressures(axes, history.patches, last.patches.pressure_MPa)
+    bar = f" ({history.reference.label})" if history.reference else ""
+    axes.set_title(load_text(last) + bar)
+    return figure
+
+
+@styled()
+def overview_figure(
+    surface: Surface, is_sample: bool, history: Any, face: NDArray[np.float64] | None
+) -> Figure:
+    """Draw the surface beside the pressures on it: of cells, spots, the face or patches.
+
+    Args:
+        surface: The surface.
+        is_sample: Whether it is a sample of a larger one.
+        history: A `multiscale.results.history.History`.
+        face: Pressures on a face with laws of samples, see `face_figure`; None without.
+    """
+    figure = new_figure(FULL_WIDTH, 2.8)
+    left, right = figure.subplots(1, 2)
+    draw_surface(left, surface, None)
+    left.set_title("surface" + " of a sample" * is_sample)
+    record, last = history.contact, history.steps[-1]
+    if record is not None:
+        draw_contact(right, record)
+    elif face is not None:
+        draw_face(right, face)
+        right.set_title("contact pressure, averaged over the roughness")
+    elif isinstance(history.patches, PatchGrid):
+        draw_pressures(right, history.patches, last.patches.pressure_MPa)
+        right.set_title("mean pressure of every patch; open ones white")
+    else:
+        right.axis("off")
+    return figure
+
+
+@styled()
+def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
+    """Draw the pressures on a contact face of any outline at a load step.
+
+    Args:
+        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+        step: The load step.
+    """
+    figure = new_figure(FULL_WIDTH, 4.2)
+    axes = figure.add_subplot()
+    draw_face(axes, points)
+    mean = quantity(step.mean_pressure_MPa, "MPa", 3)
+    axes.set_title(f"{load_text(step)}, mean pressure {mean}")
+    return figure

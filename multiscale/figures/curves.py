@@ -1,16 +1,21 @@
-"""The curves of a history: force, contact area and mean separation."""
+"""Curves of load steps and of patch laws."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
+from geometry.patches import PatchGrid
+from multiscale.figures.maps import map_axes, place_colours
 from multiscale.figures.style import (
     BLUE,
     COLOURS,
     FULL_WIDTH,
+    NO_CONTACT,
+    PALETTE,
     add_legend,
     new_figure,
     show_unit,
@@ -19,6 +24,9 @@ from multiscale.figures.style import (
 
 MOST_MARKED = 500
 """Load steps that have a symbol each; more of them are drawn as lines alone."""
+
+MOST_MARKED_LAWS = 36
+"""Laws whose rows are marked; the dots of more would hide the curves."""
 
 
 @styled()
@@ -82,3 +90,65 @@ def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None
     if area is not None:
         middle, error = 100 * record.area.value, 100 * record.area.error
         area.fill_between(pressure, middle - error, middle + error, **look)
+
+
+@styled()
+def law_figure(table: Any) -> Figure:
+    """Draw pressure and area fraction of every law over closure, coloured by place on the face.
+
+    Args:
+        table: A `multiscale.laws.law_table.LawTable` of patches, which gets a key of their colours,
+            or of regions, which get their names.
+    """
+    figure = new_figure(FULL_WIDTH, 2.7)
+    on_grid = isinstance(table.patches, PatchGrid) and table.patches.count > 1
+    pressure, area, *key = figure.subplots(1, 2 + on_grid)
+    colours, names = _law_colours(table)
+    closing = [index for index, law in enumerate(table.laws) if not law.is_open]
+    few = len(closing) <= MOST_MARKED_LAWS
+    for index in closing:
+        law, look = table.laws[index], {"color": colours[index], "lw": 1.2 if few else 0.6}
+        closure = np.linspace(law.range[0], law.range[1], 200)
+        pressure.plot(1e3 * closure, law.at(closure).pressure, label=names[index], **look)
+        area.plot(1e3 * closure, 100 * law.at(closure).contact_area_fraction, **look)
+        if few:
+            dots = 1e3 * law.rows.closure, law.rows.pressure
+            pressure.plot(*dots, ".", ms=3, color=colours[index])
+    ends = [table.laws[index].range[1] for index in closing]
+    tops = [table.laws[index].rows.pressure[-1] for index in closing]
+    area.set(ylabel="contact area fraction [%]")
+    show_unit(pressure.yaxis, "mean pressure", "MPa", tops)
+    for axes in (pressure, area):
+        show_unit(axes.xaxis, "closure", "mm", ends, 1e-3)
+    if key:
+        _draw_places(key[0], table, colours)
+    elif len(closing) > 1:
+        pressure.legend()
+    what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
+    rows = "; dots are their rows" if few else ""
+    figure.suptitle(f"laws of {len(closing)} of {table.patches.count} {what}{rows}")
+    return figure
+
+
+def _law_colours(table: Any) -> tuple[Any, list[str]]:
+    """Return the colour of each law, by its place on the face or its region, and its name."""
+    patches = table.patches
+    if not isinstance(patches, PatchGrid):
+        return [PALETTE[i % len(PALETTE)] for i in range(patches.count)], list(patches.names)
+    if patches.count == 1:
+        return [BLUE], [""]
+    return place_colours(patches.centres / np.array(patches.lengths)), [""] * patches.count
+
+
+def _draw_places(axes: Any, table: Any, colours: Any) -> None:
+    """Draw the face with its patches in the colours of their laws; open ones are white."""
+    patches = table.grid
+    scale = map_axes(axes, patches.lengths)
+    is_open = np.array([law.is_open for law in table.laws])
+    shown = np.where(is_open[:, None], np.array(to_rgb(NO_CONTACT)), colours)
+    borders = scale * patches.borders_x, scale * patches.borders_y
+    mesh = axes.pcolormesh(*borders, np.zeros(patches.grid[::-1]))
+    mesh.set_array(None)
+    by_rows = shown.reshape(*patches.grid, 3).swapaxes(0, 1).reshape(-1, 3)
+    mesh.set(facecolor=by_rows, edgecolor="0.8", linewidth=0.4)
+    axes.set_title("colours by place; open: white")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,8 +18,11 @@ Array = NDArray[np.float64]
 MOST_NUMBERED_PATCHES = 36
 """A map of more patches shows colours alone; the numbers would cover each other."""
 
-MOST_POINTS = 420
+MOST_CELLS = 420
 """Cells a side of a map that is drawn; of more, blocks of cells are shown."""
+
+MOST_POINTS = 40_000
+"""Points of a face that are drawn at most."""
 
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
@@ -127,6 +131,31 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if value >= 99.5 else number(value, 2)
 
 
+def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
+    """Draw the pressures on a contact face of any outline.
+
+    What bears no pressure is pale grey, so that the outline is seen.
+
+    Args:
+        axes: Axes to draw into.
+        points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
+    """
+    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
+    lengths = float(np.ptp(x)), float(np.ptp(y))
+    scale = map_axes(axes, lengths)
+    axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
+    inches = axes.get_position().width * axes.figure.get_figwidth()
+    size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
+    look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
+    loaded = pressure > 0.0
+    axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
+    place = scale * x[loaded], scale * y[loaded]
+    name, unit = usual_unit([float(pressure.max())], "MPa")
+    dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)
+    dots.set_clim(0.0, float(pressure.max()) / unit or 1.0)
+    colour_bar(dots, axes, f"contact pressure [{name}]")
+
+
 def place_colours(shares: Array) -> Array:
     """Return colours by place on a face: from blue to orange along x, from dark to light along y.
 
@@ -143,7 +172,7 @@ def place_colours(shares: Array) -> Array:
     return found
 
 
-def coarsened(values: Any, *, largest: bool, most: int = MOST_POINTS) -> Any:
+def coarsened(values: Any, *, largest: bool, most: int = MOST_CELLS) -> Any:
     """Return a field on few enough cells to draw; what lies beyond whole blocks is left out.
 
     Args:
@@ -155,9 +184,19 @@ def coarsened(values: Any, *, largest: bool, most: int = MOST_POINTS) -> Any:
     step = -(-max(values.shape) // most)
     if step == 1:
         return values
-    nx, ny = (n // step * step for n in values.shape)
-    blocks = values[:nx, :ny].reshape(nx // step, step, ny // step, step)
+    blocks = blocks_of(values, (step, step))
     if largest:
         return blocks.max(axis=(1, 3))
     hidden = np.ma.getmaskarray(blocks).any(axis=(1, 3))
     return np.ma.masked_where(hidden, blocks.mean(axis=(1, 3)))
+
+
+def blocks_of(field: Any, steps: Sequence[int]) -> Any:
+    """Return a field in blocks of cells, shape (mx, steps x, my, steps y); the rest is cut off.
+
+    Args:
+        field: The field, possibly masked, shape (nx, ny).
+        steps: Cells of a block along x and y.
+    """
+    mx, my = (n // step for n, step in zip(field.shape, steps, strict=True))
+    return field[: mx * steps[0], : my * steps[1]].reshape(mx, steps[0], my, steps[1])

@@ -41,9 +41,6 @@ MODELS: dict[str, dict[str, Any]] = {
 }
 """Look of each micro model; those without interaction are dashed, with hollow markers."""
 
-LINE_STYLES = ("-", "--", "-.", ":", (0, (3, 1, 1, 1, 1, 1)))
-"""Line styles of curves that are drawn over each other."""
-
 HEIGHTS = colormaps["cividis"]
 """Colours of heights."""
 PRESSURES = ListedColormap(colormaps["YlOrRd"](np.linspace(0.12, 1.0, 256)), name="pressures")

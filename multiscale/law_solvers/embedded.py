@@ -17,7 +17,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactState, FacePair, LawContactProblem, LoadedFace
+    from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ class EmbeddedLaws:
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
         self._problem, self.table, self.face = problem, table, face
-        self._last: ContactState | None = None
+        self._last: FaceContactState | None = None
 
     @property
     def displacement(self) -> Array:
@@ -117,7 +117,7 @@ class EmbeddedLaws:
                 self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
-    def _step(self, control: Control, state: ContactState) -> LoadStep:
+    def _step(self, control: Control, state: FaceContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
         laws = self.table.laws
 
@@ -147,7 +147,7 @@ class EmbeddedLaws:
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_contacts(self, state: ContactState) -> dict[str, Any]:
+    def _of_contacts(self, state: FaceContactState) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.
 
         Where laws are those of samples, contacts are counted on the area of the samples, and the

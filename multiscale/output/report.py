@@ -10,11 +10,17 @@ from importlib.metadata import version
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
-from multiscale.output.citation import citations
 from multiscale.output.provenance import library_versions
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
 from multiscale.run import Run
+
+PAPER = (
+    "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
+    "mechanics of rough surfaces. Tribology International (2016), "
+    "doi 10.1016/j.triboint.2015.12.023"
+)
+"""The paper whose method is implemented."""
 
 _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
 """Topics of the plan that say what was computed; the others say how, and are folded."""
@@ -122,3 +128,12 @@ def _made(run: Run, options: list[str]) -> list[tuple[str, str]]:
         ("PETSc options", " ".join(options) or "none given"),
         ("libraries", versions),
     ]
+
+
+def citations() -> tuple[str, str]:
+    """Return the references of the program, in the installed version, and of the paper."""
+    program = (
+        "The patchlaw developers: patchlaw: multiscale contact of rough surfaces in FEniCSx. "
+        f"Version {version('patchlaw')}"
+    )
+    return program, PAPER

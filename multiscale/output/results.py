@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from multiscale.couplings.coupling import Coupling
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
@@ -102,6 +105,19 @@ def write_tables(folder: Path, history: History) -> list[Path]:
     return files
 
 
+def write_records(path: Path, records: Iterator[Mapping[str, Any]]) -> Path | None:
+    """Write records as rows; the names of the first one's values are the columns.
+
+    Args:
+        path: File to write.
+        records: The records; none make no file.
+    """
+    first = next(records, None)
+    if first is None:
+        return None
+    return write_csv(path, list(first), (list(one.values()) for one in chain([first], records)))
+
+
 def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path]:
     """Write ``contacts.csv`` and, where fields are known, ``contact.h5``, with a group a load step.
 
@@ -177,29 +193,46 @@ def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
 
 
 def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
-    """Return what draws each figure of a run; matplotlib is loaded only by ranks that draw."""
-    coupling, history, laws = run.coupling, run.history(), run.laws
-    face = coupling.face_pressures()
+    """Return the functions that draw the figures of a run, by their names.
 
-    def by(name: str, *content: Any) -> Callable[[], Figure]:
-        """Draw by a function of `multiscale.output.figures`."""
-        return lambda: getattr(import_module("multiscale.output.figures"), name)(*content)
-
-    figures = {
-        "overview": by("overview_figure", coupling, history, face),
-        "surface": by("surface_figure_of", coupling),
-        "curves": lambda: history.plot(run.scene.kind),
+    Note:
+        Collective; drawing is not.
+    """
+    coupling, history, face = run.coupling, run.history(), run.coupling.face_pressures()
+    surface, of_samples = coupling.surface, coupling.regions is not None
+    figures: dict[str, Callable[[], Figure]] = {
+        "overview": _from("contact", "overview_figure", surface, of_samples, history, face),
+        "surface": partial(surface_picture, coupling),
+        "curves": partial(history.plot, run.scene.kind),
     }
-    if coupling.regions is None:
-        figures["pressures"] = by("pressure_figure", history)
+    if not of_samples:
+        figures["pressures"] = _from("contact", "pressure_figure", history)
     if face is not None:
-        figures["face"] = by("face_figure", face, history.steps[-1])
+        figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
     if run.contacts:
         contact = run.contacts[-1]
         figures["contact"] = contact.plot
-        of_cells = getattr(contact.pressure_MPa, "shape", None) == coupling.surface.grid
+        of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
         if run.scene.output.figures == "all" and of_cells:
-            figures["block"] = by("block_figure_of", coupling, contact)
-    if laws is not None:
-        figures["laws"] = by("law_figure", laws)
+            ratio = coupling.materials.first.poisson_ratio
+            figures["block"] = _from("block", "contact_block", surface, contact, ratio)
+    if coupling.table is not None:
+        figures["laws"] = _from("curves", "law_figure", run.laws)
     return figures
+
+
+def surface_picture(coupling: Coupling) -> Figure:
+    """Draw the surface of a scene, with its summits where the micro model uses them.
+
+    Args:
+        coupling: What was made of the scene.
+    """
+    from multiscale.figures.surface import surface_figure  # loads matplotlib
+
+    target = coupling.scene.surface.spectrum
+    return surface_figure(coupling.surface, coupling.summits, coupling.patches, target)
+
+
+def _from(module: str, function: str, *arguments: Any) -> Callable[[], Figure]:
+    """Return what draws a figure; matplotlib is loaded only when it is called."""
+    return lambda: getattr(import_module(f"multiscale.figures.{module}"), function)(*arguments)

@@ -7,15 +7,14 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from hypothesis import strategies as st
 
-from geometry.patches import PatchGrid
 from helpers.scene_inputs import scenes, takes_long
 from multiscale.cli.compare import comparison_html
-from multiscale.comparison import AGAINST
-from multiscale.comparison.compare import compare
-from multiscale.comparison.configuration import Curves, RunResult
+from multiscale.output.results import write_records
 from multiscale.scene.scene import Scene
+from multiscale.studies import AGAINST
+from multiscale.studies.comparison import compare
+from multiscale.studies.running import CaseResult
 from support.errors import InputError, NotConverged
-from support.whole_files import write_csv
 
 STATUSES = ("done", "done", "done", "not converged", "refused", "failed", "over budget")
 SIZES = (0.0, 1.0, 1.0, 1.0, 1e-30, 1e30)
@@ -25,50 +24,46 @@ asked = st.tuples(
 )
 
 
-def ended(dice, configuration, seconds):
+def ended(dice, configuration, comm, seconds):
     """Return how a configuration may end: well, early or badly, with odd numbers."""
     status, load_history = dice.choice(STATUSES), configuration.scene.loading
     whole = len(load_history.targets)
     steps = np.arange(1.0, 1.0 + (whole if status == "done" else dice.randrange(whole)))
-    patches = PatchGrid(grid=configuration.scene.patches.grid, lengths=(1.0, 1.0))
+    patches = configuration.scene.patches.grid
     numbers = {
         name: dice.choice(SIZES) * dice.uniform(0.5, 1.5) * steps
         for name in ("approach", "force", "area", "separation")
     }
     bar = dice.choice([0.0, 0.01, np.nan])
-    curves = Curves(
-        patches=patches,
-        patch_pressure=np.outer(numbers["force"], np.ones(patches.count)),
-        **numbers,
-        **{f"{name}_error": bar * numbers[name] for name in ("approach", "force", "area")},
-    )
-    return RunResult(
-        configuration=configuration,
+    numbers |= {f"{name}_error": bar * numbers[name] for name in ("approach", "force", "area")}
+    pressure = np.outer(numbers["force"], np.ones(patches[0] * patches[1]))
+    measured = {
+        "exit_code": dice.choice([0, 2, 3, 5]),
+        "phases": dice.choice([{}, {"laws": 0.5, "load steps": 1.0}, {"surface": 0.0}]),
+        "cpu_s": dice.choice([0.0, 1.0]),
+        "finite_slopes": dice.choice([True, True, False]),
+    }
+    return CaseResult(
         status=status,
-        exit_code=dice.choice([0, 2, 3, -9, None]),
-        message=dice.choice(["", "told <b>why</b>\nin two lines"]),
-        phases=dice.choice([{}, {"laws": 0.5, "load steps": 1.0}, {"surface": 0.0}]),
-        start_s=dice.uniform(0.0, 1.0),
-        cpu_s=dice.choice([0.0, 1.0]),
-        curves=curves,
-        finite_slopes=dice.choice([True, True, False]),
+        failure=dice.choice(["", "told <b>why</b>\nin two lines"]),
+        measured=measured,
+        arrays=numbers | {"patch_pressure": pressure, "patches": np.array(patches)},
     )
 
 
 def compared(path, number, against=None):
     """Compare the configurations of a scene, all but their runs; return how that ended."""
-    launch = partial(ended, random.Random(number))
+    solve = partial(ended, random.Random(number))
     try:
         scene = Scene.load(path)
         if takes_long(scene):
             return "not tried"
         with TemporaryDirectory(dir=path.parent) as folder:
             kept = path.parent / folder
-            found = compare(scene, against=against, launch=launch, folder=kept)
-            again = compare(scene, against=against, launch=launch, folder=kept)
+            found = compare(scene, against=against, solve=solve, folder=kept)
+            again = compare(scene, against=against, solve=solve, folder=kept)
             assert len(again) == len(found)
-            columns = found.to_dict()
-            write_csv(kept / "a.csv", list(columns), zip(*columns.values(), strict=True))
+            write_records(kept / "a.csv", iter(found.records()))
         page = comparison_html(found, {})
         assert "<b>why" not in page
     except InputError as error:

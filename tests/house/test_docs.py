@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale.exports.tables import CSV_COLUMNS
+from multiscale.exports.export import CSV_COLUMNS
 from multiscale.output.results import FILES
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
 from multiscale.results.extrapolation import Estimate

@@ -64,7 +64,7 @@ FLOORS = {
         "setup",
         "run",
         "doctor output restart",
-        "comparison compiled_forms sweeps",
+        "compiled_forms studies",
         "cli",
         "__main__",
     ],

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from multiscale.cli.command_line import main
-from multiscale.comparison.compare import AGAINST
+from multiscale.studies import AGAINST
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [

@@ -12,8 +12,8 @@ import pytest
 
 from multiscale import Scene, make_setup, run
 from multiscale.cli.command_line import main
+from multiscale.figures.contact import pressure_figure
 from multiscale.figures.curves import history_figure
-from multiscale.output.figures import pressure_figure
 from multiscale.results.reference_record import reference_record
 from support.errors import InputError
 

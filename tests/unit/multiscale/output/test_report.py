@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from multiscale.output.citation import citations
-from multiscale.output.report import report_html
+from multiscale.output.report import citations, report_html
 from multiscale.readable import percent, quantity
 from multiscale.results.html_page import filled, table_html
 from multiscale.run import Run

@@ -1,33 +1,33 @@
 """What the figure of error over time tells: the whole frontier, and nothing over another."""
 
+import tomllib
+
 import numpy as np
 import pytest
+from helpers.small_scene import SMALL_SCENE
 from matplotlib.text import Text
 
-from geometry.patches import PatchGrid
-from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.configuration import Configuration, Curves
-from multiscale.comparison.error_over_time import pareto_figure
-from multiscale.comparison.errors import ErrorMeasures
+from multiscale.scene.scene import Scene
+from multiscale.studies.comparison import Comparison
+from multiscale.studies.errors import NO_ERRORS, Row
+from multiscale.studies.figures import comparison_figure
+from multiscale.studies.running import CaseResult
 
-PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-CURVES = ("approach", "force", "area", "separation", "approach_error", "force_error", "area_error")
 KINDS = ("analytic", "isolated", "consistent", "concurrent", "reference")
+BASE = Scene.from_dict(tomllib.loads(SMALL_SCENE))
+SCENES = {kind: BASE.with_({"coupling.kind": kind}) for kind in KINDS}
 
 
 def errors(size):
-    return ErrorMeasures(force_max=size, area_max=size, distribution=size)
+    return NO_ERRORS | {"force_max": size, "area_max": size, "distribution": size}
 
 
 def row(number, seconds, size, *, steps=8, name="", status="done", is_measure=False):
     kind = KINDS[number % len(KINDS)]
-    configuration = Configuration(
-        name=name or f"{kind}, number {number}", content={"coupling": {"kind": kind}}, cost=1.0
-    )
-    numbers = dict.fromkeys(CURVES, np.ones(steps))
-    curves = Curves(patches=PATCHES, patch_pressure=np.ones((steps, 1)), **numbers)
+    measured = {"phases": {"load steps": seconds}}
+    result = CaseResult(status=status, measured=measured, arrays={"force": np.ones(steps)})
     return Row(
-        configuration=configuration, status=status, phases={"load steps": seconds}, curves=curves,
+        name=name or f"{kind}, number {number}", scene=SCENES[kind], result=result,
         is_measure=is_measure, errors=errors(size),
     )  # fmt: skip
 
@@ -37,9 +37,7 @@ def comparison(rows, bar=1e-3):
     return Comparison(
         scene="made up",
         rows=(*rows, measure),
-        quantity="approach",
-        steps=8,
-        grid=PATCHES,
+        response="force",
         measure="measure",
         uncertainty=errors(bar),
     )
@@ -64,7 +62,7 @@ def test_every_row_of_the_frontier_is_numbered_where_it_can_be_read(seed):
     ahead = {one.name for one in found.frontier()} | {"measure"}
     wanted = sorted(str(n) for n, one in enumerate(found.rows, 1) if one.name in ahead)
     assert len(wanted) >= 8
-    figure = pareto_figure(found)
+    figure = comparison_figure(found)
     figure.draw_without_rendering()
     for axes in panels(figure):
         assert sorted(text.get_text() for text in axes.texts) == wanted
@@ -81,9 +79,11 @@ def labels(figure):
 
 def test_legend_tells_of_configurations_that_ended_early_where_there_are_any():
     rows = [row(0, 0.1, 0.1), row(1, 1.0, 0.01)]
-    assert not any(label.startswith("hollow") for label in labels(pareto_figure(comparison(rows))))
+    assert not any(
+        label.startswith("hollow") for label in labels(comparison_figure(comparison(rows)))
+    )
     rows[0] = row(0, 0.1, 0.1, status="not converged", steps=3)
-    figure = pareto_figure(comparison(rows))
+    figure = comparison_figure(comparison(rows))
     assert "hollow: ended before the last load step" in labels(figure)
     hollow = [line for line in panels(figure)[0].lines if line.get_markerfacecolor() == "none"]
     assert [line.get_xdata()[0] for line in hollow] == [0.1]
@@ -91,6 +91,6 @@ def test_legend_tells_of_configurations_that_ended_early_where_there_are_any():
 
 def test_configurations_that_are_beaten_are_pale():
     rows = [row(0, 0.1, 0.1), row(1, 1.0, 0.2), row(2, 2.0, 0.01)]
-    for axes in panels(pareto_figure(comparison(rows))):
+    for axes in panels(comparison_figure(comparison(rows))):
         faint = [line.get_xdata()[0] for line in axes.lines if (line.get_alpha() or 1.0) < 1.0]
         assert faint == [1.0]

@@ -3,21 +3,21 @@
 import csv
 from argparse import ArgumentTypeError, Namespace
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from geometry.patches import PatchGrid
 from multiscale import compare
 from multiscale.cli.command_line import main
 from multiscale.cli.compare import compare_scene
 from multiscale.cli.words import wall_time
-from multiscale.comparison.configuration import Curves, RunResult
-from multiscale.comparison.process import run_here
-from multiscale.comparison.scene_content import SMALL_SLOPES
 from multiscale.run import run
 from multiscale.scene.scene import Scene
+from multiscale.studies.configurations import OWN, SMALL_SLOPES
+from multiscale.studies.measured_run import measured_run
+from multiscale.studies.running import CaseResult
 from support.errors import InputError, NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -34,19 +34,23 @@ PICKED = (
 RUN = {}  # results by key of the configuration: several tests want the same
 
 
-def launched(one, seconds):
-    """Run some of the configurations here; the others fail as a crash does."""
-    if one.is_own or one.name.startswith(PICKED):
+def measured(result, **values):
+    return replace(result, measured={**result.measured, **values})
+
+
+def solved(one, comm=None, seconds=None):
+    """Run some of the configurations; the others fail."""
+    if one.name.startswith((OWN, *PICKED)):
         if one.key not in RUN:
-            result = run_here(one)
-            RUN[one.key] = replace(result, cpu_s=result.seconds)
+            result = measured_run(one)
+            RUN[one.key] = measured(result, cpu_s=sum(result.measured["phases"].values()))
         return RUN[one.key]
-    return RunResult(configuration=one, status="failed", exit_code=-9, message="killed")
+    return measured(CaseResult(status="failed", failure="no memory"), exit_code=5)
 
 
 @pytest.fixture(scope="module")
 def found():
-    return compare(Scene.load(PAPER, TINY), launch=launched)
+    return compare(Scene.load(PAPER, TINY), solve=solved)
 
 
 def test_the_best_is_the_measure(found):
@@ -55,14 +59,16 @@ def test_the_best_is_the_measure(found):
     measure = found[found.measure]
     assert measure.is_measure
     assert measure.errors == found.uncertainty
-    assert 0.0 < found.uncertainty.force_max < 0.1  # half the heights change a few per cent
+    assert 0.0 < found.uncertainty["force_max"] < 0.1  # half the heights change a few per cent
 
 
 def test_errors_are_those_of_the_forces(found):
-    right = found[found.measure].curves.force
+    right = found[found.measure].curves["force"]
     for name in (OWN_NAME, "analytic, elliptic"):
-        expected = np.abs(found[name].curves.force - right).max() / right.max()
-        assert found[name].errors.force_max == pytest.approx(expected, rel=1e-12)  # the same sums
+        expected = np.abs(found[name].curves["force"] - right).max() / right.max()
+        assert found[name].errors["force_max"] == pytest.approx(
+            expected, rel=1e-12
+        )  # the same sums
 
 
 def test_shares_of_every_error_add_up(found):
@@ -78,18 +84,18 @@ def test_failed_configurations_have_rows_and_no_errors(found):
     failed = [row for row in found.rows if row.status == "failed"]
     assert len(failed) > 10
     for row in failed:
-        assert (row.exit_code, row.message) == (-9, "killed")
-        assert np.isnan([row.seconds, row.errors.force_max]).all()
+        assert (row.record()["exit_code"], row.record()["message"]) == (5, "no memory")
+        assert np.isnan([row.seconds, row.errors["force_max"]]).all()
 
 
 def test_other_measure_can_be_forced():
-    forced = compare(Scene.load(PAPER, TINY), against="half-space", launch=launched)
+    forced = compare(Scene.load(PAPER, TINY), against="half-space", solve=solved)
     assert forced.measure == "analytic, half-space 64 × 64"
     assert forced.warnings == ()
 
 
 def test_measure_that_is_not_reached_is_told():
-    missed = compare(Scene.load(PAPER, TINY), against="reference", launch=launched)
+    missed = compare(Scene.load(PAPER, TINY), against="reference", solve=solved)
     assert missed.against == "concurrent"
     assert missed.warnings == (
         "no configuration of kind reference was reached: compared against the concurrent instead",
@@ -97,18 +103,18 @@ def test_measure_that_is_not_reached_is_told():
 
 
 def test_busy_machine_is_told():
-    def slow(one, seconds):
-        return replace(launched(one, seconds), cpu_s=0.0)
+    def slow(one, comm, seconds):
+        return measured(solved(one), cpu_s=0.0)
 
-    (warning,) = compare(Scene.load(PAPER, TINY), launch=slow).warnings
+    (warning,) = compare(Scene.load(PAPER, TINY), solve=slow).warnings
     assert "the machine was busy with something else" in warning
 
 
 def test_nothing_reached_is_no_comparison():
-    def never(one, seconds):
-        return RunResult(configuration=one, status="failed")
+    def never(one, comm, seconds):
+        return CaseResult(status="failed")
 
-    empty = compare(Scene.load(PAPER, TINY), launch=never)
+    empty = compare(Scene.load(PAPER, TINY), solve=never)
     assert (empty.measure, empty.frontier()) == (None, ())
     assert len(empty.records()) == len(empty)
 
@@ -117,20 +123,20 @@ def test_prescribed_force_is_measured_by_the_approach():
     scene = Scene.load(PAPER, TINY).to_dict(whole=False)
     scene["load"] = {"force": 2.0, "steps": 2, "tilt": "free"}
 
-    def analytic(one, seconds):
+    def analytic(one, comm, seconds):
         assert one.scene.loading.tilt == "free"
         if one.name.startswith("analytic, half-space"):
-            return run_here(one)
-        return RunResult(configuration=one, status="not started")
+            return measured_run(one)
+        return CaseResult(status="not started")
 
-    by_force = compare(Scene.from_dict(scene), launch=analytic)
+    by_force = compare(Scene.from_dict(scene), solve=analytic)
     coarse = by_force["analytic, half-space 32 × 32"]
     right, mine = by_force[by_force.measure], coarse.last("approach")
     assert by_force.response == "approach"
-    assert coarse.errors.force_max < 1e-6  # what the balance of the force leaves
+    assert coarse.errors["force_max"] < 1e-6  # what the balance of the force leaves
     expected = mine / right.last("approach") - 1.0
-    assert coarse.errors.approach_last == pytest.approx(expected, rel=1e-9)  # a difference
-    assert coarse.shares.discretisation == pytest.approx(expected, rel=1e-9)
+    assert coarse.errors["approach_last"] == pytest.approx(expected, rel=1e-9)  # a difference
+    assert coarse.shares["discretisation"] == pytest.approx(expected, rel=1e-9)
 
 
 def test_small_slopes_are_a_cause_of_their_own(found):
@@ -139,43 +145,13 @@ def test_small_slopes_are_a_cause_of_their_own(found):
         steep, small = (found[f"{kind}, half-space 64 × 64{end}"] for end in ("", SMALL_SLOPES))
         assert (steep.finite_slopes, small.finite_slopes) == (True, False)
         assert 1.005 < small.last("force") / steep.last("force") < 1.06
-        assert small.shares.slopes > 0.005
+        assert small.shares["slopes"] > 0.005
         if kind == "concurrent":  # the measure
-            assert small.errors.force_last == pytest.approx(small.shares.slopes, rel=1e-12)
+            assert small.errors["force_last"] == pytest.approx(small.shares["slopes"], rel=1e-12)
             continue
-        assert steep.shares.slopes == 0.0
-        assert small.shares.block == steep.shares.block
-    assert found["analytic, elliptic"].shares.slopes > 0.005
-
-
-def test_slopes_are_measured_by_a_reference_with_small_ones():
-    forces = {"reference, 2": 2.0, "reference, 1": 2.1, "concurrent": 2.3}
-
-    def pressed(one, seconds):
-        known = [force for start, force in forces.items() if one.name.startswith(start)]
-        if not known:
-            return RunResult(configuration=one, status="not started")
-        force = np.array([known[0], 2.0 * known[0]])
-        if one.scale != 1.0:
-            force = 1.05 * force  # stiffer by 5 % where slopes are small
-        nan = np.full(2, np.nan)
-        errors = {"force_error": 0.01 * force, "approach_error": nan, "area_error": nan}
-        curves = Curves(
-            patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)), force=force, area=force,
-            approach=force, separation=force, patch_pressure=force[:, None], **errors,
-        )  # fmt: skip
-        return RunResult(configuration=one, status="done", curves=curves, phases={"laws": 1.0})
-
-    by_reference = compare(Scene.load(PAPER, TINY), launch=pressed)
-    assert by_reference.measure.startswith("reference, 2 meshes")
-    (small,) = [row for row in by_reference.rows if row.name.endswith("heights × 0.1")]
-    assert small.last("force") == pytest.approx(
-        1.05 * 4.2, rel=1e-12
-    )  # as if heights were the scene's
-    concurrent = by_reference["concurrent, half-space 64 × 64, small slopes"]
-    lost = 1.0 - 1.0 / 1.05
-    assert concurrent.shares.slopes == pytest.approx(lost * 4.6 / 4.0, rel=1e-12)
-    assert np.isnan(small.shares.slopes)
+        assert steep.shares["slopes"] == 0.0
+        assert small.shares["block"] == steep.shares["block"]
+    assert found["analytic, elliptic"].shares["slopes"] > 0.005
 
 
 @pytest.mark.parametrize(
@@ -183,12 +159,17 @@ def test_slopes_are_measured_by_a_reference_with_small_ones():
     [
         ({"against": "experiment"}, r"'experiment': is nothing to compare against \(allowed: ref"),
         ({"budget_s": 0.0}, "is no budget"),
-        ({"comm": type("Comm", (), {"size": 2})()}, "cannot be launched in an MPI job"),
     ],
 )
 def test_wrong_arguments(arguments, text):
     with pytest.raises(InputError, match=text):
-        compare(Scene.load(PAPER, TINY), launch=launched, **arguments)
+        compare(Scene.load(PAPER, TINY), solve=solved, **arguments)
+
+
+def test_heights_in_memory_are_refused():
+    heights = {"heights": np.eye(8), "lengths": [1.0, 1.0]}
+    with pytest.raises(InputError, match=r"surface\.heights: are not compared in memory"):
+        compare(Scene.load(PAPER, TINY).with_({"surface": heights}))
 
 
 @pytest.mark.parametrize(
@@ -213,46 +194,50 @@ def test_no_budget(text, problem):
 
 
 def chosen(folder, **choice):
-    words = {"scene": PAPER, "set": TINY, "out": folder, "ranks": 1}
+    words = {"scene": PAPER, "set": TINY, "out": folder}
     return Namespace(**words | {"against": None, "budget": None} | choice)
 
 
-def test_command_writes_table_figures_and_report(capsys, tmp_path):
-    compare_scene(chosen(tmp_path), [], None, launch=launched)
+@pytest.fixture
+def some_solved(monkeypatch):
+    monkeypatch.setattr("multiscale.cli.compare.compare", partial(compare, solve=solved))
+
+
+def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, some_solved):
+    compare_scene(chosen(tmp_path), [], None)
     shown = capsys.readouterr().out
     assert "They are compared with “concurrent, half-space 64 × 64" in shown
     names = {path.name for path in tmp_path.iterdir()}
-    assert names == {
-        "compare.csv", "pareto.png", "curves.png", "pressures.png", "report.html",
-        "pareto.svg", "curves.svg", "pressures.svg", "configurations",
-    }  # fmt: skip
+    assert names == {"compare.csv", "pareto.png", "pareto.svg", "report.html", "cases"}
     with (tmp_path / "compare.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     measure = [row for row in rows if row["is_measure"] == "True"]
     assert [row["kind"] for row in measure] == ["concurrent"]
     assert float(rows[0]["error_force_max"]) > 0.0
     report = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert report.count("data:image/png;base64,") == 3
+    assert report.count("data:image/png;base64,") == 1
     assert "://" not in report  # it needs no network
     assert "Configurations without a result" in report
     # the table that all look at has six columns, a page's width; the others are folded
     visible, _, folded = report.partition("<details>")
     first = visible[visible.index("<h2>Configurations</h2>") :]
     assert first[: first.index("</tr>")].count("<th>") == 6
-    assert "memory [MB]" in folded and "memory" not in visible
+    assert "set-up" in folded and "set-up" not in visible
 
-    def none_again(one, seconds):
-        assert not one.is_own and not one.name.startswith(PICKED)
-        return launched(one, seconds)
+    def none_again(one, comm, seconds):
+        assert not one.name.startswith((OWN, *PICKED))
+        return solved(one)
 
-    compare_scene(chosen(tmp_path), [], None, launch=none_again)
-    assert f"{OWN_NAME}: done, from an earlier call" in capsys.readouterr().out
+    table = (tmp_path / "compare.csv").read_bytes()
+    monkeypatch.setattr("multiscale.cli.compare.compare", partial(compare, solve=none_again))
+    compare_scene(chosen(tmp_path), [], None)
+    assert (tmp_path / "compare.csv").read_bytes() == table
 
 
-def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path):
+def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path, some_solved):
     text = "the comparison against reference did not converge: MEASURE_NOT_REACHED"
     with pytest.raises(NotConverged, match=text):
-        compare_scene(chosen(tmp_path, against="reference"), [], None, launch=launched)
+        compare_scene(chosen(tmp_path, against="reference"), [], None)
     assert "compared against the concurrent instead" in capsys.readouterr().out
     assert (tmp_path / "report.html").exists()
 
@@ -262,7 +247,6 @@ def test_command_tells_when_the_measure_was_not_reached(capsys, tmp_path):
     [
         (["--against", "truth"], "argument --against: invalid choice: 'truth' (choose from 'refe"),
         (["--budget", "soon"], "argument --budget: 'soon': cannot be read as a quantity"),
-        (["--ranks", "0"], "--ranks = 0: is no number of processes"),
     ],
 )
 def test_command_refuses_before_anything_is_run(capsys, tmp_path, words, text):

@@ -14,8 +14,8 @@ from multiscale import run, sweep
 from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.sweeps.cases import sweep_cases, values_from_text
-from support.checked_store import START, unsealed
+from multiscale.studies.cases import sweep_cases, values_from_text
+from support.checked_store import START, sealed, unsealed
 from support.errors import InputError, NotConverged
 
 SEED, MODULUS = "surface.spectrum.seed", "block.young_modulus"
@@ -96,36 +96,23 @@ def test_wrong_cases_are_refused_before_any_runs(scene, vary, problem):
         sweep(scene, vary)
 
 
-def test_cases_are_found_by_their_names(scene):
+def test_cases_have_the_same_keys_whatever_their_numbers(scene):
     cases = sweep_cases(scene, VARY)
-    assert [cases.number_of(case.name) for case in cases] == list(range(6))
     assert cases[4].values == {MODULUS: "4 GPa", SEED: 1}
+    assert len({case.key for case in cases}) == 6
     other = sweep_cases(scene, {SEED: range(9), MODULUS: ["4 GPa"]})
-    assert [cases.number_of(case.name) for case in other][:4] == [3, 4, 5, None]
-    assert sweep_cases(scene, {SEED: [1]}).number_of(cases[0].name) is None
-    assert [case.number for case in cases.where({SEED: 2})] == [2, 5]
+    assert [case.key for case in other][:3] == [case.key for case in cases][3:]
+    assert sweep_cases(scene, {SEED: [0]})[0].key not in {case.key for case in cases}
 
 
 def test_cases_are_what_runs_of_their_own_are(scene):
     found = sweep(scene, VARY)
     for case, forces in zip(found.cases, found.force_N, strict=True):
         alone = run(scene.with_(case.values))
-        # the modulus scales pressures that were found with another one: rounding differs
-        np.testing.assert_allclose(forces, alone.force_N, rtol=1e-12)
+        np.testing.assert_array_equal(forces, alone.force_N)
     assert found.force_N.shape == (6, 2)
     assert found.unfinished == 0
     assert found.failures == {}
-
-
-def test_other_moduli_are_not_solved_again_under_approaches(scene, monkeypatch):
-    solved = []
-    whole = Run.load_steps
-    monkeypatch.setattr(Run, "load_steps", lambda run: (solved.append(1), whole(run))[1])
-    sweep(scene, VARY)
-    assert len(solved) == 3
-    solved.clear()
-    sweep(scene.with_({"load.force": "0.5 N"}), VARY)
-    assert len(solved) == 6
 
 
 def test_means_and_bands_are_over_the_seeds_of_each_ensemble(scene):
@@ -158,7 +145,7 @@ def test_a_sweep_goes_on_after_the_cases_that_are_done(scene, tmp_path):
     journal.write_bytes(whole_file[: marks[3].size + 20])  # as a killed process leaves it
     rest = sweep(scene, VARY, folder=tmp_path, observe=lambda case, result: again.append(case))
     assert (len(first), len(again)) == (6, 3)
-    np.testing.assert_allclose(rest.force_N, whole.force_N, rtol=1e-12)
+    np.testing.assert_array_equal(rest.force_N, whole.force_N)
     assert len(list(unsealed(journal.read_bytes()))) == 7  # the scene, and six cases
 
 
@@ -248,23 +235,49 @@ def test_files_are_compared_and_seeds_averaged(file, tmp_path):
     assert legend(seeds.plot()) == ["mean of 3"]
 
 
-@pytest.mark.parametrize("varied", [False, True])
-def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path, varied):
-    dice = np.random.default_rng(2)
-    heights = dice.normal(scale=1e-3, size=(8, 8))
+def with_maps(file):
+    """Return a scene of a measured map, beside which there is another, and the heights of both."""
+    heights = np.random.default_rng(2).normal(scale=1e-3, size=(8, 8))
     for name in ("one.npy", "other.npy"):
         np.save(file.with_name(name), heights)
     base = Scene.load(file).with_({"surface": {"file": "one.npy", "lengths": [1.0, 1.0]}})
-    vary = {"surface.file": ["one.npy", "other.npy"]} if varied else {MODULUS: ["1 GPa", "2 GPa"]}
+    return base, heights
+
+
+def test_a_sweep_does_not_go_on_over_another_map(file, tmp_path):
+    base, heights = with_maps(file)
+    vary = {MODULUS: ["1 GPa", "2 GPa"]}
     first = sweep(base, vary, folder=tmp_path / "out")
-    np.save(file.with_name("other.npy" if varied else "one.npy"), 2.0 * heights)
-    problem = r"other.npy': has another content" if varied else "content of surface.file was '"
-    with pytest.raises(InputError, match=problem) as error:
+    np.save(file.with_name("one.npy"), 2.0 * heights)
+    with pytest.raises(InputError, match=r"content of surface\.file was '.*--overwrite"):
         sweep(base, vary, folder=tmp_path / "out")
-    assert "surface.file" in str(error.value) and "--overwrite" in str(error.value)
-    np.save(file.with_name("other.npy" if varied else "one.npy"), heights)
+    np.save(file.with_name("one.npy"), heights)
     again = sweep(base, vary, folder=tmp_path / "out", observe=lambda *_: pytest.fail("run again"))
     np.testing.assert_array_equal(again.force_N, first.force_N)
+
+
+def test_cases_of_a_map_that_has_changed_are_run_again(file, tmp_path):
+    base, heights = with_maps(file)
+    vary, again = {"surface.file": ["one.npy", "other.npy"]}, []
+    first = sweep(base, vary, folder=tmp_path / "out").force_N
+    np.testing.assert_array_equal(first[0], first[1])
+    np.save(file.with_name("other.npy"), 2.0 * heights)
+    found = sweep(
+        base, vary, folder=tmp_path / "out", observe=lambda case, _: again.append(case.number)
+    )
+    assert again == [1]
+    np.testing.assert_array_equal(found.force_N[0], first[0])
+    alone = run(base.with_({"surface.file": "other.npy"}))
+    np.testing.assert_array_equal(found.force_N[1], alone.force_N)
+
+
+def test_cases_of_another_version_are_refused(scene, tmp_path):
+    sweep(scene, {SEED: [1]}, folder=tmp_path)
+    journal = tmp_path / "cases" / "1-of-1" / "rank-0.cases"
+    (head, _), (case, _) = unsealed(journal.read_bytes())
+    journal.write_bytes(sealed([head, {**case, "files": {}}])[0])
+    with pytest.raises(InputError, match="another patchlaw; remove it, and its cases are computed"):
+        sweep(scene, {SEED: [1]}, folder=tmp_path)
 
 
 def test_cases_of_another_scene_are_not_mixed_in(scene, tmp_path):

@@ -41,7 +41,7 @@ def _no_numbers() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ContactState:
+class FaceContactState:
     """The contact on a face under a rigid plane.
 
     All but displacements, samples and nodes is the same on every rank.

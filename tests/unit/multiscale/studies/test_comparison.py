@@ -1,42 +1,38 @@
 """The frontier against brute force, and the comparison as plain records."""
 
+import tomllib
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers.small_scene import SMALL_SCENE
 
-from geometry.patches import PatchGrid
-from multiscale.comparison.comparison import Comparison, Row
-from multiscale.comparison.configuration import Configuration
-from multiscale.comparison.errors import ErrorMeasures
+from multiscale.scene.scene import Scene
+from multiscale.studies.comparison import Comparison
+from multiscale.studies.errors import NO_ERRORS, Row
+from multiscale.studies.running import CaseResult
 from support.errors import InputError
 
-PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+SCENE = Scene.from_dict(tomllib.loads(SMALL_SCENE))
 
 
 def row(name, seconds, error, status="done"):
-    content = {
-        "surface": {"grid": [8, 8]}, "patches": {"grid": [2, 2]}, "block": {},
-        "coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"},
-    }  # fmt: skip
-    return Row(
-        configuration=Configuration(name=name, content=content, cost=1.0),
-        status=status, phases={"load steps": seconds},
-        errors=ErrorMeasures(force_max=error, approach_max=2 * error),
-    )  # fmt: skip
+    result = CaseResult(status=status, measured={"phases": {"load steps": seconds}})
+    errors = NO_ERRORS | {"force_max": error, "approach_max": 2 * error}
+    return Row(name=name, scene=SCENE, result=result, errors=errors)
 
 
-def comparison(rows, bar=float("nan"), quantity="approach"):
+def comparison(rows, bar=float("nan"), response="force"):
     return Comparison(
-        scene="some", rows=tuple(rows), quantity=quantity, steps=2, grid=PATCHES, measure="best",
-        uncertainty=ErrorMeasures(force_max=bar),
+        scene="some", rows=tuple(rows), response=response, measure="best",
+        uncertainty=NO_ERRORS | {"force_max": bar},
     )  # fmt: skip
 
 
 def beaten(one, other, bar):
     """Tell whether another level is at least as good in both, and better in one."""
-    mine = one.seconds, max(one.errors.force_max, bar)
-    theirs = other.seconds, max(other.errors.force_max, bar)
+    mine = one.seconds, max(one.errors["force_max"], bar)
+    theirs = other.seconds, max(other.errors["force_max"], bar)
     return theirs != mine and theirs[0] <= mine[0] and theirs[1] <= mine[1]
 
 
@@ -73,7 +69,7 @@ def test_an_error_that_is_unknown_is_not_the_uncertainty():
 def test_response_is_what_the_load_does_not_prescribe():
     rows = [row("one", 1.0, 0.1)]
     assert comparison(rows).error(rows[0]) == 0.1
-    assert comparison(rows, quantity="force").error(rows[0]) == 0.2
+    assert comparison(rows, response="approach").error(rows[0]) == 0.2
 
 
 def test_unknown_measure_is_refused():
@@ -82,7 +78,9 @@ def test_unknown_measure_is_refused():
 
 
 def test_records_are_plain():
-    found = comparison([row("one", 1.0, 0.1), replace(row("two", 2.0, 0.2), exit_code=3)])
+    two = row("two", 2.0, 0.2)
+    stopped = replace(two.result, measured={**two.result.measured, "exit_code": 3})
+    found = comparison([row("one", 1.0, 0.1), replace(two, result=stopped)])
     records = found.records()
     assert records[0]["error_force_max"] == 0.1
     assert records[0]["error_area_max"] is None
@@ -90,9 +88,8 @@ def test_records_are_plain():
     assert {type(value) for record in records for value in record.values()} <= {
         str, float, int, bool, type(None),
     }  # fmt: skip
-    columns = found.to_dict()
-    assert columns["exit_code"] == [None, 3]
-    assert list(columns) == list(records[0])
+    assert [record["exit_code"] for record in records] == [None, 3]
+    assert list(records[1]) == list(records[0])
     assert found["two"].seconds == 2.0
     with pytest.raises(KeyError, match="three"):
         found["three"]

@@ -1,25 +1,37 @@
-"""The figure of a comparison that shows errors over wall time, and which ways are the best."""
+"""The figures of studies: curves of a sweep with their bands, error over time of a comparison."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import cycle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from multiscale.comparison.comparison import Comparison, Row
 from multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
     FULL_WIDTH,
     MARKERS,
+    PALETTE,
+    add_legend,
     new_figure,
     panels_above_legend,
     styled,
 )
+from multiscale.studies.comparison import Comparison
+from multiscale.studies.errors import Row
+
+MOST_CURVES = 200
+"""Cases of a sweep that are drawn as curves; bands show those beyond."""
+
+MOST_ENSEMBLES = 8
+"""Ensembles that are drawn; more of them cannot be told apart."""
 
 PALE = 0.4
-"""Opacity of configurations that another one beats in time and error."""
+"""Opacity of single cases, and of configurations that another one beats in time and error."""
 
 LEAST_ERROR = 1e-5
 """Smaller errors are drawn here."""
@@ -30,6 +42,10 @@ LEAST_SHARE = 0.2
 NUMBER_SIZE = (10.0, 8.0)
 """Width and height that a number takes [pt]."""
 
+_SHARED = 1e-9
+"""Spread of values of all cases, relative to their mean, that is rounding."""
+
+_POINTS: dict[str, Any] = {"marker": "o", "ms": 4.0}  # curves of one load step
 _PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
 _RING = _PLAIN | {"mec": "0.1", "mew": 1.1, "ms": 7.5, "zorder": 5}
 _BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
@@ -39,7 +55,76 @@ _NUMBER |= {"ha": "center", "va": "center"}
 
 
 @styled()
-def pareto_figure(comparison: Comparison) -> Figure:
+def sweep_figure(sweep: Any) -> Figure:
+    """Draw mean pressure over approach, and contact area over mean pressure.
+
+    Thin curves are single cases. A thick curve is the mean of an ensemble, a broken one its median,
+    and the band about them holds the middle 90 % of its cases: of pressures where all were pressed
+    to the same approaches, of approaches where all were pressed by the same forces.
+
+    Args:
+        sweep: A `multiscale.studies.sweep.SweepResults`, of which `MOST_ENSEMBLES` are drawn.
+    """
+    figure = new_figure(FULL_WIDTH, 3.0)
+    force, area = figure.subplots(1, 2)
+    ensembles = sweep.ensembles()[:MOST_ENSEMBLES]
+    for colour, (values, part), (_, statistics) in zip(
+        cycle(PALETTE), ensembles, sweep.statistics, strict=False
+    ):
+        few = slice(MOST_CURVES // len(ensembles))
+        approach, pressure = 1e3 * part.approach_mm[few], part.mean_pressure_MPa[few]
+        look = {"color": colour} | (_POINTS if approach.shape[1] == 1 else {})
+        thin = look | {"lw": 0.5, "alpha": PALE}
+        force.plot(approach.T, pressure.T, **thin)
+        area.plot(pressure.T, 100.0 * part.contact_area_fraction[few].T, **thin)
+        many = len(part) > 1
+        label = ", ".join(filter(None, (_label(values), f"mean of {len(part)}" * many)))
+        mean = _read_off(statistics, "mean")
+        force.plot(*mean[:2], lw=2.0, label=label, **look)
+        area.plot(*mean[1:], lw=2.0, **look)
+        if many:
+            _draw_scatter(force, statistics, colour)
+    force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
+    area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+    add_legend(figure)
+    return figure
+
+
+def _label(values: Mapping[str, Any]) -> str:
+    """Return the values of keys as a legend shows them, without sections and folders."""
+    names = {key: key.rpartition(".")[2].replace("_", " ") for key in values}
+    return ", ".join(
+        Path(value).name if names[key] in ("file", "mesh") else f"{names[key]} {value}"
+        for key, value in values.items()
+    )
+
+
+def _read_off(statistics: Any, name: str) -> list[np.ndarray[Any, Any]]:
+    """Return a number of approaches [µm], mean pressures [MPa] and area fractions [%]."""
+    drawn = {"approach_mm": 1e3, "mean_pressure_MPa": 1.0, "contact_area_fraction": 100.0}
+    return [scale * statistics.of(column, name) for column, scale in drawn.items()]
+
+
+def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
+    """Draw the band of an ensemble whose cases share their approaches or their pressures."""
+    mean, median, low, high, least, most = (
+        _read_off(statistics, name)
+        for name in ("mean", "median", "low", "high", "smallest", "largest")
+    )
+    shared = [bool((most[k] - least[k]).max() <= _SHARED * np.abs(mean[k]).max()) for k in (0, 1)]
+    if shared[0] == shared[1]:
+        return
+    x, y = (mean[0], median[1]) if shared[0] else (median[0], mean[1])
+    axes.plot(x, y, color=colour, lw=1.2, ls="--")
+    along, across = (axes.fill_between, 1) if shared[0] else (axes.fill_betweenx, 0)
+    along(mean[1 - across], low[across], high[across], color=colour, alpha=0.2)
+    if len(x) == 1:  # of which a band would be nothing
+        lines = axes.vlines if shared[0] else axes.hlines
+        lines(mean[1 - across], low[across], high[across], color=colour, lw=1.0)
+
+
+@styled()
+def comparison_figure(comparison: Comparison) -> Figure:
     """Draw errors of the response, the contact area and the pressure distribution over time.
 
     The frontier is drawn, configurations that another one beats are pale, and the uncertainty of
@@ -78,10 +163,10 @@ def pareto_figure(comparison: Comparison) -> Figure:
 
 def _points(comparison: Comparison, error: str) -> list[tuple[float, float, int, Row]]:
     """Return time, error as it is drawn, number and row of all configurations that have both."""
-    least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * getattr(comparison.uncertainty, error)))
+    least = max(LEAST_ERROR, np.nan_to_num(LEAST_SHARE * comparison.uncertainty[error]))
     points = [
         # The error of the measure is its own uncertainty.
-        (row.seconds, float(np.maximum(abs(getattr(row.errors, error)), least)), number, row)
+        (row.seconds, float(np.maximum(abs(row.errors[error]), least)), number, row)
         for number, row in enumerate(comparison.rows, 1)
     ]
     return [point for point in points if np.isfinite(point[:2]).all()]
@@ -89,7 +174,7 @@ def _points(comparison: Comparison, error: str) -> list[tuple[float, float, int,
 
 def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
     """Draw one panel of errors over time without its numbers."""
-    frontier, bar = comparison.frontier(error), getattr(comparison.uncertainty, error)
+    frontier, bar = comparison.frontier(error), comparison.uncertainty[error]
     for seconds, size, _, row in _points(comparison, error):
         look = _PLAIN if row in frontier else _BEATEN
         if row.is_measure or row.status != "done":

@@ -7,20 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry.patches import PatchGrid
 from micro import MODEL_NAMES
 from multiscale.auto.keys import auto_keys
-from multiscale.comparison.catalogue import configurations
-from multiscale.comparison.compare import resolved_scene
-from multiscale.comparison.configuration import Curves, RunResult
-from multiscale.comparison.measure import ranked, refinements
-from multiscale.comparison.scene_content import SMALL_SLOPES, pressure_grid
 from multiscale.inputs.block import LAW_BLOCK_CELLS
 from multiscale.scene.scene import Scene
+from multiscale.studies.comparison import ranked, refinements, resolved_scene
+from multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations, pressure_grid
+from multiscale.studies.errors import Row
+from multiscale.studies.measured_run import measured_run
+from multiscale.studies.running import CaseResult
 
-COLUMNS = (
-    "approach", "force", "area", "separation", "approach_error", "force_error", "area_error",
-)  # fmt: skip
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 
 
@@ -41,9 +37,9 @@ def test_paper_has_every_kind_and_the_scene_itself():
     models = {one.model for one in found if one.kind == "analytic"}
     assert models == set(MODEL_NAMES)
     for kind in ("isolated", "consistent"):
-        grids = {one.content["patches"]["grid"][0] for one in found if one.kind == kind}
+        grids = {one.scene.patches.grid[0] for one in found if one.kind == kind}
         assert grids == {1, 2, 4, 8, 16}
-    (own,) = [one for one in found if one.is_own]
+    (own,) = [one for one in found if one.name.startswith(OWN)]
     assert own.scene.coupling == Scene.load(PAPER).coupling
     assert own.scene.block == Scene.load(PAPER).block
 
@@ -76,7 +72,7 @@ def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
     scene = Scene.load(tmp_path / "scan.toml")
     found = configurations(scene)
     assert {one.heights for one in found} == {(40, 20)}
-    assert {one.content["surface"]["file"] for one in found} == {str(file)}
+    assert {one.scene.surface_path for one in found} == {file}
     before = {one.key for one in found}
     np.save(file, 1e-3 * np.random.default_rng(2).normal(size=(40, 20)))
     assert not before & {one.key for one in configurations(scene)}  # other heights, other results
@@ -89,17 +85,16 @@ def test_other_scenes_have_other_keys():
     assert keys & {one.key for one in small("patches.grid=[2, 2]")}  # what does not see patches
 
 
-def test_only_couplings_use_ranks():
-    ranks = {(one.kind == "analytic", one.ranks) for one in small(ranks=3)}
-    assert ranks == {(True, 1), (False, 3)}
-    several = {one.key for one in small(ranks=3) if one.ranks == 3}
-    assert several.isdisjoint(one.key for one in small())
+def test_results_on_other_ranks_are_others():
+    several = small(ranks=3)
+    assert {one.ranks for one in several} == {3}
+    assert {one.key for one in several}.isdisjoint(one.key for one in small())
 
 
 def test_all_configurations_take_the_same_steps():
     for one in small("load.force_change=0.2", "load.steps=3"):
         assert one.scene.loading.force_change is None
-        targets = np.divide(one.scene.loading.targets, one.scale)
+        targets = one.scene.loading.targets
         assert targets == pytest.approx([8e-3 / 3, 16e-3 / 3, 8e-3])
 
 
@@ -122,17 +117,6 @@ def test_load_by_force_or_free_tilt_has_configurations_too():
         assert {"analytic", "concurrent", "reference"} <= {one.kind for one in found}
 
 
-def test_small_slopes_scale_heights_and_load_together():
-    found = small("load.tilt=[0.01, 0]")
-    (low,) = [one for one in found if one.scale != 1.0]
-    (steep,) = [one for one in found if f"{one.name}, heights × 0.1" == low.name]
-    assert (steep.scale, low.scale) == (1.0, 0.1)
-    assert low.scene.surface.spectrum.rms_slope == pytest.approx(0.0215, rel=1e-12)  # rounding
-    assert low.scene.loading.approach == pytest.approx((0.8e-3,), rel=1e-12)
-    assert low.scene.loading.tilt == pytest.approx((1e-3, 0.0), rel=1e-12)
-    assert low.scene.reference == steep.scene.reference
-
-
 def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     text = (
         "accuracy = 0.05\n[surface]\nspectrum = { hurst = 0.95, waves = [2, 4], rms_slope = 0.2 }\n"
@@ -142,47 +126,42 @@ def test_scene_that_leaves_all_open_has_configurations_that_stand(tmp_path):
     )
     (tmp_path / "open.toml").write_text(text, encoding="utf-8")
     scene = Scene.load(tmp_path / "open.toml")
-    settled = resolved_scene(scene, tmp_path)
-    assert resolved_scene(scene, tmp_path) == settled  # what was kept
+    settled = resolved_scene(scene)
+    assert resolved_scene(scene) == settled
     found = configurations(settled)
-    (own,) = [one for one in found if one.is_own]
+    (own,) = [one for one in found if one.name.startswith(OWN)]
     assert own.scene.coupling.kind in ("consistent", "concurrent")
     assert own.scene.accuracy == 0.05
     assert auto_keys(own.scene) == {"micro.model"}  # its cells
     for one in found:
         assert auto_keys(one.scene) <= {"micro.model"}
-        assert not auto_keys(one.scene) or one.is_own or one.kind == "reference"
+        assert not auto_keys(one.scene) or one is own
     meshed = [one.scene.block.cells for one in found if "elements" in one.name]
     assert LAW_BLOCK_CELLS in meshed  # laws on a mesh are not left with what a smooth rest needs
 
 
 def ended(one, *, finite_slopes=True):
-    ones = np.ones(2)
-    curves = Curves(
-        patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)),
-        patch_pressure=ones[:, None],
-        **{key: ones for key in COLUMNS},
-    )
-    return RunResult(configuration=one, status="done", curves=curves, finite_slopes=finite_slopes)
+    measured = {"finite_slopes": finite_slopes}
+    return Row.of(one, CaseResult(measured=measured, arrays={"force": np.ones(2)}))
 
 
 def test_the_best_has_finite_slopes_and_then_the_most_heights():
     concurrent = [one for one in made() if one.kind == "concurrent"]
     found = [ended(one, finite_slopes=not one.name.endswith(SMALL_SLOPES)) for one in concurrent]
-    best = [one.configuration.name.removeprefix("concurrent, half-space ") for one in found]
+    best = [one.name.removeprefix("concurrent, half-space ") for one in found]
     assert sorted(best) == sorted(
         ["32 × 32", "64 × 64", "128 × 128", "256 × 256", f"128 × 128{SMALL_SLOPES}"]
     )
     best = ranked(found, "concurrent")
-    assert best[0].configuration.heights == (256, 256)
-    assert best[-1].configuration.name.endswith(SMALL_SLOPES)
+    assert best[0].heights == (256, 256)
+    assert best[-1].name.endswith(SMALL_SLOPES)
     (pair,) = refinements(best)
     assert [one.name for one in pair] == [f"concurrent, half-space {n} × {n}" for n in (128, 256)]
 
 
-def test_all_configurations_but_one_of_low_heights_see_the_true_ones():
+def test_all_configurations_see_the_true_heights():
     found = made()
-    slopes = {one.scene.surface.spectrum.rms_slope for one in found if one.scale == 1.0}
+    slopes = {one.scene.surface.spectrum.rms_slope for one in found}
     assert slopes == {0.215}
     for kind in ("analytic", "consistent", "concurrent"):
         half_spaces = [one for one in found if one.kind == kind and one.model == "half-space"]
@@ -202,13 +181,15 @@ def test_cells_of_the_block_are_stated_by_laws_on_its_mesh_alone():
     assert len([one for one in hexahedra if one.kind == "reference"]) == 3
 
 
-def test_references_that_fit_no_memory_are_told(monkeypatch):
+def test_configurations_that_fit_no_memory_stay_and_say_so_when_they_are_run(monkeypatch):
     pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": 30_000}  # 0.12 GB
     monkeypatch.setattr(os, "sysconf", pages.__getitem__)
-    refused = {one.name: one.refusal for one in made("block.cells=[8, 8, 4]") if one.refusal}
-    assert "reference, 3 meshes, 7.37 µm" in refused
-    assert all(name.startswith("reference") for name in refused)
-    assert all("GB of memory" in text for text in refused.values())
+    found = {one.name: one for one in made("block.cells=[8, 8, 4]")}
+    large = found["reference, 3 meshes, 7.37 µm"]
+    assert large.cost == float("inf")
+    result = measured_run(large)
+    assert result.status == "not started"  # on another machine it may be run
+    assert "GB of memory" in result.failure
 
 
 def test_two_bodies_are_compared_without_meshed_roughness():

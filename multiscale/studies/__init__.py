@@ -1,0 +1,13 @@
+"""Runs many scenes: for many values of their keys, or in every sensible way to compute one.
+
+    SweepCases, Configurations      what is run                            `cases`, `configurations`
+    run_cases, CaseResult           runs it on any number of ranks, and goes on after a kill
+                                                                           `sweep`, `process`
+    SweepResults                    rows, means and bands of a sweep       `results`
+    Comparison                      error over time of all ways            `comparison`, `errors`
+
+`sweep` and `compare` do all of this.
+"""
+
+AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
+"""What the others can be compared against, the best first, and the coupling of each."""

@@ -1,0 +1,254 @@
+"""The configurations of a scene: all sensible ways to compute it.
+
+They range from the micro model alone to the meshed roughness. All of them have the same surface
+with its true heights, and the same load history. Load steps are never halved
+(``load.force_change``), so that curves can be compared step by step. Couplings without laws sum
+their results over the patches that pressures are compared on (`pressure_grid`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, TypeAlias, cast
+
+from geometry.meshes.families import suggested_fine
+from micro import MODELS
+from multiscale.couplings.coupling import Coupling
+from multiscale.inputs.block import LAW_BLOCK_CELLS, block_section
+from multiscale.inputs.loads import load_history_on, patch_grid
+from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.surfaces import make_surface
+from multiscale.scene.identity import identity
+from multiscale.scene.reader import to_dict
+from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
+from support.errors import InputError, NotConverged
+
+Grid: TypeAlias = tuple[int, int]
+"""Heights or patches along x and y."""
+Values: TypeAlias = dict[str, Any]
+"""Sections and dotted keys of a scene with their values."""
+
+OWN = "the scene as it is"
+"""Beginning of the name of the configuration that runs the scene as its file states it."""
+
+SMALL_SLOPES = ", small slopes"
+"""End of the name of a configuration that differs from another by neglecting finite slopes."""
+
+FEWEST_HEIGHTS, HEIGHTS_PER_WAVE = 32, 3
+"""Heights along a side and per shortest wave, at least, of coarser versions of a surface."""
+
+LAW_HEIGHTS = 128
+"""Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
+
+PATCHES = (1, 2, 4, 8, 16)
+"""Patches along a side, of couplings by laws."""
+
+CELLS_PER_PATCH = 2
+"""Elements along a patch, at least, of blocks whose mesh carries the laws."""
+
+REFERENCE_MESHES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
+"""Numbers of meshes of references, and their edges relative to those that fit the contacts."""
+
+_HALF_SPACE: Values = {"model": "half-space"}
+_NO_OUTPUT: Values = {"figures": False, "report": False, "check": "none", "contact": "none"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Configuration:
+    """One way to compute a scene.
+
+    Attributes:
+        name: A unique name, for tables and legends.
+        scene: The scene that does it.
+        cost: Predicted wall time [s].
+        ranks: Number of processes.
+    """
+
+    name: str
+    scene: Scene
+    cost: float = float("inf")
+    ranks: int = 1
+
+    @property
+    def kind(self) -> str:
+        """The coupling."""
+        return self.scene.coupling.kind
+
+    @property
+    def model(self) -> str:
+        """The micro model; empty for an explicit reference."""
+        return "" if self.kind == "reference" else self.scene.micro.model
+
+    @property
+    def heights(self) -> Grid:
+        """Grid of the surface, which all configurations state."""
+        return cast("Grid", self.scene.surface.grid)
+
+    @cached_property
+    def key(self) -> str:
+        """Hash of everything that the results depend on."""
+        parts = {"scene": identity(self.scene), "ranks": self.ranks}
+        return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()[:20]
+
+
+def configurations(scene: Scene, ranks: int = 1) -> list[Configuration]:
+    """Return the configurations of a scene, those of the least work first.
+
+    Args:
+        scene: The scene, without auto values.
+        ranks: Number of processes that run each.
+
+    Raises:
+        InputError: When the surface cannot be read.
+    """
+    chosen: dict[str, Configuration] = {}
+    setups: dict[Any, Coupling] = {}
+    # The scene itself comes first: an equal configuration does not replace its name.
+    for number, values in enumerate(_Catalogue(scene).all()):
+        try:
+            changed, cost = scene.with_(values), float("inf")
+            setup = make_setup(changed, like=setups.get(changed.surface.grid))
+            setups.setdefault(changed.surface.grid, setup)
+            cost = setup.work().computing
+        except MemoryLacking:  # its row says so, once it is to be run
+            pass
+        except (InputError, NotConverged):
+            continue
+        name = f"{OWN}: " * (number == 0) + _name(changed)
+        one = Configuration(name=name, scene=changed, cost=cost, ranks=ranks)
+        chosen.setdefault(one.key, one)
+    return sorted(chosen.values(), key=lambda one: one.cost)
+
+
+def pressure_grid(scene: Scene) -> Grid:
+    """Return the patches that pressures are compared on: the scene's, divided to at least 4 × 4."""
+    nx, ny = (count * -(-4 // count) for count in patch_grid(scene))
+    return nx, ny
+
+
+def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
+    """Return the grids that the surface can be made on, the coarsest first and its own last.
+
+    Heights from a file have their own grid only, and so have those of two rough sides.
+    """
+    grids, spectrum = [heights], scene.surface.spectrum
+    if spectrum is None or scene.counter_surface is not None:
+        return grids
+    bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
+    least = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * band[1]) for band in bands if band]
+    while all(n % 2 == 0 and n // 2 >= few for n, few in zip(grids[0], least, strict=True)):
+        grids.insert(0, (grids[0][0] // 2, grids[0][1] // 2))
+    return grids
+
+
+class _Catalogue:
+    """What the configurations of a scene have in common, and by what they differ."""
+
+    def __init__(self, scene: Scene) -> None:
+        surface, cells = make_surface(scene), block_section(scene).cells
+        self._of, self._patches = scene, patch_grid(scene)
+        self._grids = coarser_grids(surface.grid, scene)
+        fitting = [grid for grid in self._grids if max(grid) <= LAW_HEIGHTS]
+        self._law_grid = fitting[-1] if fitting else self._grids[0]
+        stated = cells if isinstance(cells, tuple) else None
+        self._cells = stated or LAW_BLOCK_CELLS
+        of_all = {"output": _NO_OUTPUT, "load.force_change": None, "surface.grid": self._grids[-1]}
+        self._own = of_all | {"block.cells": stated if scene.on_mesh else None}
+        # Of all others every key is stated, so that no accuracy chooses one; only laws need a mesh.
+        micro = to_dict(scene.micro, whole=False)
+        self._common = of_all | {"accuracy": None, "block.cells": None, "micro": micro}
+        self._common |= {"patches.grid": pressure_grid(scene)}
+
+    def all(self) -> Iterator[Values]:
+        """Yield by what the configurations differ from the scene; the scene itself is first."""
+        yield self._own
+        yield from (self._common | values for values in self._ways())
+
+    def _ways(self) -> Iterator[Values]:
+        for model in MODELS:
+            yield {"coupling": {"kind": "analytic"}, "micro": {"model": model}}
+        for kind in ("analytic", "concurrent"):
+            yield from self._half_spaces({"coupling": {"kind": kind}})
+        yield from self._laws()
+        yield from self._references()
+
+    def _half_spaces(self, values: Values) -> Iterator[Values]:
+        """Yield half-spaces on every grid, and one of them without finite slopes."""
+        for heights in self._grids:
+            yield values | {"micro": _HALF_SPACE, "surface.grid": heights}
+        small = _HALF_SPACE | {"finite_slopes": False}
+        yield values | {"micro": small, "surface.grid": self._law_grid}
+
+    def _laws(self) -> Iterator[Values]:
+        """Yield couplings by laws, from asperities and from half-spaces."""
+        own, cells, model = self._patches, self._cells, self._of.micro.model
+        isolated = {"coupling": {"kind": "isolated", "love": self._of.coupling.love}}
+        decomposed = {"coupling": {"kind": "consistent", "compliance": "decomposed"}}
+        meshed = {"coupling": {"kind": "consistent", "compliance": "finite-element"}}
+        on_cells = {"micro": _HALF_SPACE, "surface.grid": self._law_grid}
+        if model != "half-space":
+            yield decomposed | {"patches.grid": own}
+        else:
+            isolated["micro"] = {"model": "elliptic"}
+        half = tuple(max(1, count // 2) for count in cells)
+        grids = {(count, count) for count in PATCHES if count <= min(self._grids[-1])} | {own}
+        for patches, mesh in (*((patches, cells) for patches in grids), (own, half)):
+            if _carries(mesh, patches):
+                yield isolated | {"patches.grid": patches, "block.cells": mesh}
+        for patches in grids:
+            yield decomposed | on_cells | {"patches.grid": patches}
+        yield from self._half_spaces(decomposed | {"patches.grid": own})
+        yield isolated | on_cells | {"patches.grid": own, "block.cells": cells}
+        if _carries(cells, own):
+            yield meshed | on_cells | {"patches.grid": own, "block.cells": cells}
+
+    def _references(self) -> Iterator[Values]:
+        """Yield references, of several numbers of meshes and with several edges."""
+        fine = self._fine
+        for meshes, factor in REFERENCE_MESHES if fine else ((1, 1.0), (2, 1.0), (3, 1.0)):
+            edges = {"reference.fine": float(f"{factor * fine:.4g}")} if fine else {}
+            yield {"coupling": {"kind": "reference"}, "reference.meshes": meshes} | edges
+
+    @property
+    def _fine(self) -> float | None:
+        """Edges of tetrahedra that fit the contacts; None where they are not known."""
+        section, loads = self._of.reference, self._of.loading
+        if section.hexahedral or section.fine:
+            return section.fine
+        if loads.approach is None or loads.tilt == "free":
+            return None
+        surface = make_surface(self._of)
+        largest = load_history_on(self._of, (surface,)).largest
+        return suggested_fine(surface, largest, tilt=loads.tilt)
+
+
+def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
+    """Tell whether enough elements lie under every patch."""
+    return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], patches, strict=True))
+
+
+def _name(scene: Scene) -> str:
+    """Return the name of a configuration in tables: its coupling, micro model and grids."""
+    kind, micro, reference = scene.coupling.kind, scene.micro, scene.reference
+    if kind == "reference":
+        name = f"reference, {reference.meshes} mesh{'es' * (reference.meshes > 1)}"
+        return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
+    name = kind
+    if kind in ("isolated", "consistent"):
+        name += f", {times(patch_grid(scene))} patches"
+    name += f", {micro.model}"
+    if micro.model == "half-space":
+        name += f" {times(scene.surface.grid)}"
+    cells = block_section(scene).cells
+    name += f", {times(cells)} elements" if cells else ""
+    return name + SMALL_SLOPES * (micro.finite_slopes is False)
+
+
+def times(counts: Any, sign: str = " × ") -> str:
+    """Return counts along the axes as a text."""
+    return sign.join(map(str, counts))
