@@ -229,6 +229,8 @@ def compare(before, after):
                 largest, place = float("inf"), key
                 continue
             scale = max(map(abs, a), default=0.0) or 1.0
+            if "imbalance" in key:  # which is relative itself
+                scale = 1.0
             apart = max((abs(x - y) / scale for x, y in zip(a, b, strict=True)), default=0.0)
             if apart > largest:
                 largest, place = apart, key
