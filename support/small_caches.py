@@ -31,6 +31,7 @@ def cached_where_small(
         def made(*args: P.args, **kwargs: P.kwargs) -> T:
             return (cached if is_small(*args, **kwargs) else make)(*args, **kwargs)  # type: ignore[arg-type]
 
+        made.cache_clear, made.cache_info = cached.cache_clear, cached.cache_info  # type: ignore[attr-defined]
         return made
 
     return decorated

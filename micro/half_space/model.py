@@ -144,6 +144,38 @@ class HalfSpaceModel:
         surface = self.surface.on_grid(grid)
         return replace(self, surface=surface, highest=self.reference_height, slopes=())
 
+    def solve(
+        self,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = (0.0, 0.0),
+        start: Start | None = None,
+    ) -> ContactState:
+        """Solve the contact at one approach of the plane: `press` in short.
+
+        Args:
+            approach: Rigid approach δ at the centre of the rectangle [mm].
+            tilt: Slopes (tx, ty) of the approach: δ(x, y) = δ + tx (x − xc) + ty (y − yc).
+            start: What the solution may start from, see `ContactState.guess`.
+        """
+        return self.press(Control(approach=approach, tilt=tilt), start=start)
+
+    def solve_force(
+        self,
+        force: float,
+        *,
+        tilt: tuple[float, float] | None = (0.0, 0.0),
+        start: Start | None = None,
+    ) -> ContactState:
+        """Solve the contact under one normal force: `press` in short.
+
+        Args:
+            force: Normal force, ≥ 0 [N]; beyond full contact of a periodic surface too.
+            tilt: Slopes (tx, ty) of the plane, kept while it finds its height; None lets it turn.
+            start: What the solution may start from, see `ContactState.guess`.
+        """
+        return self.press(Control(force=force, tilt=tilt), start=start)
+
     def press(
         self,
         control: Control,

@@ -141,12 +141,15 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         scene: The scene as it was given.
         resolved: What `resolved_sections` returned.
     """
-    changed: dict[str, Any] = {
-        name: read(type(getattr(scene, name)), content)
-        for name, content in resolved.items()
-        if name != "micro"
+    contents = {name: content for name, content in resolved.items() if name != "micro"}
+    sections: dict[str, Any] = {
+        name: read(type(getattr(scene, name)), content) for name, content in contents.items()
     }
-    return replace(scene, **changed)
+    stated = {  # which other scenes are made from
+        name: {key: value for key, value in content.items() if value is not None}
+        for name, content in contents.items()
+    }
+    return replace(scene, **sections, written=scene.written | stated)
 
 
 def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import os
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -85,11 +84,12 @@ def _fresh(scene: Scene, comm: Any) -> Iterator[None]:
 
     A small scene with the same coupling brings these, so that no run waits for them.
     """
-    before, kind = os.environ.get(_CACHE), type(lru_cache(_small))
+    before = os.environ.get(_CACHE)
     os.environ[_CACHE] = "off"
-    for one in gc.get_objects():
-        if isinstance(one, kind) and str(one.__module__).startswith(("micro", "macro")):
-            one.cache_clear()
+    for name in [name for name in sys.modules if name.startswith(("micro.", "macro."))]:
+        for one in vars(sys.modules[name]).values():
+            if clear := getattr(one, "cache_clear", None):
+                clear()
     try:
         with suppress(PatchlawError):  # the scene itself will report its error
             run_case(_small(scene), comm)

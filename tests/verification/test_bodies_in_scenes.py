@@ -68,24 +68,24 @@ def test_a_cube_from_a_file_is_the_block(folder, name):
     coupling = {"coupling": {"kind": "isolated", "table_tolerance": 1e-2, **WAYS[name]}}
     block = {"block": {**CONSTANTS, "cells": CELLS}}
     expected = done(**PATCHES, **coupling, **block)
-    table = expected.table
+    table = expected.coupling.table
     assert forces(expected)[-1] > 0.1
     found = done(**PATCHES, **coupling, body=body(folder), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-10)
     found = done(**PATCHES, **coupling, body=body(folder, "turned"), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
-    np.testing.assert_allclose(found.coupling.face.lengths, [1, 1], rtol=1e-12)
+    np.testing.assert_allclose(found.coupling.body.lengths, [1, 1], rtol=1e-12)
 
 
 def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):
     sections = {"law": {"kind": "representative"}, "surface": SAMPLE, "output": QUIET}
     load = {"load": {"force": "2 N", "steps": 2}}
     here = done(**sections, **load, body=body(folder))
-    there = done(**sections, **load, body=body(folder, "turned"), table=here.table)
+    there = done(**sections, **load, body=body(folder, "turned"), table=here.coupling.table)
     approach = [[step.approach_mm for step in whole.steps] for whole in (here, there)]
     assert approach[1] == pytest.approx(approach[0], rel=1e-9)
     block = {**CONSTANTS, "cells": CELLS, "lengths": [1, 1], "height": HEIGHT}
-    on_block = done(**sections, **load, block=block, table=here.table)
+    on_block = done(**sections, **load, block=block, table=here.coupling.table)
     approach = [step.approach_mm for step in on_block.steps]
     assert approach == pytest.approx([step.approach_mm for step in here.steps], rel=1e-10)
 
@@ -129,7 +129,7 @@ def test_a_column_in_series_with_the_law_of_a_sample(folder):
         load={"approach": "6 um", "steps": 2},
         output=QUIET,
     )
-    law = found.table.laws[0]
+    law = found.coupling.table.laws[0]
     expected = [column(law, step.approach_mm) for step in found.steps]
     assert forces(found) == pytest.approx(expected, rel=1e-10)  # on 1 mm²
     peaks = [step.peak_pressure_MPa for step in found.steps]
@@ -169,7 +169,7 @@ def test_a_moved_support_is_an_approach(folder):
         **sections,
         body=body(folder, supports=lifted),
         load={"approach": "4 um", "steps": 1},
-        table=still.table,
+        table=still.coupling.table,
     )
     assert forces(found) == pytest.approx(forces(still), rel=1e-9)
 
@@ -186,12 +186,12 @@ def test_a_crown_is_a_gap_of_the_face(folder):
         **sections,
         law={**law, "crown": ["0.1 m", "inf"]},
         body=body(folder, "fine"),
-        table=flat.table,
+        table=flat.coupling.table,
     )
-    found = done(**sections, law=law, body=crowned, table=flat.table)
+    found = done(**sections, law=law, body=crowned, table=flat.coupling.table)
     assert forces(found)[-1] < 0.95 * forces(flat)[-1]
     assert forces(found) == pytest.approx(forces(key), rel=2e-3)  # chords of the parabola
-    assert "below its highest point" in found.coupling.face.notes[0]
+    assert "below its highest point" in found.coupling.body.notes[0]
     with pytest.raises(InputError, match=r"is not planar: its nodes are up to 0\.000625 mm off"):
         Run(Scene.from_dict({**PATCHES, "body": crowned}))
 

@@ -72,7 +72,7 @@ def test_heights_from_a_file_are_taken_as_they_are(tmp_path):
     scene = Scene.load(tmp_path / "scan.toml")
     found = configurations(scene)
     assert {one.heights for one in found} == {(40, 20)}
-    assert {one.scene.surface_path for one in found} == {file}
+    assert {one.scene.path_of(one.scene.surface.file) for one in found} == {file}
     before = {one.key for one in found}
     np.save(file, 1e-3 * np.random.default_rng(2).normal(size=(40, 20)))
     assert not before & {one.key for one in configurations(scene)}  # other heights, other results

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from micro.compliance.grid_compliance import _small_half_space
 
 from macro.compliance.cache import cache_directory
+from micro.boundary_elements.grid_compliance import _half_space
 from multiscale.run import Run, run
 from multiscale.scene.scene import Scene
 from multiscale.studies import comparison
@@ -183,7 +183,7 @@ def test_no_earlier_run_has_made_what_a_run_takes(monkeypatch):
     scene = SCENE.with_({"coupling.kind": "analytic", "micro.model": "half-space"})
     for _ in range(2):
         measured_run(Configuration(name="", scene=scene))
-        made.append(_small_half_space.cache_info().misses)  # of this run alone
+        made.append(_half_space.cache_info().misses)  # of this run alone
     assert made[0] == made[1] > 0
     assert set(folders) == {None}
     assert os.environ["PATCHLAW_CACHE"] == "/somewhere"
