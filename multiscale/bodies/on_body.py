@@ -23,13 +23,20 @@ _RESIDUAL = 1e-10
 of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
 
 
-def on_body(bodies: Bodies | None, materials: MaterialPair, counter: Surface | None) -> OnBody:
+def on_body(
+    bodies: Bodies | None,
+    materials: MaterialPair,
+    counter: Surface | None,
+    *,
+    more_modes: int = 0,
+) -> OnBody:
     """Return what puts half-space models on the bodies of a scene, which are solved for once.
 
     Args:
         bodies: The bodies; None for half-spaces.
         materials: The materials on both sides.
         counter: What of the surface is the counter-body's; None where that is smooth.
+        more_modes: Modes of the body along a side beyond those that its shape needs.
 
     Returns:
         A function from a model and the order of finite slopes, 0 for none, to the model on the
@@ -39,7 +46,10 @@ def on_body(bodies: Bodies | None, materials: MaterialPair, counter: Surface | N
         Collective.
     """
     terms = None if bodies is None else bodies.terms(side_term=True)
-    face = None if bodies is None or terms is None else terms.face(bodies.comm)
+    face = None
+    if bodies is not None and terms is not None:
+        modes = terms.modes + more_modes if more_modes else None
+        face = terms.face(bodies.comm, modes=modes)
 
     def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
         model, above = replace(model, tolerance=_RESIDUAL), None

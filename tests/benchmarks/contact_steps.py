@@ -18,7 +18,6 @@ import numpy as np
 
 from geometry import Control
 from multiscale import Scene, make_setup
-from multiscale.couplings.contact import contact_model
 
 
 def scene(grid, seed):
@@ -53,7 +52,7 @@ def main():
     for grid in choice.grids:
         ratios = []
         for seed in choice.seeds:
-            whole = contact_model(make_setup(scene(grid, seed)), None)
+            whole = make_setup(scene(grid, seed)).model_on_body()
             small = replace(whole, slopes=())
             models = [replace(small, body=None), small, whole]
             starts = [model.press(Control(approach=6e-3)) for model in models]

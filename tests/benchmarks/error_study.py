@@ -20,12 +20,11 @@ from dataclasses import replace
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from multiscale.couplings.body import scene_body
 
 from geometry import InputError, Spectrum, Surface, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene
-from multiscale.couplings.contact import SLOPES, on_body
+from multiscale.bodies.on_body import SLOPES, on_body
 
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""
@@ -122,11 +121,10 @@ def meshed_force(data):
 def finer_force(run, number):
     """Return the force on more cells and with more modes, under the last load step's plane [N]."""
     setup, step = run.coupling, run.steps[-1]
-    block = scene_body(setup) if setup.has_block else None
-    face = block and block.face(None, modes=block.modes + MORE_MODES)
-    body = on_body(setup, None, half_space=block is None, face=face)
-    surface = surface_of(number, min(FINER * setup.model.surface.grid[0], MOST_CELLS))
-    model = replace(setup.model, surface=surface, highest=surface.highest)
+    bodies = setup.bodies if setup.has_body else None
+    body = on_body(bodies, setup.materials, setup.counter_surface, more_modes=MORE_MODES)
+    surface = surface_of(number, min(FINER * setup.micro.surface.grid[0], MOST_CELLS))
+    model = replace(setup.micro, surface=surface, highest=surface.highest)
     order = SLOPES if setup.finite_slopes else 0
     return body(model, order).press(Control(approach=step.approach_mm, tilt=step.tilt)).force
 

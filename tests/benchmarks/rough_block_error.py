@@ -30,7 +30,6 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from multiscale import Scene, extrapolated, make_setup
-from multiscale.couplings.contact import contact_model
 
 GRID, SIDE, RADIUS, FLOOR = 256, 1.0, 0.16, -0.05
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
@@ -83,8 +82,7 @@ def models(surface):
     )
     setup = make_setup(scene)
     setup = replace(setup, surface=surface, micro=replace(setup.micro, surface=surface))
-    steep = contact_model(setup, None)
-    return steep, replace(contact_model(_small(setup), None), surface=surface)
+    return setup.model_on_body(), replace(_small(setup).model_on_body(), surface=surface)
 
 
 def _small(setup):

@@ -47,8 +47,6 @@ def scene(choice: argparse.Namespace) -> dict:
 def measure(choice: argparse.Namespace) -> None:
     """Make the laws on this rank and the others; rank 0 prints the facts as JSON."""
     from mpi4py import MPI
-    from multiscale.couplings.assembly import make_table
-    from multiscale.couplings.patch_compliance import patch_displacements
 
     import macro  # noqa: F401 imports are no part of the times
     from multiscale import Scene, consistent_laws
@@ -66,24 +64,26 @@ def measure(choice: argparse.Namespace) -> None:
         return found
 
     run = timed("set-up", lambda: Run(Scene.from_dict(scene(choice)), comm))
-    model, setup = timed("body", run.make_model), run.coupling
+    setup = run.coupling
     if choice.kind == "concurrent":
-        timed("coupling", run.make_coupling)
+        timed("coupling", run.prepare)
         steps = timed("load steps", lambda: list(run.load_steps()))
         if MPI.COMM_WORLD.rank == 0:
             forces = sum(step.force_N for step in steps)
             print(json.dumps({"seconds": times, "rows": len(steps), "pressure": forces}))
         return
     if choice.kind == "isolated":
-        table = timed("laws", lambda: make_table(setup, model, comm))
+        table = timed("laws", setup.make_laws)
     else:
-        displacements = timed("displacements", lambda: patch_displacements(setup, comm, dense=True))
+        model = timed("body", setup.model_on_body)
+        compliance = timed("displacements", setup.bodies.patch_compliance)
         history = setup.scene.loading
         table = timed(
             "laws",
             lambda: consistent_laws(
                 model, setup.patches, mean_heights=setup.mean_heights,
-                largest=history.control(history.largest), displacements=displacements,
+                largest=history.control(history.largest), 
+                displacements=lambda pressures: pressures @ compliance.T,
                 tolerance=1e-9, most_rows=ROWS, comm=comm,
             ),
         )  # fmt: skip
