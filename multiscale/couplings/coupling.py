@@ -298,13 +298,8 @@ class Coupling(SceneParts, ABC):
         Raises:
             InputError: When the coupling has no laws.
         """
-        raise InputError(
-            "has no laws",
-            key="coupling.kind",
-            value=scene.kind,
-            allowed="isolated, consistent",
-            file=scene.file,
-        )
+        if not cls.has_laws:
+            raise _without_laws(scene)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once.
@@ -316,8 +311,7 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        self.check_has_laws(self.scene)
-        raise NotImplementedError
+        raise _without_laws(self.scene)
 
     @abstractmethod
     def prepare(self) -> None:
@@ -564,3 +558,14 @@ class Coupling(SceneParts, ABC):
     @abstractmethod
     def _drop_solvers(self) -> None:
         """Let go of what holds the bodies, whose matrices stay in memory until then."""
+
+
+def _without_laws(scene: Scene) -> InputError:
+    """Return the error on a coupling without laws."""
+    return InputError(
+        "has no laws",
+        key="coupling.kind",
+        value=scene.kind,
+        allowed="isolated, consistent",
+        file=scene.file,
+    )

@@ -16,7 +16,6 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import Solver
 from multiscale.readable import Observer
-from multiscale.scene.scene import Scene
 
 
 class LawSolver(Solver, Protocol):
@@ -80,10 +79,6 @@ class LawCoupling(Coupling):
     @abstractmethod
     def _make_solver(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; collective."""
-
-    @classmethod
-    def check_has_laws(cls, scene: Scene) -> None:
-        """Do nothing: the coupling has laws."""
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
