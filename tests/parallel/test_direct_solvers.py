@@ -27,8 +27,7 @@ def forces(mpirun, root):
     return of
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-@pytest.mark.parametrize("choice", CHOICES)
+@pytest.mark.parametrize(("choice", "ranks"), [("mumps", 1), *((one, 2) for one in CHOICES)])
 def test_forces_are_those_of_multigrid(forces, choice, ranks):
     usual, found = forces("usual", 1), forces(choice, ranks)
     for name in usual:

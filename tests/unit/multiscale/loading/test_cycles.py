@@ -1,6 +1,7 @@
 """Cyclic loads under every control, with every coupling: a cycle repeats the one before."""
 
 import tomllib
+from itertools import product
 
 import numpy as np
 import pytest
@@ -28,8 +29,17 @@ COUPLINGS = {
 }
 
 
-@pytest.mark.parametrize("load", CONTROLS.values(), ids=CONTROLS)
-@pytest.mark.parametrize("changes", COUPLINGS.values(), ids=COUPLINGS)
+CASES = [
+    *product(("analytic", "concurrent"), CONTROLS),  # the stepper's controls are those of all
+    *product(set(COUPLINGS) - {"analytic", "concurrent"}, ["force, free"]),
+]
+
+
+@pytest.mark.parametrize(
+    ("changes", "load"),
+    [(COUPLINGS[name], CONTROLS[control]) for name, control in sorted(CASES)],
+    ids=[f"{name}-{control}" for name, control in sorted(CASES)],
+)
 def test_a_cycle_repeats_the_one_before(changes, load):
     data = tomllib.loads(SMALL_SCENE)
     data["block"]["cells"] = [4, 4, 3]
