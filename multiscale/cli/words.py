@@ -76,6 +76,10 @@ def sweep_part(text: str) -> tuple[int, int]:
     raise argparse.ArgumentTypeError(f"{text!r} is no part of a sweep; it is K/N, such as 2/8")
 
 
+def _removed_ranks(text: str) -> NoReturn:
+    raise argparse.ArgumentTypeError("is no option any more; mpirun -n N patchlaw compare SCENE")
+
+
 _TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
 
 
@@ -140,6 +144,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     compare.add_argument("--against", metavar="KIND", choices=AGAINST, help=against)
     budget = "wall time for all configurations, such as 5min; by default any"
     compare.add_argument("--budget", help=budget, **_TIME)
+    compare.add_argument("--ranks", type=_removed_ranks, help=argparse.SUPPRESS)
     sweep = command(
         "sweep",
         "sweep.sweep_scene",
