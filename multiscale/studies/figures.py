@@ -138,7 +138,7 @@ def comparison_figure(comparison: Comparison) -> Figure:
     titles = {
         f"{response}_max": f"{response}: largest error over the curve",
         "area_max": "contact area: largest error over the curve",
-        "distribution": "pressures: distance over their mean",
+        "distribution": "pressures: distance / mean",
     }
     figure = new_figure(FULL_WIDTH, 4.4)
     panels, below = panels_above_legend(figure, 3, 0.16)
