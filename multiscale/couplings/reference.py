@@ -91,7 +91,6 @@ class ReferenceCoupling(PressedSurface):
             surface,
             contact_modulus=parts["materials"].contact_modulus,
             periodic=scene.surface.periodic,
-            hardness=scene.micro.hardness,
         )
         plane = estimated_plane(parts["load_history"], model)
         parts["seconds"]["load estimate"] = time.perf_counter() - began
