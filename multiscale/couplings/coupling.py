@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
@@ -70,6 +70,13 @@ class Coupling(SceneParts, ABC):
     table: LawTable | None = field(default=None, init=False)
     _past: Any = field(default=None, init=False)
     _meshes: tuple[SceneBody | None, SceneBody | None] = field(default=(None, None), init=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is made from the scene alone; bodies and solvers are not sent."""
+        return {one.name: getattr(self, one.name) for one in fields(self) if one.init}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]
 
     # --- from the scene
 

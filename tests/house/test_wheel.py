@@ -133,7 +133,7 @@ OF_DOLFINX = "bodies of finite elements need it: take dolfinx"
         ("patchlaw.run", "pydantic", WITH_PIP),
         ("multiscale.read_laws", "h5py", WITH_PIP),
         ("patchlaw.History.plot(None)", "matplotlib", WITH_PIP),
-        ("patchlaw.ContactProblem", "ufl", OF_DOLFINX),
+        ("patchlaw.ContactProblem", "dolfinx", OF_DOLFINX),
         ("gmsh_session('box').__enter__()", "gmsh", OF_DOLFINX),
     ],
 )

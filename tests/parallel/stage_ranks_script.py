@@ -29,7 +29,7 @@ if __name__ == "__main__":
         surface.heights.flags.writeable,
         float(surface.interpolant(0.31, 0.62, dx=1)).hex(),
         setup.asperities.count,
-        setup.model.contact_modulus.hex(),
+        setup.micro.contact_modulus.hex(),
     )
     nodes = cluster_nodes(COMM)
     everywhere = COMM.gather(told)

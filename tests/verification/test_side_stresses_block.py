@@ -13,7 +13,7 @@ from helpers.love_stresses import love_stresses
 from helpers.reference_cases import COMM
 from scipy.interpolate import RectBivariateSpline
 
-from geometry import Control, RefinedShape
+from geometry import RefinedShape
 from macro import Block, Material, block_mesh
 from micro import FreeSides
 from micro.boundary_elements.side_cells import SideStresses
@@ -42,9 +42,7 @@ def meshed_stresses(nu):
     top = ufl.conditional(ufl.gt(x[2], -1e-9), pressure, 0.0)
     measure = ufl.ds(metadata={"quadrature_degree": 6})
     form = fem.form(-top * ufl.TestFunction(block.space)[2] * measure)
-    displaced = block.press(Control(approach=fem.petsc.assemble_vector(form))).x.array.reshape(
-        -1, 3
-    )[:, :2]
+    displaced = block.solve(fem.petsc.assemble_vector(form)).x.array.reshape(-1, 3)[:, :2]
     nodes = block.space.tabulate_dof_coordinates()
     cells = block.space.dofmap.list.array.reshape(-1, 10)
     on_top = np.abs(nodes[cells, 2]) < 1e-9
