@@ -94,13 +94,6 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     return large.bcast(made, root=0)
 
 
-def is_cached(kind: str, key: tuple[object, ...]) -> bool:
-    """Tell whether this process finds arrays in the cache; see `cached`."""
-    words = fingerprint((sources_digest(), kind, key))
-    path = _file(kind, words)
-    return path is not None and _read(path, words) is not None
-
-
 @cache
 def sources_digest(top: Path = _TOP) -> str:
     """Return a digest of the sources of the packages that make the cached arrays.

@@ -5,6 +5,7 @@ Theory: docs/theory.md, sections 10 and 11.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
@@ -166,9 +167,9 @@ class PatchLaws(LawCoupling, MicroCoupling):
         return f"{coupling.kind}: {grid}; {self._made}; {coupling.interface} closure"
 
     @property
+    @abstractmethod
     def _made(self) -> str:
         """How the laws are made, in words."""
-        raise NotImplementedError
 
 
 @dataclass(kw_only=True, eq=False)

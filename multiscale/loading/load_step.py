@@ -179,37 +179,6 @@ class LoadStep:
             **other,
         )
 
-    def with_modulus(self, ratio: float) -> LoadStep:
-        """Return the load step of a body whose Young's modulus is another, at the same approach.
-
-        Args:
-            ratio: The other modulus over that of this load step's body. Forces and pressures are
-                proportional to it.
-        """
-        mx, my = self.moment_N_mm
-        rates = self.patches.stiffness_MPa_per_mm
-        patches = replace(
-            self.patches,
-            pressure_MPa=ratio * self.patches.pressure_MPa,
-            stiffness_MPa_per_mm=None if rates is None else ratio * rates,
-        )
-        names = (
-            *("force_error_N", "peak_pressure_MPa"),
-            *("stiffness_N_per_mm", "stiffness_error_N_per_mm"),
-            *("elastic_energy_mJ", "plastic_work_mJ", "work_mJ"),
-        )
-        known = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        return replace(
-            self,
-            force_N=ratio * self.force_N,
-            mean_pressure_MPa=ratio * self.mean_pressure_MPa,
-            moment_N_mm=(ratio * mx, ratio * my),
-            **{name: ratio * value for name, value in known.items()},
-            errors=tuple((cause, ratio * error) for cause, error in self.errors),
-            meshes=tuple((approach, ratio * force, area) for approach, force, area in self.meshes),
-            patches=patches,
-        )
-
     def counted_from(self, zero: float) -> LoadStep:
         """Return the load step with approach and closures counted from another height.
 
