@@ -30,7 +30,7 @@ from typing import Any
 
 from geometry import Control
 from micro import BodyModes, ContactState, HalfSpaceModel
-from multiscale.bodies.on_body import SLOPES, OnBody
+from multiscale.bodies.bodies import SLOPES, OnBody
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent, quantity

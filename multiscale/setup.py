@@ -18,7 +18,7 @@ from multiscale.auto.keys import (
 from multiscale.auto.mesh_search import MeshError, measured_mesh_error
 from multiscale.auto.search import coupling_by_accuracy
 from multiscale.bodies.reader import read_bodies
-from multiscale.couplings.coupling import Coupling, Facts
+from multiscale.couplings.coupling import Coupling, Facts, Source
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
@@ -77,7 +77,7 @@ def _made(
     start = provisional(with_resolved(scene, known), auto)
 
     def build(stated: Scene) -> Coupling:
-        return coupling_class(stated).from_scene(stated, facts, nodes)
+        return coupling_class(stated).from_scene(Source(stated, facts, nodes))
 
     if not known and is_measured(scene):
         chosen = coupling_by_accuracy(scene, start, build, mesh_error)
@@ -86,4 +86,4 @@ def _made(
         start = with_value(start, "patches.grid", map_grid(start, make_surface(start)))
     x, y = known.get("micro") or (0, 0)
     cells = (int(x), int(y)) if x else None
-    return coupling_class(start).from_scene(start, facts, nodes, like=like, cells=cells)
+    return coupling_class(start).from_scene(Source(start, facts, nodes, like, cells))

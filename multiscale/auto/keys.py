@@ -15,7 +15,7 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.couplings.work import SOLUTIONS_OF_LAWS
 from multiscale.inputs.loads import PROVISIONAL_PATCHES
-from multiscale.inputs.spectrum import most_waves
+from multiscale.inputs.surfaces import most_waves
 from multiscale.loading.stepper import step_count
 from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene import Scene

@@ -27,9 +27,9 @@ from multiscale.auto.mesh_search import Build, Errors, MeshError, MeshSearch, re
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.couplings.scene_parts import Decision
 from multiscale.inputs.loads import load_history_on
 from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.measured_errors import ZERO, ErrorProbe

@@ -14,8 +14,7 @@ import numpy as np
 
 from geometry import InputError, Material
 from geometry.face_frame import UPWARD, FaceFrame
-from multiscale.bodies.scene_body import SceneBody
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts, SceneBody
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 from geometry.materials import Material
 from geometry.meshes.block import misalignment
 from geometry.statistics import roughness
-from multiscale.couplings.scene_parts import SceneParts
-from multiscale.inputs.block import block_section
-from multiscale.inputs.body_facts import BodyFacts
-from multiscale.inputs.spectrum import heights_per_wave
+from micro import MicroModel
+from multiscale.inputs.bodies import BodyFacts, block_section
+from multiscale.inputs.scene_parts import SceneParts
+from multiscale.inputs.surfaces import heights_per_wave
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
+from multiscale.scene.sections import MicroSection
 
+_INTERACTING = ("elliptic", "circular")
 LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
 cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
@@ -79,6 +81,21 @@ def two_sides(parts: SceneParts) -> str:
         rigid = "the slopes of [surface] alone count: the other side is rigid"
         return f"{text}; the heights of both add, {rigid}"
     return f"{text}; the heights of both add, and the slopes of each count on its own body"
+
+
+def micro_model(section: MicroSection, model: MicroModel | None) -> str:
+    """Say which micro model solves contacts, and how.
+
+    Args:
+        section: What the scene says of it.
+        model: The model; None where contacts are meshed.
+    """
+    if model is None:
+        return "none: contacts are meshed, and the keys of [micro] are not used"
+    if section.model in _INTERACTING:
+        return f"{model.name}, solved by {section.solver}"
+    unused = section.solver != type(section)().solver
+    return f"{model.name}; it has no use for micro.solver" if unused else model.name
 
 
 def load(parts: SceneParts) -> str:

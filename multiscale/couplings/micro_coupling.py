@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -13,45 +13,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Asperities, InputError, MaterialPair, Surface
-from geometry.plausibility import check_finite_slopes
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
-from multiscale.bodies.on_body import SLOPES, OnBody, on_body
+from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.couplings.coupling import Coupling, Facts
-from multiscale.couplings.estimate import plane_at_largest_load, prescribed_plane
-from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.couplings.work import (
-    BYTES_PER_CELL,
-    FACE_CYCLES,
-    PRODUCTS,
-    SET_UP_CYCLES,
-    SLOPES_PRODUCTS,
-    SOLUTIONS_OF_LAWS,
-    Work,
+from multiscale.couplings.contact_solver import (
+    ContactSolver,
+    plane_at_largest_load,
+    prescribed_plane,
 )
-from multiscale.inputs.memory import law_requests
-from multiscale.inputs.surfaces import located
+from multiscale.couplings.coupling import Source
+from multiscale.couplings.pressed_surface import PressedSurface
+from multiscale.couplings.work import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
-from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
 
-Array = NDArray[np.float64]
-
-_INTERACTING = ("elliptic", "circular")
 _CHECK, _FINER = 2.0, 6.0
 """Solutions on the run's cells that an error check is worth, and where it solves a finer grid."""
 
 
 @dataclass(kw_only=True, eq=False)
 class MicroCoupling(PressedSurface):
-    """A micro model of the whole surface, on the body of the scene.
-
-    Attributes:
-        micro: Micro model of the whole surface, on a half-space.
-    """
+    """A micro model of the whole surface, on the body of the scene."""
 
     needs_plane: ClassVar[bool] = False
     """Whether something needs the plane at the largest load before the load steps."""
@@ -59,22 +43,21 @@ class MicroCoupling(PressedSurface):
     micro: MicroModel
 
     @classmethod
-    def from_scene(
-        cls,
-        scene: Scene,
-        facts: Facts,
-        nodes: ClusterNodes,
-        *,
-        like: Coupling | None = None,
-        cells: tuple[int, int] | None = None,
-    ) -> Self:
+    def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        parts = cls._parts(scene, facts, nodes, like)
+        parts, scene = cls._parts(source), source.scene
         began, surface, history = time.perf_counter(), parts["surface"], parts["load_history"]
         model = _stated_model(scene, surface, parts["materials"])
-        if cells is not None and isinstance(model, HalfSpaceModel):
-            model = model.resampled(cells)
-        _refuse_without_summits(scene, model)
+        if source.cells is not None and isinstance(model, HalfSpaceModel):
+            model = model.resampled(source.cells)
+        if not math.isfinite(model.first_touch):
+            raise InputError(
+                "the surface has no summit that could carry load",
+                key="micro.model",
+                value=scene.micro.model,
+                allowed="half-space",
+                file=scene.file,
+            )
         plane = prescribed_plane(history, surface)
         solves = cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel)
         if plane is None and solves:  # laws end there, and statements say it of summits
@@ -83,51 +66,25 @@ class MicroCoupling(PressedSurface):
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         return cls(micro=model, plane_at_largest_load=plane, **parts)
 
-    def __post_init__(self) -> None:
-        """Refuse finite slopes of a surface that is too steep for them."""
-        if self.finite_slopes:
-            with located(self.scene, "micro.finite_slopes"):
-                for surface in self._sloped:
-                    check_finite_slopes(surface)
-
     @property
-    def _sloped(self) -> list[Surface]:
+    def sloped_surfaces(self) -> Sequence[Surface]:
         """The rough sides of the bodies, whose slopes count."""
         if self.counter_surface is None:
             return [self.surface]
         own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
         return [own] if self.materials.second is None else [own, self.counter_surface]
 
-    @classmethod
-    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
-        """Yield the memory that a scene needs, with the interaction of its patches."""
-        yield from super().requests(scene)
-        yield from law_requests(scene, interact=cls.has_body)
-
     # --- the micro model and the body
 
     @property
     def finite_slopes(self) -> bool:
         """Whether finite slopes of the surface count."""
-        return self.scene.micro.finite_slopes is not False and self._on_cells
-
-    @property
-    def _on_cells(self) -> bool:
-        """Whether the micro model is the half-space on the cells of the surface."""
-        return isinstance(self.micro, HalfSpaceModel)
+        return self.scene.micro.finite_slopes is not False and self.cells is not None
 
     @property
     def cells(self) -> tuple[int, int] | None:
         """Cells of the half-space of contact problems; None where these have no cells."""
         return self.micro.surface.grid if isinstance(self.micro, HalfSpaceModel) else None
-
-    @property
-    def label(self) -> str:
-        """The coupling, and the cells or micro model that it works on."""
-        kind = self.scene.kind
-        if self.cells is None:
-            return f"{kind}, {self.micro.name}"
-        return f"{kind} on {self.cells[0]} × {self.cells[1]} cells"
 
     @cached_property
     def asperities(self) -> Asperities:
@@ -161,6 +118,10 @@ class MicroCoupling(PressedSurface):
             body = terms.term(terms.face(self.comm))
         return replace(self.micro, body=body)  # type: ignore[type-var]
 
+    def contact_solver(self, model: MicroModel) -> ContactSolver:
+        """Return what solves the contact problem of a model of the surface."""
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
+
     # --- errors
 
     def error_probe(self) -> ErrorProbe:
@@ -176,37 +137,32 @@ class MicroCoupling(PressedSurface):
 
     def checked(self, step: LoadStep) -> LoadStep | None:
         """Return a load step with its errors measured; None where they cannot be."""
-        if not self._on_cells:
+        if self.cells is None:
             return None
         return checked(step, self.error_probe(), self.load_history, self.comm)
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
-        if not self._on_cells:
+        if self.cells is None:
             return f"{self.micro.name} contacts have no measure of it, half-space has"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
-
-    def contact_solver(self, model: MicroModel) -> ContactSolver:
-        """Return what solves the contact problem of a model of the surface."""
-        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
 
     # --- what is known before the run
 
     def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
         output, steps = self.scene.output, step_count(self.scene.loading)
-        rows = SOLUTIONS_OF_LAWS if self.has_laws else 0
-        solutions, factor = float(rows or steps), SLOPES_PRODUCTS if self.finite_slopes else 1.0
-        finer = 1.0
-        if isinstance(self.micro, HalfSpaceModel):
-            size = int(self.micro.surface.heights.size)
+        rows, finer = SOLUTIONS_OF_LAWS if self.has_laws else 0, 1.0
+        solutions = float(rows or steps)
+        if self.cells is None:
+            size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
+        else:
+            size = math.prod(self.cells)
             if output.check != "none":
                 # a check solves a finer grid where the error of the grid is not outweighed
                 refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
                 each, finer = (_FINER, 4.0) if refines else (_CHECK, 1.0)
                 solutions += each * (steps if output.check == "all" else 1)
-        else:
-            size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
         unknowns, cycles = 0, 0.0
         if self.has_body:
             unknowns = sum(facts.unknowns for facts in self.meshes)
@@ -218,12 +174,12 @@ class MicroCoupling(PressedSurface):
             size=size,
             solutions=solutions,
             rows=rows,
-            products=solutions * size * PRODUCTS * factor,
+            finite_slopes=self.finite_slopes,
+            finer=finer,
             unknowns=unknowns,
             cycles=cycles,
             ranks=ranks,
-            memory=finer * BYTES_PER_CELL * size * self._on_cells,
-            of_pairs=not self._on_cells,
+            of_pairs=self.cells is None,
         )
 
     def _law_cycles(self, steps: int, rows: int) -> float:
@@ -251,14 +207,6 @@ class MicroCoupling(PressedSurface):
             return f"{len(self.summits)} summits, {within}; the others cost nothing"
         return super().contact_statement()
 
-    def model_statement(self) -> str:
-        """Say which micro model solves contacts, and how."""
-        micro, name = self.scene.micro, self.micro.name
-        if micro.model in _INTERACTING:
-            return f"{name}, solved by {micro.solver}"
-        unused = micro.solver != type(micro)().solver
-        return f"{name}; it has no use for micro.solver" if unused else name
-
     def body_statements(self) -> Iterator[tuple[str, str]]:
         """Yield what the bodies are, with topics."""
         if not self.has_body:
@@ -274,8 +222,8 @@ class MicroCoupling(PressedSurface):
 
     def error_statement(self) -> str:
         """Say how the run will know its error."""
-        if why := self.unmeasured():
-            return f"not measured: {why}"
+        if self.unmeasured():
+            return super().error_statement()
         which = "every load step" if self.scene.output.check == "all" else "the last load step"
         body = ", body" if self.has_body else "; there is no block"
         laws = " and laws" * self.has_laws
@@ -311,13 +259,9 @@ class MicroCoupling(PressedSurface):
     def shows_cells(self) -> bool:
         """Whether pressures of the surface's cells will be known."""
         without = ("auto", "none") if self.has_laws else ("none",)
-        return self._on_cells and self.scene.output.contact not in without
+        return self.cells is not None and self.scene.output.contact not in without
 
     # --- for the record
-
-    def record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the coupling alone, by name."""
-        return {"micro_model": {"name": self.micro.name}}
 
     def surface_record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the surface alone, by name."""
@@ -337,14 +281,3 @@ def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> Mi
     if isinstance(model, HalfSpaceModel):
         return replace(model, periodic=scene.surface.periodic, hardness=micro.hardness)
     return model
-
-
-def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
-    if not math.isfinite(model.first_touch):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space",
-            file=scene.file,
-        )

@@ -13,14 +13,11 @@ import numpy as np
 from geometry import Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import Bodies
-from multiscale.inputs.body_facts import BodyFacts
 from multiscale.inputs.surfaces import RegionSamples
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.laws.representative import representative_laws
-from multiscale.loading.load_history import LoadHistory
 from multiscale.readable import Observer
-from multiscale.scene.scene import Scene
 
 _CONCENTRATION = 10.0
 """Largest local pressure that laws are made for, over the mean one on the face."""
@@ -40,30 +37,20 @@ class SampleLaws:
     """The laws of the samples of a face.
 
     Args:
-        scene: The scene.
-        bodies: Its bodies.
+        bodies: The bodies, with what is known of their scene.
         samples: The samples of every region of the face.
         model: Micro model of the first sample, the periodic half-space.
-        load_history: The loads, counted from first touch.
-        finite_slopes: Whether finite slopes of the samples count.
         tolerance: Interpolation error of the laws.
     """
 
-    scene: Scene
     bodies: Bodies
     samples: tuple[RegionSamples, ...]
     model: HalfSpaceModel
-    load_history: LoadHistory
-    finite_slopes: bool
     tolerance: float
 
     @property
     def _modulus(self) -> float:
-        return self.bodies.materials.contact_modulus
-
-    @property
-    def _face(self) -> BodyFacts:
-        return self.bodies.facts[0]
+        return self.bodies.parts.materials.contact_modulus
 
     def table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
         """Tabulate the laws, or extend earlier ones as far as the material allows.
@@ -75,7 +62,7 @@ class SampleLaws:
         Note:
             Collective.
         """
-        hardness = self.scene.micro.hardness
+        hardness = self.model.hardness
         most = math.inf if hardness is None else _YIELDED * hardness
         if before is None or not (reached := before.largest_pressure):
             pressure, closure = self.largest_loads()
@@ -105,7 +92,7 @@ class SampleLaws:
         """Return the periodic model of a sample, with the slopes of its body where they count."""
         pair = region.materials
         model = replace(self.model, surface=sample, contact_modulus=pair.contact_modulus)
-        if not self.finite_slopes:
+        if not self.bodies.parts.finite_slopes:
             return model
         return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
 
@@ -117,12 +104,13 @@ class SampleLaws:
         Note:
             Collective.
         """
-        stated, history = self.scene.law.largest_pressure, self.load_history
+        parts = self.bodies.parts
+        stated, history, face = parts.scene.law.largest_pressure, parts.load_history, parts.body
         if history.quantity == "force":
             force = history.largest
-            mean = force / self._face.area
+            mean = force / face.area
             return stated or max(_CONCENTRATION * mean, self._hertz(force=force)), None
-        tilt, lengths = history.slopes or (0.0, 0.0), self._face.lengths
+        tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
         approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
         mean = approach / self.mean_compliance()
         pressure = stated or max(_CONCENTRATION * mean, self._hertz(approach=approach))
@@ -150,12 +138,12 @@ class SampleLaws:
         Source:
             Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
         """
-        radii = [one for one in self.scene.law.crown or () if one != "inf"]
+        radii = [one for one in self.bodies.parts.scene.law.crown or () if one != "inf"]
         if not radii:
             return 0.0
         modulus, radius = self._modulus, math.sqrt(math.prod(radii))
         if len(radii) == 1:
-            radius, length = radii[0], min(self._face.lengths)
+            radius, length = radii[0], min(self.bodies.parts.body.lengths)
             line = math.sqrt(force / length * modulus / (math.pi * radius))
             return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
         point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)

@@ -13,15 +13,15 @@ from dataclasses import dataclass
 
 from multiscale.readable import number
 
-CELL_PRODUCTS = 3e7
+_CELL_PRODUCTS = 3e7
 """Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
 66 and 260 ms (docs/speed.md, 2026-11-22), with some 30 products each."""
-UNKNOWN_CYCLES = 1e6
+_UNKNOWN_CYCLES = 1e6
 """Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
 2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
-PRODUCTS = 30.0
+_PRODUCTS = 30.0
 """Products of a solution, 15 to 60 on 64² to 1024² cells."""
-SLOPES_PRODUCTS = 2.4
+_SLOPES_PRODUCTS = 2.4
 """Factor of the products of a solution with finite slopes."""
 SOLUTIONS_OF_LAWS = 84
 """Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
@@ -29,7 +29,7 @@ SOLUTIONS_OF_LAWS = 84
 SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
 """Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
 the compliance of a meshed body's face in 64 modes."""
-BYTES_PER_CELL = 165.0
+_BYTES_PER_CELL = 165.0
 """Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
 load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
 and of 1024² cells could; free sides and body add 40, finite slopes 40."""
@@ -44,23 +44,34 @@ class Work:
             interact; 0 where contact is meshed.
         solutions: Contact problems that are solved, error check and rows of laws included.
         rows: Rows of laws; 0 without laws.
-        products: Cells or pairs times products with the compliance, of all contact problems.
+        finite_slopes: Whether finite slopes count.
+        finer: Cells of the largest contact problem, that of an error check, over those of the run.
         unknowns: Degrees of freedom of all meshes; 0 without meshes.
         cycles: Unknowns times multigrid cycles, of all meshes.
         ranks: Processes that share the meshes.
-        memory: Memory of the largest contact problem [B].
         of_pairs: Whether pairs of asperities are counted instead of cells.
     """
 
     size: int = 0
     solutions: float = 0.0
     rows: int = 0
-    products: float = 0.0
+    finite_slopes: bool = False
+    finer: float = 1.0
     unknowns: int = 0
     cycles: float = 0.0
     ranks: int = 1
-    memory: float = 0.0
     of_pairs: bool = False
+
+    @property
+    def products(self) -> float:
+        """Cells or pairs times products with the compliance, of all contact problems."""
+        factor = _SLOPES_PRODUCTS if self.finite_slopes else 1.0
+        return self.solutions * self.size * _PRODUCTS * factor
+
+    @property
+    def memory(self) -> float:
+        """Memory of the largest contact problem of cells [B]."""
+        return 0.0 if self.of_pairs else self.finer * _BYTES_PER_CELL * self.size
 
     @property
     def computing(self) -> float:
@@ -68,8 +79,8 @@ class Work:
 
         It is that of cores of the kind that the rates were measured on.
         """
-        meshes = self.cycles / UNKNOWN_CYCLES / self.ranks
-        return self.products / CELL_PRODUCTS + meshes
+        meshes = self.cycles / _UNKNOWN_CYCLES / self.ranks
+        return self.products / _CELL_PRODUCTS + meshes
 
     def statements(self) -> Iterator[tuple[str, str]]:
         """Yield what was counted, with its topic."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from geometry import InputError, Surface
 from geometry.zero import Zero
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene

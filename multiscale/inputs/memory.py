@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Any
 
 from geometry import InputError
 from geometry.files.content import BYTES_PER_HEIGHT
-from multiscale.inputs.block import Cells, block_section
+from multiscale.inputs.bodies import Cells, block_section
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
 
@@ -75,13 +76,18 @@ def shortage_warnings(requests: Iterable[MemoryRequest], nodes: ClusterNodes) ->
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
 
 
-def surface_requests(scene: Scene) -> Iterator[MemoryRequest]:
-    """Yield the memory that the surface of a scene needs.
+def scene_requests(
+    scene: Scene, cells: Cells | None, *, interact: bool, made_by: str = ""
+) -> Iterator[MemoryRequest]:
+    """Yield the memory that a scene needs, key by key, as far as its file tells.
 
     Auto values are left out: none is chosen that would not fit.
 
     Args:
         scene: The scene.
+        cells: Cells of the block, where it is meshed.
+        interact: Whether all patches interact in the compliance of the bodies.
+        made_by: Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without.
     """
     grids = {"surface.grid": scene.surface.grid, "surface.resample": scene.surface.resample}
     for key, heights in grids.items():
@@ -89,15 +95,14 @@ def surface_requests(scene: Scene) -> Iterator[MemoryRequest]:
             sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
             made = math.prod(heights) * BYTES_PER_HEIGHT - sent
             yield MemoryRequest(key=key, value=heights, per_rank=sent, root_only=made)
+    if cells is not None:
+        yield from _block_requests(scene, cells)
+    if isinstance(scene.patches.grid, tuple):
+        yield from _patch_requests(scene, scene.patches.grid, interact, made_by)
 
 
-def block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
-    """Yield the memory that the mesh of a block needs.
-
-    Args:
-        scene: The scene.
-        cells: Cells of the block.
-    """
+def _block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
+    """Yield the memory that the mesh of a block needs."""
     nx, ny, nz = cells
     size = nx * ny * nz * BYTES_PER_CELL
     yield MemoryRequest(key="block.cells", value=cells, shared=size)
@@ -107,44 +112,22 @@ def block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
         yield MemoryRequest(key="block.margin_cells", value=margin, shared=size)
 
 
-def patch_requests(scene: Scene) -> Iterator[MemoryRequest]:
-    """Yield the memory that the patches of a scene and their history need.
-
-    Args:
-        scene: The scene.
-    """
-    patches, loading = scene.patches.grid, scene.loading
-    if not isinstance(patches, tuple):
-        return
-    count = math.prod(patches)
-    size = count * BYTES_PER_HEIGHT
-    yield MemoryRequest(key="patches.grid", value=patches, per_rank=size)
+def _patch_requests(
+    scene: Scene, patches: tuple[int, int], interact: bool, made_by: str
+) -> Iterator[MemoryRequest]:
+    """Yield the memory that patches need: their history, their interaction, and their laws."""
+    count, loading = math.prod(patches), scene.loading
+    asked = partial(MemoryRequest, key="patches.grid", value=patches)
+    yield asked(per_rank=count * BYTES_PER_HEIGHT)
     purpose = f"the history of {count} patches"
     size = loading.count * (count * BYTES_PER_STATE + BYTES_PER_STEP)
     yield MemoryRequest(key="load.steps", value=loading.steps, purpose=purpose, per_rank=size)
-
-
-def law_requests(
-    scene: Scene, *, interact: bool = True, made_by: str = ""
-) -> Iterator[MemoryRequest]:
-    """Yield the memory that the laws of patches and their interaction need.
-
-    Args:
-        scene: The scene.
-        interact: Whether all patches interact in the compliance of the bodies.
-        made_by: Which ranks make laws, ``"shared"`` or ``"root_only"``; empty without any.
-    """
-    patches = scene.patches.grid
-    if not isinstance(patches, tuple):
-        return
-    count = math.prod(patches)
     if interact:
-        purpose, size = "the interaction of all patches with each other", count**2 * BYTES_PER_PAIR
-        yield MemoryRequest(key="patches.grid", value=patches, purpose=purpose, per_rank=size)
+        purpose = "the interaction of all patches with each other"
+        yield asked(purpose=purpose, per_rank=count**2 * BYTES_PER_PAIR)
     if made_by:
-        purpose, size = "a law for every patch", count * BYTES_PER_LAW
-        sizes: dict[str, Any] = {"per_rank": size, made_by: count * BYTES_PER_NEW_LAW}
-        yield MemoryRequest(key="patches.grid", value=patches, purpose=purpose, **sizes)
+        sizes: dict[str, Any] = {made_by: count * BYTES_PER_NEW_LAW}
+        yield asked(purpose="a law for every patch", per_rank=count * BYTES_PER_LAW, **sizes)
 
 
 def body_request(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -15,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
 from geometry.meshes.expected_contact import contact_radius
 from geometry.meshes.families import Shape, characteristic_size, reference_shapes
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import block_section, block_unknowns
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
@@ -243,7 +242,7 @@ def mesh_unknowns(shape: Shape) -> int:
         shape: What is meshed.
     """
     if isinstance(shape, BlockShape):
-        return 3 * math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
+        return block_unknowns(shape)
     return round(3.0 * _NODES[shape.degree] * _cubes(shape))
 
 

@@ -15,6 +15,7 @@ from geometry import (
     InputError,
     Material,
     MaterialPair,
+    Spectrum,
     Surface,
     facing,
     laid_on,
@@ -198,3 +199,28 @@ def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSect
         return [section]
     spectra = [replace(section.spectrum, seed=seed) for seed in seeds]
     return [replace(section, spectrum=spectrum) for spectrum in spectra]
+
+
+def heights_per_wave(
+    spectrum: Spectrum, grid: tuple[int, int], lengths: tuple[float, float]
+) -> float:
+    """Return the heights along the shortest wavelength of a spectrum.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Heights in x and y.
+        lengths: Sides of the surface [mm].
+    """
+    return min(n / most for n, most in zip(grid, most_waves(spectrum, lengths), strict=True))
+
+
+def most_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> list[float]:
+    """Return the largest number of waves along each side.
+
+    Args:
+        spectrum: The spectrum.
+        lengths: Sides of the surface [mm].
+    """
+    if spectrum.waves is not None:  # counted along x
+        return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]
+    return [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]

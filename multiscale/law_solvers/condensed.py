@@ -16,7 +16,7 @@ from geometry import Control, NotConverged, PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED
 from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
-from multiscale.law_solvers.law_range import ROUNDING, beyond_law
+from multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
@@ -31,7 +31,7 @@ _DECREASE = 1e-4  # share of the predicted decrease that a step must bring
 _PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plane gains a support
 
 
-class CondensedLaws:
+class CondensedLaws(LawSolver):
     """Patch laws on the compliance of the block's patches; a load step is a small dense system.
 
     The block is linear, so that its compliance says all that patchwise laws need to know of it.
@@ -42,21 +42,14 @@ class CondensedLaws:
             (N, N) [mm/MPa].
     """
 
-    past: Any = None
-    face: Any = None
-
     def __init__(self, table: LawTable, compliance: Array) -> None:
-        self.table, self._laws = table, PatchLaws(table.laws)
-        self._compliance = compliance
+        super().__init__(table)
+        self._laws, self._compliance = PatchLaws(table.laws), compliance
         self._last: DenseState | None = None
         self._control = Control(approach=0.0)
 
-    def field_state(self, step: LoadStep) -> Any:
-        """Return what fields of the load step just accepted are made from: the pressures."""
-        return step.patches.pressure_MPa
-
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Solver.press`."""
+        """Solve one load step; see `StepSolver.press`."""
         patches, end = self.table.grid, self._laws.end
         state = equilibrium(self._laws, self._compliance, patches, control, self._last)
         worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
@@ -65,7 +58,7 @@ class CondensedLaws:
                 f"patch {patches.unravel(worst)} at a local approach of {state.local[worst]:.6g} "
                 f"mm (allowed: up to {end[worst]:.6g} mm)"
             )
-            raise beyond_law(control, problem, self.table)
+            raise self.beyond_law(control, problem)
         self._last, self._control = state, control
         return LoadStep.of_patches(
             patches,

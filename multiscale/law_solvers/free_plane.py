@@ -5,13 +5,11 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from geometry import Control, NotConverged, RigidPlane
 from micro.model import Stiffness
-from multiscale.law_solvers.law_range import ROUNDING, beyond_law
+from multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from multiscale.laws.consistent import Displacements
 from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
@@ -23,13 +21,15 @@ _OTHER_MODEL = 0.05
 for another macro model; between their rows it is hundredths of that."""
 
 
-class FreePlaneLaws:
+class FreePlaneLaws(LawSolver):
     """Consistent laws under a plane without moment.
 
     The moment of the contacts decides how such a plane turns. Mean pressures of few large patches
     do not tell that moment, and a single law knows nothing of it. Therefore the plane turns as it
     did in the rows of the laws, where the macro model that the laws were made for is in equilibrium
     with their pressures.
+
+    Every load step is found without those before it.
 
     Args:
         table: The laws, with the path of the plane.
@@ -40,22 +40,16 @@ class FreePlaneLaws:
         ValueError: When the laws have no path.
     """
 
-    past: Any = None
-    face: Any = None
-
     def __init__(self, table: LawTable, displacements: Displacements) -> None:
         if table.path is None:
             raise ValueError("the laws were made under a plane of given tilt")
-        self.table, self._path, self._laws = table, table.path, PatchLaws(table.laws)
+        super().__init__(table)
+        self._path, self._laws = table.path, PatchLaws(table.laws)
         self._displacements = displacements
         self._approach: float | None = None
 
-    def field_state(self, step: LoadStep) -> Any:
-        """Return what fields of the load step just accepted are made from: the pressures."""
-        return step.patches.pressure_MPa
-
     def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step; see `Solver.press`.
+        """Find the equilibrium of one load step; see `StepSolver.press`.
 
         Raises:
             NotConverged: Also when the laws were made for another macro model.
@@ -67,7 +61,7 @@ class FreePlaneLaws:
         end = float(path.approach[-1])
         if approach > end + ROUNDING * abs(end):
             problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
-            raise beyond_law(control, problem, self.table)
+            raise self.beyond_law(control, problem)
         tx, ty, *moment = map(float, path.at(approach))
         point = self._along(approach)
         xc, yc = map(float, patches.middle)
@@ -103,13 +97,6 @@ class FreePlaneLaws:
             return Stiffness(None, 0)
         rates = self._along(self._approach).dpressure
         return Stiffness(self.table.grid.area * float(rates.sum()), 0)
-
-    def state(self) -> Any:
-        """Return nothing: every load step is found without those before it."""
-        return None
-
-    def restore(self, state: Any) -> None:
-        """Do nothing; see `state`."""
 
     def _force(self, approach: float) -> float:
         return self.table.grid.area * float(self._along(approach).pressure.sum())

@@ -23,7 +23,7 @@ from micro.conductance import (
 from multiscale.couplings.coupling import Coupling
 from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
-from multiscale.observers.observer import StepObserver
+from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, quantity
 from multiscale.scene.bodies import ConductanceSection
 from support.collective import on_root
@@ -105,7 +105,8 @@ class ConductanceObserver(StepObserver):
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""
-        stiffness, pair = self._coupling.interface_stiffness(step), self._conductances
+        coupling, pair = self._coupling, self._conductances
+        stiffness = coupling.solver.interface_stiffness(step, coupling.areas)
         if stiffness is None:
             return step
         columns: dict[str, Any] = {}
@@ -126,7 +127,7 @@ class ConductanceObserver(StepObserver):
         if (gas := section.gas) is not None:
 
             def through_gas() -> float:
-                gaps = self._coupling.gaps()
+                gaps = self._coupling.solver.gaps
                 if gaps is not None:
                     return gas_conductance(gaps, gas, jump)
                 # laws know the mean gap: the mean of k/(g + M) is no less

@@ -24,7 +24,7 @@ from scaling_rank import INSIDE, PARTS, logged, stored
 from stream_triad import bandwidth
 
 from macro.linear_solvers.options import PREFIX
-from multiscale import ReferenceCoupling, Run, Scene
+from multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 SCENE = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
@@ -171,8 +171,9 @@ def main() -> None:
     words += REFERENCE if choice.reference else ["coupling.newton=full"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
-    coupling = run.prepare()
-    finest = coupling.finest if isinstance(coupling, ReferenceCoupling) else coupling.face
+    run.prepare()
+    solver: Any = run.coupling.solver
+    finest = solver.finest if choice.reference else solver.face
     work = Work(finest.body.solver)
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())
     say(f"{work.unknowns} unknowns on {COMM.size} ranks, {work.grids} grids; memory gives {rates}")

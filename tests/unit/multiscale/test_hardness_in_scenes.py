@@ -10,7 +10,7 @@ from geometry import Control
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup, run, sweep
 from multiscale.loading.energy import BALANCE, missing_energy
-from multiscale.observers.fields import FieldRecorder
+from multiscale.observers.step_observers import FieldRecorder
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history

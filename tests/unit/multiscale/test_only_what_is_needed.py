@@ -116,7 +116,7 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     if kind != "isolated" or load == "approach":
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("multiscale.bodies.bodies.Bodies.contact_face", never)
-    monkeypatch.setattr("multiscale.bodies.block.BlockTerms.face", never)
+    monkeypatch.setattr("multiscale.bodies.face_terms.BlockTerms.face", never)
     monkeypatch.setattr("multiscale.couplings.micro_coupling.on_body", never)
     monkeypatch.setattr("multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
 from geometry.zero import Zero
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene
 
