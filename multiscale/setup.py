@@ -15,8 +15,7 @@ from multiscale.auto.keys import (
     with_resolved,
     with_value,
 )
-from multiscale.auto.mesh_search import MeshError, measured_mesh_error
-from multiscale.auto.search import coupling_by_accuracy
+from multiscale.auto.search import MeshError, coupling_by_accuracy, measured_mesh_error
 from multiscale.bodies.reader import read_bodies
 from multiscale.couplings.coupling import Coupling, Facts, Source
 from multiscale.couplings.dispatch import coupling_class

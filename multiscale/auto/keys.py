@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from geometry.surface import Surface
+from multiscale.couplings.cost import SOLUTIONS_OF_LAWS
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
-from multiscale.couplings.work import SOLUTIONS_OF_LAWS
 from multiscale.inputs.loads import PROVISIONAL_PATCHES
 from multiscale.inputs.surfaces import most_waves
 from multiscale.loading.stepper import step_count
@@ -77,7 +77,7 @@ def is_measured(scene: Scene) -> bool:
     """
     opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
     sized = scene.accuracy is None or not scene.reference.sizes_are_open
-    return opened or (scene.kind == "reference" and not sized)
+    return opened or (coupling_class(scene).meshes_contact and not sized)
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:

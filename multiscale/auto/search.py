@@ -11,20 +11,23 @@ is refused where their memory is missing. The rule in words: docs/choosing.md.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import cast
 
 from geometry.zero import Zero
 from micro import HalfSpaceModel
 from multiscale.auto.keys import (
     MOST_HEIGHTS,
+    accuracy_of,
     auto_keys,
     chosen_coupling,
     map_grid,
     on_waves,
     with_value,
 )
-from multiscale.auto.mesh_search import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.dispatch import coupling_class
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.inputs.loads import load_history_on
@@ -33,11 +36,16 @@ from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.measured_errors import ZERO, ErrorProbe
+from multiscale.results.accuracy_verdict import relative_error
 from multiscale.scene.scene import Scene
 from support.errors import InputError, NotConverged
 
+Build = Callable[[Scene], Coupling]
+MeshError = Callable[[ReferenceCoupling], float]
+Errors = Mapping[str, float]
+
 _TRIALS = 6
-"""Most trials of a grid."""
+"""Most trials of a grid, or of the size of meshes."""
 _SPARE = 0.8
 """Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
 _ORDER = 1.5
@@ -51,6 +59,43 @@ _LEAST_CELLS = 48
 """Cells along a side at least."""
 _LAWS = 0.1
 """Interpolation error of laws over the accuracy."""
+_LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
+"""Limits of the refinement from one trial to the next."""
+_MOST_UNKNOWNS = 1_000_000
+"""Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
+_DEFAULT_MESHES = 0.005
+"""Error, roughly, of the meshes that a reference has by default."""
+_COARSEST_MESH = 1.8
+"""Largest edge length of the first meshes, relative to the default."""
+
+
+def refinement(excess: float, order: float) -> float:
+    """Return the refinement for the next trial.
+
+    Args:
+        excess: Error over allowed error.
+        order: Known order of the error in the size.
+    """
+    return min(max(excess ** (1.0 / order), _LEAST_STEP), _LARGEST_STEP)
+
+
+def measured_mesh_error(coupling: ReferenceCoupling) -> float:
+    """Return the relative error of the force by the meshes of a reference at the largest load.
+
+    Args:
+        coupling: The reference, with several meshes.
+
+    Raises:
+        NotConverged: When the contact problem cannot be solved.
+    """
+    history = coupling.load_history
+    step = coupling.press(history.control(history.largest))
+    (with_error,), _ = coupling.with_mesh_errors([step])
+    coupling.release()
+    if not step.force_N > 0.0:
+        return 0.0
+    error = relative_error(with_error, by_force=history.quantity == "force")
+    return 1.0 if error is None else error
 
 
 def coupling_by_accuracy(
@@ -68,24 +113,36 @@ def coupling_by_accuracy(
         InputError: When nothing that the scene allows can be made, or the memory is missing.
         NotConverged: When a contact problem cannot be solved.
     """
-    search, auto = _Search(given, build, mesh_error), auto_keys(given)
+    search, auto, kind = _Search(given, build, mesh_error), auto_keys(given), coupling_class(start)
     if "surface.grid" in auto:
-        on_cells = start.micro.model == "half-space" and start.coupling.kind != "reference"
+        on_cells = start.micro.model == "half-space" and not kind.meshes_contact
         start = on_waves(start, _COARSE if on_cells else _FINE)
-    if start.coupling.kind == "consistent" and start.coupling.table_tolerance is None:
+    if kind.tolerance_by_accuracy and start.coupling.table_tolerance is None:
         start = with_value(start, "coupling.table_tolerance", _LAWS * search.accuracy)
     coupling = build(start)
     if "patches.grid" in auto:
         coupling = build(with_value(start, "patches.grid", map_grid(start, coupling.surface)))
-    if isinstance(coupling, ReferenceCoupling):
-        return search.decided(*search.with_refined_meshes(coupling))
-    if isinstance(coupling, MicroCoupling) and isinstance(coupling.micro, HalfSpaceModel):
-        return search.kept_or_meshed(*search.refined_cells(coupling, coupling.micro))
+    if kind.meshes_contact:
+        return search.decided(*search.with_refined_meshes(cast(ReferenceCoupling, coupling)))
+    if isinstance(coupling.micro, HalfSpaceModel):
+        return search.kept_or_meshed(
+            *search.refined_cells(cast(MicroCoupling, coupling), coupling.micro)
+        )
     return search.decided(coupling, {})
 
 
-class _Search(MeshSearch):
+@dataclass(frozen=True)
+class _Search:
     """The search for auto values of one scene; see `coupling_by_accuracy`."""
+
+    given: Scene
+    build: Build
+    mesh_error: MeshError
+
+    @property
+    def accuracy(self) -> float:
+        """Relative error of the force that may be left."""
+        return accuracy_of(self.given)
 
     def refined_cells(
         self, coupling: MicroCoupling, model: HalfSpaceModel
@@ -115,9 +172,41 @@ class _Search(MeshSearch):
             cells = _scaled(cells, refinement(by_cells / allowed, _ORDER))
         if new_surface:
             made = self.build(with_value(scene, "surface.grid", model.surface.grid))
-            assert isinstance(made, MicroCoupling)
-            coupling = made
+            coupling = cast(MicroCoupling, made)
         return replace(coupling, micro=model), errors
+
+    def with_refined_meshes(self, coupling: ReferenceCoupling) -> tuple[ReferenceCoupling, Errors]:
+        """Refine the meshes of a reference until their error keeps the accuracy."""
+        coupling = self._with_first_meshes(coupling)
+        if len(coupling.rough_meshes.shapes) == 1:  # one mesh does not show its error
+            return coupling, {}
+        for _ in range(_TRIALS):
+            error, fine = self.mesh_error(coupling), coupling.scene.reference.fine
+            if error <= self.accuracy or not self._may_refine(coupling) or fine is None:
+                break
+            finer = refinement(error / self.accuracy, coupling.rough_meshes.force_order)
+            refined = self._with_fine(coupling, fine / finer)
+            if not _is_small(refined):
+                break
+            coupling = refined
+        return coupling, {"mesh": error}
+
+    def _may_refine(self, coupling: ReferenceCoupling) -> bool:
+        """Tell whether the scene leaves the size of tetrahedra open."""
+        return self.given.reference.fine is None and not coupling.rough_meshes.hexahedral
+
+    def _with_first_meshes(self, coupling: ReferenceCoupling) -> ReferenceCoupling:
+        """Return a reference with the meshes to try first, coarser for a lower accuracy."""
+        if not self._may_refine(coupling) or coupling.scene.reference.fine is not None:
+            return coupling
+        coarser = min(max((self.accuracy / _DEFAULT_MESHES) ** 0.5, 1.0), _COARSEST_MESH)
+        return self._with_fine(coupling, coarser * float(coupling.rough_meshes.sizes[-1]))
+
+    def _with_fine(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
+        return self._reference(with_value(coupling.scene, "reference.fine", fine))
+
+    def _reference(self, scene: Scene) -> ReferenceCoupling:
+        return cast(ReferenceCoupling, self.build(scene))
 
     def kept_or_meshed(self, coupling: MicroCoupling, errors: Errors) -> Coupling:
         """Return the coupling, or a reference where the errors exceed the accuracy.
@@ -133,8 +222,8 @@ class _Search(MeshSearch):
         section = type(coupling.scene.coupling)(kind="reference")
         scene = replace(coupling.scene, coupling=section)
         try:
-            meshed = self.with_first_meshes(self.reference(scene))
-            if not self.is_small(meshed):
+            meshed = self._with_first_meshes(self._reference(scene))
+            if not _is_small(meshed):
                 return self.decided(coupling, errors)
             meshed, mesh_errors = self.with_refined_meshes(meshed)
         except MemoryLacking:  # another machine would take the reference
@@ -166,6 +255,11 @@ class _Search(MeshSearch):
             missed=missed or {},
         )
         return replace(coupling, decision=decision)
+
+
+def _is_small(coupling: ReferenceCoupling) -> bool:
+    """Tell whether the meshes of a reference have no more unknowns than are chosen."""
+    return sum(coupling.rough_meshes.unknowns) <= _MOST_UNKNOWNS
 
 
 def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:

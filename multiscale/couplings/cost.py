@@ -1,13 +1,41 @@
-"""The order of magnitude of a run's time, and its memory by part."""
+"""What a run computes and the memory it takes, counted; and the order of magnitude of its time.
+
+The work of a contact problem is its cells times its products with the compliance, that of a mesh
+its unknowns times its multigrid cycles. Two rates of one core make seconds of them. No clock is
+read: the same scene has the same work on every machine, and a run tells its own pace after its
+first load step.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.work import Work
-from multiscale.readable import duration
+from multiscale.inputs.scene_parts import SceneParts
+from multiscale.machine import MemoryRequest
+from multiscale.readable import duration, number
+
+_CELL_PRODUCTS = 3e7
+"""Cells × products a second. Load steps on 128², 256² and 512² cells without finite slopes took 21,
+66 and 260 ms (docs/speed.md, 2026-11-22), with some 30 products each."""
+_UNKNOWN_CYCLES = 1e6
+"""Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
+2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
+_PRODUCTS = 30.0
+"""Products of a solution, 15 to 60 on 64² to 1024² cells."""
+_SLOPES_PRODUCTS = 2.4
+"""Factor of the products of a solution with finite slopes."""
+SOLUTIONS_OF_LAWS = 84
+"""Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
+45 to 65 rows, models of summits 60 to 150."""
+SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
+"""Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
+the compliance of a meshed body's face in 64 modes."""
+_BYTES_PER_CELL = 165.0
+"""Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
+load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
+and of 1024² cells could; free sides and body add 40, finite slopes 40."""
 
 _START, _PICTURES = 2.0, 4.0
 """Time of imports and tables, and of figures and report [s]."""
@@ -20,40 +48,115 @@ _HEIGHT = 87.0
 """Memory per height of the surface with its spline, and of figures [B]."""
 
 
-def cost_statements(coupling: Coupling, program: float, ranks: int) -> Iterator[tuple[str, str]]:
-    """Yield what a run computes, the order of magnitude of its time, and its memory.
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What a run computes.
+
+    Attributes:
+        size: Cells of its contact problem, which isolated laws share; of asperities the pairs that
+            interact; 0 where contact is meshed.
+        solutions: Contact problems that are solved, error check and rows of laws included.
+        rows: Rows of laws; 0 without laws.
+        finite_slopes: Whether finite slopes count.
+        finer: Cells of the largest contact problem, that of an error check, over those of the run.
+        unknowns: Degrees of freedom of all meshes; 0 without meshes.
+        cycles: Unknowns times multigrid cycles, of all meshes.
+        ranks: Processes that share the meshes.
+        of_pairs: Whether pairs of asperities are counted instead of cells.
+    """
+
+    size: int = 0
+    solutions: float = 0.0
+    rows: int = 0
+    finite_slopes: bool = False
+    finer: float = 1.0
+    unknowns: int = 0
+    cycles: float = 0.0
+    ranks: int = 1
+    of_pairs: bool = False
+
+    @property
+    def products(self) -> float:
+        """Cells or pairs times products with the compliance, of all contact problems."""
+        factor = _SLOPES_PRODUCTS if self.finite_slopes else 1.0
+        return self.solutions * self.size * _PRODUCTS * factor
+
+    @property
+    def memory(self) -> float:
+        """Memory of the largest contact problem of cells [B]."""
+        return 0.0 if self.of_pairs else self.finer * _BYTES_PER_CELL * self.size
+
+    @property
+    def computing(self) -> float:
+        """Time of contact problems and meshes, to an order of magnitude [s].
+
+        It is that of cores of the kind that the rates were measured on.
+        """
+        meshes = self.cycles / _UNKNOWN_CYCLES / self.ranks
+        return self.products / _CELL_PRODUCTS + meshes
+
+    def statements(self) -> Iterator[tuple[str, str]]:
+        """Yield what was counted, with its topic."""
+        counted = []
+        if self.size:
+            laws = f", {self.rows} of them rows of laws" if self.rows else ""
+            what = "pairs" if self.of_pairs else "cells"
+            counted.append(
+                f"about {self.solutions:.0f} contact problems{laws}, on {self.size} {what} each: "
+                f"{_millions(self.products)} {what} × products"
+            )
+        if self.cycles:
+            counted.append(
+                f"meshes of about {_millions(self.unknowns)} unknowns: "
+                f"{_millions(self.cycles)} unknowns × multigrid cycles"
+            )
+        if counted:
+            yield "work", "; ".join(counted)
+
+
+def _millions(count: float) -> str:
+    return f"{number(1e-6 * count, 2)} million"
+
+
+def cost_statement(
+    parts: SceneParts, work: Work, requests: Iterable[MemoryRequest], program: float
+) -> tuple[str, str]:
+    """Return the order of magnitude of a run's time, and its memory, with their topic.
 
     Args:
-        coupling: The coupling.
+        parts: What is known of the scene.
+        work: What its coupling computes.
+        requests: The memory that it needs.
         program: Memory of a process before anything of the scene is in it [B].
-        ranks: Processes of the MPI job.
     """
-    work, output = coupling.work(ranks), coupling.scene.output
-    yield from work.statements()
+    output = parts.scene.output
     seconds = work.computing + _START + _PICTURES * bool(output.figures or output.report)
-    parts = memory_parts(coupling, work, program)
-    largest = max(parts, key=lambda part: parts[part])
-    yield (
+    memory = memory_parts(parts, work, requests, program)
+    largest = max(memory, key=lambda part: memory[part])
+    return (
         "cost",
         f"of the order of {magnitude(seconds)}, more on slow or busy cores; the run tells its own "
-        f"pace after its first load step; {sum(parts.values()) / 1e6:.0f} MB, most of it for the "
+        f"pace after its first load step; {sum(memory.values()) / 1e6:.0f} MB, most of it for the "
         f"{largest}",
     )
 
 
-def memory_parts(coupling: Coupling, work: Work, program: float) -> dict[str, float]:
+def memory_parts(
+    parts: SceneParts, work: Work, requests: Iterable[MemoryRequest], program: float
+) -> dict[str, float]:
     """Return the memory of the first process by part [B].
 
     Args:
-        coupling: The coupling.
-        work: What it computes.
+        parts: What is known of the scene.
+        work: What its coupling computes.
+        requests: The memory that it needs.
         program: Memory of a process before anything of the scene is in it [B].
     """
-    libraries = coupling.has_body + bool(coupling.scene.output.figures)
-    asked = (one for one in coupling.memory_requests() if not one.key.startswith("surface"))
+    libraries = parts.has_body + bool(parts.scene.output.figures)
+    asked = (one for one in requests if not one.key.startswith("surface"))
     return {
         "program": program + _LIBRARIES * libraries,
-        "surface": _HEIGHT * coupling.surface.heights.size,
+        "surface": _HEIGHT * parts.surface.heights.size,
         "meshes and laws": sum(
             one.shared / work.ranks + one.per_rank + one.root_only for one in asked
         ),

@@ -25,7 +25,7 @@ from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies
 from multiscale.bodies.fields import write_solved
 from multiscale.couplings import describe
-from multiscale.couplings.work import Work
+from multiscale.couplings.cost import Work, cost_statement
 from multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, BodyFacts, Cells, SceneBody
 from multiscale.inputs.bodies import block_cells as cells_of_block
 from multiscale.inputs.memory import body_request, scene_requests
@@ -84,6 +84,10 @@ class Coupling(SceneParts, ABC):
             None without laws.
     """
 
+    meshes_contact: ClassVar[bool] = False
+    """Whether the roughness itself is meshed, instead of being that of a micro model."""
+    tolerance_by_accuracy: ClassVar[bool] = False
+    """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
     shows_contacts: ClassVar[bool] = False
     """Whether fields of a block are those under its contacts, which take more cells."""
     patches_interact: ClassVar[bool] = True
@@ -255,7 +259,7 @@ class Coupling(SceneParts, ABC):
         """Yield pairs of topic and sentence that say what will be done and why.
 
         Args:
-            cost: What it costs, see `multiscale.couplings.cost.cost_statements`.
+            cost: What it costs, see `cost_statements`.
         """
         yield "inputs", f"{describe.materials(self)}; a surface of {describe.dimensions(self)}"
         yield "surface", describe.surface(self)
@@ -346,6 +350,17 @@ class Coupling(SceneParts, ABC):
                 in_parts = section.mesh.lower().endswith(".xdmf")
                 element, unknowns = facts.element, facts.unknowns
                 yield body_request(key, element, unknowns, steps, in_parts=in_parts)
+
+    def cost_statements(self, program: float, ranks: int) -> Iterator[tuple[str, str]]:
+        """Yield what a run computes, the order of magnitude of its time, and its memory.
+
+        Args:
+            program: Memory of a process before anything of the scene is in it [B].
+            ranks: Processes of the MPI job.
+        """
+        work = self.work(ranks)
+        yield from work.statements()
+        yield cost_statement(self, work, self.memory_requests(), program)
 
     @abstractmethod
     def unmeasured(self) -> str:

@@ -21,9 +21,9 @@ from multiscale.couplings.contact_solver import (
     plane_at_largest_load,
     prescribed_plane,
 )
+from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.couplings.work import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked

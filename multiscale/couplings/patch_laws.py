@@ -162,6 +162,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
 class ConsistentCoupling(PatchLaws):
     """Laws of all patches from one solution of the whole surface."""
 
+    tolerance_by_accuracy: ClassVar[bool] = True
     laws_made_by: ClassVar[str] = "root_only"
 
     def _prepare_laws(self) -> None:

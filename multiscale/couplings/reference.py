@@ -16,10 +16,10 @@ import numpy as np
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import estimated_plane
+from multiscale.couplings.cost import SET_UP_CYCLES, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
-from multiscale.couplings.work import SET_UP_CYCLES, Work
 from multiscale.inputs.bodies import Cells, block_section
 from multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
@@ -48,6 +48,7 @@ class ReferenceCoupling(PressedSurface):
         rough_meshes: The meshes, from coarse to fine.
     """
 
+    meshes_contact: ClassVar[bool] = True
     patches_interact: ClassVar[bool] = False
 
     rough_meshes: ReferenceMeshes

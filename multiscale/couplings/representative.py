@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from geometry import Control, PatchGrid, Regions, RigidPlane, Surface
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
+from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.sample_laws import SampleLaws
-from multiscale.couplings.work import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
