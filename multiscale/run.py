@@ -115,7 +115,7 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         self.prepare()
-        stepper = LoadStepper(self.coupling, self.coupling.load_history, self.position)
+        stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position

@@ -15,7 +15,7 @@ from geometry import PatchGrid
 from multiscale.couplings.describe import times
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.inputs.bodies import FIELD_CELLS
-from multiscale.loading.step_solver import StepSolver
+from multiscale.loading.stepper import StepSolver
 
 
 @dataclass(kw_only=True, eq=False)

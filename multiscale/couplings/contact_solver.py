@@ -16,8 +16,7 @@ from geometry.patches import patch_means
 from micro import HalfSpaceModel, MicroModel, Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.step_solver import StepSolver
-from multiscale.loading.stepper import load_steps
+from multiscale.loading.stepper import StepSolver, load_steps
 from support.collective import on_root, on_root_alone
 
 Array = NDArray[np.float64]

@@ -34,8 +34,7 @@ from multiscale.inputs.surfaces import located
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.clock import Clock
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.step_solver import StepSolver
-from multiscale.loading.stepper import step_count
+from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import Detail, percent, quantity
 from multiscale.results.history import range_notes
@@ -413,15 +412,6 @@ class Coupling(SceneParts, ABC):
     def press(self, control: Control) -> LoadStep:
         """Find the equilibrium of one load step; see `StepSolver.press`."""
         return self.solver.press(control)
-
-    @property
-    def past(self) -> Any:
-        """What the load steps so far left behind; see `StepSolver.past`."""
-        return self.solver.past
-
-    @past.setter
-    def past(self, value: Any) -> None:
-        self.solver.past = value
 
     # --- what is made of load steps
 

@@ -10,7 +10,7 @@ from typing import ClassVar, NamedTuple
 from multiscale.couplings.coupling import Coupling
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
-from multiscale.loading.step_solver import StepSolver
+from multiscale.loading.stepper import StepSolver
 from multiscale.readable import Observer
 
 _TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4

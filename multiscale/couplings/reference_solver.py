@@ -15,7 +15,7 @@ from geometry import Control, PatchGrid
 from geometry.contact_state import ContactState, Spots, peaks_of
 from geometry.rigid_plane import RigidPlane
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.step_solver import StepSolver
+from multiscale.loading.stepper import StepSolver
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, MeshQuality, UnilateralContactProblem

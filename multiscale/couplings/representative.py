@@ -9,13 +9,13 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Control, PatchGrid, Regions, RigidPlane, Surface
+from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
@@ -26,14 +26,15 @@ from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_surface
-from multiscale.law_solvers.embedded import EmbeddedLaws
+from multiscale.law_solvers.embedded import ExtendedLaws
+from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import BeyondLaws, step_count
+from multiscale.loading.stepper import step_count
 from multiscale.readable import Observer, number, quantity
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LoadedFace
+    from macro import FacePair, LawContactProblem, LoadedFace
 
 Array = NDArray[np.float64]
 
@@ -157,17 +158,30 @@ class RepresentativeCoupling(LawCoupling):
     def _make_table(self, observe: Observer | None) -> LawTable:
         return self._laws.table(observe)
 
-    def _solver_of(self, table: LawTable) -> EmbeddedLaws:
-        return self._solver_on(self.bodies.contact_face(), table)
+    def _solver_of(self, table: LawTable) -> LawSolver:
+        face = self.bodies.contact_face()
+        return ExtendedLaws(partial(self._problem, face), table, face, self._longer)
 
-    def _solver_on(self, face: LoadedFace | FacePair, table: LawTable) -> EmbeddedLaws:
-        """Return what finds load steps from laws at the points of a face."""
+    def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
+        """Return a face with laws at its points."""
         from macro import FacePair, LawContactProblem
 
         problem = LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
         if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
             problem.start_from(np.ones(face.patches.count))
-        return EmbeddedLaws(problem, table, face)
+        return problem
+
+    def _longer(self, table: LawTable) -> LawTable | None:
+        """Return the laws extended; None where they end as far as possible."""
+        longer = self._laws.table(None, before=table)
+        if longer is table:
+            return None
+        self.table = longer
+        self._extensions.append(
+            f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
+            "needed"
+        )
+        return longer
 
     def _crown(self) -> Callable[[Array, Array], Array] | None:
         """Return the depth of a crowned face at points of its plane [mm]; None without a crown."""
@@ -183,28 +197,6 @@ class RepresentativeCoupling(LawCoupling):
 
         return depth
 
-    @property
-    def _embedded(self) -> EmbeddedLaws:
-        assert isinstance(self.solver, EmbeddedLaws)
-        return self.solver
-
-    def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step, with longer laws where these end too early."""
-        while True:
-            try:
-                return super().press(control)
-            except BeyondLaws:
-                longer = self._laws.table(None, before=self.table)
-                if longer is self.table:
-                    raise
-                last, face = self.solver.state(), self._embedded.face
-                self.table, self.solver = longer, self._solver_on(face, longer)
-                self.solver.restore(last)
-                self._extensions.append(
-                    f"the laws were extended to {number(longer.largest_pressure)} MPa, which a "
-                    "load step needed"
-                )
-
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the approximations behind load steps."""
         if self.table is not None:
@@ -215,7 +207,7 @@ class RepresentativeCoupling(LawCoupling):
     @property
     def areas(self) -> Array:
         """Nominal areas of the regions, shape (N,) [mm²]."""
-        return np.asarray(self._embedded.face.areas)
+        return np.asarray(self.solver.face.areas)
 
     # --- statements
 

@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from multiscale.bodies.fields import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import BeyondLaws
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
@@ -188,3 +189,36 @@ class EmbeddedLaws(LawSolver):
             "areas": areas,
             "peak_pressure_MPa": float(peaks.max()),
         }
+
+
+class ExtendedLaws(EmbeddedLaws):
+    """Laws of samples at the points of a face; they are extended where a load step needs it.
+
+    Args:
+        problem_of: Returns the body with laws on its contact face.
+        table: The laws.
+        face: The contact face.
+        longer: Returns laws that go further than these; None where that cannot be.
+    """
+
+    def __init__(
+        self,
+        problem_of: Callable[[LawTable], LawContactProblem],
+        table: LawTable,
+        face: LoadedFace | FacePair,
+        longer: Callable[[LawTable], LawTable | None],
+    ) -> None:
+        super().__init__(problem_of(table), table, face)
+        self._problem_of, self._longer = problem_of, longer
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step, with longer laws where these end too early."""
+        while True:
+            try:
+                return super().press(control)
+            except BeyondLaws:
+                if (longer := self._longer(self.table)) is None:
+                    raise
+                last = self.state()
+                self.table, self._problem = longer, self._problem_of(longer)
+                self.restore(last)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from geometry import Control
 from multiscale.laws.law_table import LawTable
-from multiscale.loading.step_solver import StepSolver
-from multiscale.loading.stepper import BeyondLaws
+from multiscale.loading.stepper import BeyondLaws, StepSolver
 
 ROUNDING = 1e-12
 """Share of a law's end by which a converged approach may exceed it."""

@@ -229,13 +229,14 @@ class FieldRecorder(StepObserver):
         ]
         if not missing:
             return
-        again, past = [step for step in steps if step.step in missing], self._coupling.past
+        again, solver = [step for step in steps if step.step in missing], self._coupling.solver
+        past = solver.past
         if past is not None and self._coupling.scene.micro.hardness is not None:
             # what earlier load steps left behind depends on all of them, from the first
-            self._coupling.past = (None, None)
+            solver.past = (None, None)
             again = [step for step in steps if step.step <= max(missing)]
         for step in again:
-            self._coupling.press(Control(approach=step.approach_mm, tilt=step.tilt))
+            solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
             if step.step in missing:
                 self.observe(step, None, last=step is steps[-1])
-        self._coupling.past = past
+        solver.past = past
