@@ -22,13 +22,8 @@ from multiscale.scene.scene import Scene
 from multiscale.scene.sections import CouplingSection
 from support.errors import InputError
 
-DEFAULT_ACCURACY = 0.02
-"""Relative error of the force that is kept unless the scene says."""
-PATCHES_ACROSS = 8
-"""Patches along the shorter side, enough for a map."""
-LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
-"""Heights along a side of grids that are chosen."""
-
+MOST_HEIGHTS = 2048
+"""Heights along a side of grids that are chosen, at most."""
 _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
 
 
@@ -58,12 +53,12 @@ def auto_keys(scene: Scene) -> frozenset[str]:
 
 
 def accuracy_of(scene: Scene) -> float:
-    """Return the relative error of the force that a scene may be left with.
+    """Return the relative error of the force that a scene may be left with, 2 % by default.
 
     Args:
         scene: The scene.
     """
-    return scene.accuracy or DEFAULT_ACCURACY
+    return scene.accuracy or 0.02
 
 
 def is_measured(scene: Scene) -> bool:
@@ -179,6 +174,8 @@ def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
 def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
     """Return nearly square patches that make a map, no more than heights or elements below.
 
+    There are 8 along the shorter side.
+
     Args:
         scene: The scene.
         surface: Its surface.
@@ -186,7 +183,7 @@ def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
     shorter = min(surface.lengths)
     most = np.min(list(coupling_class(scene).patch_limits(scene, surface).values()), axis=0)
     x, y = (
-        min(max(round(PATCHES_ACROSS * length / shorter), 1), int(limit))
+        min(max(round(8 * length / shorter), 1), int(limit))
         for length, limit in zip(surface.lengths, most, strict=True)
     )
     return x, y
@@ -203,5 +200,5 @@ def on_waves(scene: Scene, count: int) -> Scene:
     if section.spectrum is None or section.lengths is None:  # refused when the scene was read
         return scene
     waves = most_waves(section.spectrum, section.lengths)
-    grid = tuple(min(max(8 * math.ceil(count * k / 8), LEAST_HEIGHTS), MOST_HEIGHTS) for k in waves)
+    grid = tuple(min(max(8 * math.ceil(count * k / 8), 32), MOST_HEIGHTS) for k in waves)
     return with_value(scene, "surface.grid", grid)

@@ -46,27 +46,8 @@ Errors = Mapping[str, float]
 
 _TRIALS = 6
 """Most trials of a grid, or of the size of meshes."""
-_SPARE = 0.8
-"""Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
-_ORDER = 1.5
-"""Order of the force in the size of the cells, for the next grid to try."""
-_COARSE, _FINE = 8, 16
-"""Heights along the shortest wave that are tried first, and that are enough for summits and for
-meshes."""
-_FIRST_CELLS = 4
-"""Coarsening of a given grid for the first trial, along a side."""
-_LEAST_CELLS = 48
-"""Cells along a side at least."""
-_LAWS = 0.1
-"""Interpolation error of laws over the accuracy."""
-_LEAST_STEP, _LARGEST_STEP = 1.3, 2.0
-"""Limits of the refinement from one trial to the next."""
 _MOST_UNKNOWNS = 1_000_000
 """Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
-_DEFAULT_MESHES = 0.005
-"""Error, roughly, of the meshes that a reference has by default."""
-_COARSEST_MESH = 1.8
-"""Largest edge length of the first meshes, relative to the default."""
 
 
 def refinement(excess: float, order: float) -> float:
@@ -76,7 +57,7 @@ def refinement(excess: float, order: float) -> float:
         excess: Error over allowed error.
         order: Known order of the error in the size.
     """
-    return min(max(excess ** (1.0 / order), _LEAST_STEP), _LARGEST_STEP)
+    return min(max(excess ** (1.0 / order), 1.3), 2.0)
 
 
 def measured_mesh_error(coupling: ReferenceCoupling) -> float:
@@ -116,9 +97,10 @@ def coupling_by_accuracy(
     search, auto, kind = _Search(given, build, mesh_error), auto_keys(given), coupling_class(start)
     if "surface.grid" in auto:
         on_cells = start.micro.model == "half-space" and not kind.meshes_contact
-        start = on_waves(start, _COARSE if on_cells else _FINE)
+        # heights along the shortest wave: what is tried first, and enough for summits and meshes
+        start = on_waves(start, 8 if on_cells else 16)
     if kind.tolerance_by_accuracy and start.coupling.table_tolerance is None:
-        start = with_value(start, "coupling.table_tolerance", _LAWS * search.accuracy)
+        start = with_value(start, "coupling.table_tolerance", 0.1 * search.accuracy)
     coupling = build(start)
     if "patches.grid" in auto:
         coupling = build(with_value(start, "patches.grid", map_grid(start, coupling.surface)))
@@ -152,7 +134,7 @@ class _Search:
         new_surface = "surface.grid" in auto
         may_refine = new_surface or "micro.model" in auto
         if may_refine and not new_surface:
-            cells = _scaled(cells, 1.0 / _FIRST_CELLS)
+            cells = _scaled(cells, 0.25)
         probe, history = replace(coupling.error_probe(), by_laws=False), coupling.load_history
         for trial in range(_TRIALS):
             if new_surface:
@@ -165,11 +147,12 @@ class _Search:
             errors = _measured(replace(probe, model=model), history)
             by_cells = errors["grid"] + (errors.get(ZERO, 0.0) if new_surface else 0.0)
             others = sum(errors.values()) - by_cells
-            allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
+            # at other loads errors differ: this one may take 0.8 of the accuracy
+            allowed = max(0.8 * self.accuracy - others, 0.5 * others)
             last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or by_cells <= allowed:
                 break
-            cells = _scaled(cells, refinement(by_cells / allowed, _ORDER))
+            cells = _scaled(cells, refinement(by_cells / allowed, order=1.5))
         if new_surface:
             made = self.build(with_value(scene, "surface.grid", model.surface.grid))
             coupling = cast(MicroCoupling, made)
@@ -199,7 +182,8 @@ class _Search:
         """Return a reference with the meshes to try first, coarser for a lower accuracy."""
         if not self._may_refine(coupling) or coupling.scene.reference.fine is not None:
             return coupling
-        coarser = min(max((self.accuracy / _DEFAULT_MESHES) ** 0.5, 1.0), _COARSEST_MESH)
+        # the default meshes are off by some 0.005
+        coarser = min(max((self.accuracy / 0.005) ** 0.5, 1.0), 1.8)
         return self._with_fine(coupling, coarser * float(coupling.rough_meshes.sizes[-1]))
 
     def _with_fine(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
@@ -278,8 +262,5 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
 
 def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
     """Return cells along the sides times a factor, as multiples of 8 within the limits."""
-    x, y = (
-        min(max(8 * math.ceil(factor * count / 8 - 1e-9), _LEAST_CELLS), MOST_HEIGHTS)
-        for count in cells
-    )
+    x, y = (min(max(8 * math.ceil(factor * count / 8 - 1e-9), 48), MOST_HEIGHTS) for count in cells)
     return x, y

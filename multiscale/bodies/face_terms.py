@@ -40,9 +40,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_DECAY_LENGTH = 0.25
-"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
-the block."""
 
 _CUBE_MODES = 8
 """Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
@@ -62,14 +59,6 @@ LEAST_WITH_MARGIN = 12
 """Modes at least where the block is wider than the contact: with a margin of 0.05 mm on a cube 8
 are up to 1.2 % off, 12 up to 0.1 %; a corner 0.7 %."""
 
-_MODES_OF_CORNERS = 12
-"""Modes for many patches where free sides are a term of their own: of 16 × 16 patches the one in
-the corner is 0.3 % off with 8 and less than 0.1 % with 12."""
-
-_MODES_PER_PATCH, _MOST_MODES = 2, 32
-"""Modes per patch along a side where they describe free sides too, and their largest number. Of
-4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 % of the largest
-entry."""
 
 _BYTES = 190.0
 """Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56
@@ -93,7 +82,7 @@ def free_sides(
     return FreeSides(
         lengths=lengths,
         poisson_ratio=material.poisson_ratio,
-        decay_length=_DECAY_LENGTH * min(*lengths, depth),
+        decay_length=0.25 * min(*lengths, depth),
         present=present,
     )
 
@@ -206,9 +195,11 @@ class FaceTerms(ABC):
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
             half_space += self.side_term.patch_compliance(patches) / modulus
-            count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
+            # of 16 × 16 patches the one in the corner is 0.3 % off with 8 modes, < 0.1 % with 12
+            count = max(count, min(max(patches.shape), 12))
         else:
-            count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
+            # of 4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 %
+            count = max(count, min(2 * max(patches.shape), 32))
         correction = self.term(self.face(comm, modes=count))
         return np.asarray(half_space + correction.patch_compliance(patches))
 

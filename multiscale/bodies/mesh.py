@@ -22,13 +22,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, ElasticBody, FaceCompliance
     from macro.compliance.surroundings import Surroundings
 
-_SAME = 1e-9
-"""Difference of Poisson's ratios that is rounding."""
-_CACHED = "mesh-face"
-"""Kind of these compliances in the cache."""
-_ON_MESH = 6
-"""Modes at most where they load the mesh itself: finer ones are those of its elements."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MeshTerms(FaceTerms):
@@ -145,12 +138,12 @@ class MeshTerms(FaceTerms):
             rough = None if linear is None else of(linear).normal
             return replace(of(body), rough=rough).arrays
 
-        found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
+        found = FaceCompliance(**cached("mesh-face", self._key(count), compute, self.body.comm))
         return turned(found) if self.behind else found
 
     def _resolved(self, count: int) -> int:
         """Return as many modes along a side, or as many as the mesh itself resolves."""
-        return count if self.around.below else min(count, _ON_MESH)
+        return count if self.around.below else min(count, 6)
 
     def _key(self, count: int) -> tuple[object, ...]:
         """Return what the compliance in so many modes along a side depends on; collective."""
@@ -235,7 +228,7 @@ class PairTerms(FaceTerms):
         left, right, *others = around.free_sides
         same = own is not None and own.present == (right, left, *others)
         apart = self.first.material.poisson_ratio - self.second.material.poisson_ratio
-        return same and abs(apart) < _SAME
+        return same and abs(apart) < 1e-9
 
     @property
     def _behind(self) -> MeshTerms:

@@ -23,14 +23,10 @@ from support.collective import on_root
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody, TaggedMesh
 
-MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
-"""Units of meshes in mm."""
 
+_MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
 _SAME_PLANE = 1e-6
 """Distance between planes, relative to the face, that is rounding of coordinates in files."""
-_MOST_CURVED = 5e-3
-"""Height of a slightly curved face over its shorter side, up to which its gap counts as one between
-planes. A sphere has slopes of 2 % at its edge then, whose squares are not counted."""
 
 
 def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
@@ -89,7 +85,7 @@ class _Reader:
         from macro.mesh.checks import check_size
         from macro.mesh.from_file import read_mesh
 
-        mesh = read_mesh(self._path, self._comm, unit=MILLIMETRES[self._section.mesh_unit])
+        mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
         check_size(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
         for region in regions:
@@ -165,7 +161,8 @@ class _Reader:
 
         names = {tag: name for name, tag in mesh.facet_names.items()}
         curved = self._scene.law.representative
-        allowed = _MOST_CURVED * self._shortest(mesh) if curved else 0.0
+        # a gap counts as one between planes up to here: a sphere has slopes of 2 % at its edge
+        allowed = 5e-3 * self._shortest(mesh) if curved else 0.0
         faces = [
             planar_face(
                 mesh, tag, name=names.get(tag), deviation=allowed, key=f"{self._key}.contact"

@@ -22,30 +22,12 @@ _CELL_PRODUCTS = 3e7
 _UNKNOWN_CYCLES = 1e6
 """Unknowns × multigrid cycles a second. Hexahedra and tetrahedra, linear and quadratic, took 0.5 to
 2.6 µs per unknown and cycle (8 to 131 thousand unknowns, 2026-11-22)."""
-_PRODUCTS = 30.0
-"""Products of a solution, 15 to 60 on 64² to 1024² cells."""
-_SLOPES_PRODUCTS = 2.4
-"""Factor of the products of a solution with finite slopes."""
 SOLUTIONS_OF_LAWS = 84
 """Solutions of the contact problem that a table of laws takes. Models of cells took 75 to 105 for
 45 to 65 rows, models of summits 60 to 150."""
 SET_UP_CYCLES, FACE_CYCLES = 20.0, 1000.0
 """Multigrid cycles that meshing, the stiffness and its multigrid are worth, 9 to 70; and those of
 the compliance of a meshed body's face in 64 modes."""
-_BYTES_PER_CELL = 165.0
-"""Memory per cell of a contact problem with its kernel, work arrays and body, and the maps of a
-load step [B]. Without a body 95 were measured where few cells could touch, 101 where 9/16 of 512²
-and of 1024² cells could; free sides and body add 40, finite slopes 40."""
-
-_START, _PICTURES = 2.0, 4.0
-"""Time of imports and tables, and of figures and report [s]."""
-_ORDERS = (1, 3, 10, 30, 120, 300, 900, 3600, 3 * 3600, 10 * 3600, 24 * 3600, 72 * 3600, 240 * 3600)
-"""Times that are said [s]."""
-
-_LIBRARIES = 70e6
-"""Memory of dolfinx, and of matplotlib [B]."""
-_HEIGHT = 87.0
-"""Memory per height of the surface with its spline, and of figures [B]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,13 +60,15 @@ class Work:
     @property
     def products(self) -> float:
         """Cells or pairs times products with the compliance, of all contact problems."""
-        factor = _SLOPES_PRODUCTS if self.finite_slopes else 1.0
-        return self.solutions * self.size * _PRODUCTS * factor
+        # 15 to 60 products on 64² to 1024² cells, finite slopes 2.4 times as many
+        return self.solutions * self.size * (72.0 if self.finite_slopes else 30.0)
 
     @property
     def memory(self) -> float:
         """Memory of the largest contact problem of cells [B]."""
-        return 0.0 if self.of_pairs else self.finer * _BYTES_PER_CELL * self.size
+        # Of a cell with kernel, work arrays and the maps of a load step 95 B were measured where
+        # few cells could touch, 101 where 9/16 could; sides and body add 40, finite slopes 40.
+        return 0.0 if self.of_pairs else 165.0 * self.finer * self.size
 
     @property
     def computing(self) -> float:
@@ -130,7 +114,8 @@ def cost_statement(
         program: Memory of a process before anything of the scene is in it [B].
     """
     output = parts.scene.output
-    seconds = work.computing + _START + _PICTURES * bool(output.figures or output.report)
+    # 2 s for imports and tables, 4 s for figures and report
+    seconds = work.computing + 2.0 + 4.0 * bool(output.figures or output.report)
     memory = memory_parts(parts, work, requests, program)
     largest = max(memory, key=lambda part: memory[part])
     return (
@@ -152,11 +137,12 @@ def memory_parts(
         requests: The memory that it needs.
         program: Memory of a process before anything of the scene is in it [B].
     """
+    # dolfinx and matplotlib take 70 MB each
     libraries = parts.has_body + bool(parts.scene.output.figures)
     asked = (one for one in requests if not one.key.startswith("surface"))
     return {
-        "program": program + _LIBRARIES * libraries,
-        "surface": _HEIGHT * parts.surface.heights.size,
+        "program": program + 70e6 * libraries,
+        "surface": 87.0 * parts.surface.heights.size,  # with its spline and figures
         "meshes and laws": sum(
             one.shared / work.ranks + one.per_rank + one.root_only for one in asked
         ),
@@ -170,4 +156,6 @@ def magnitude(seconds: float) -> str:
     Args:
         seconds: The time [s].
     """
-    return duration(min(_ORDERS, key=lambda one: abs(math.log(one / max(seconds, 1e-3)))))
+    minutes, hours = (30, 120, 300, 900), (1, 3, 10, 24, 72, 240)
+    orders = (1, 3, 10, *minutes, *(3600 * each for each in hours))
+    return duration(min(orders, key=lambda one: abs(math.log(one / max(seconds, 1e-3)))))

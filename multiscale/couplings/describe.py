@@ -20,10 +20,6 @@ LOCKING_FROM = 0.45
 """Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
 cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
 are 0.5, 1.1 and 1.5 % too stiff."""
-MOST_UNEQUAL = 3.0
-"""Ratio of two edges of the block that deserves a note: few mean it, and many forget a unit."""
-LEAST_CELLS_PER_PATCH = 4
-"""Linear cells along a patch below which the block is too stiff under a patch's pressure."""
 
 
 def materials(parts: SceneParts) -> str:
@@ -234,9 +230,10 @@ def proportions(parts: SceneParts) -> Iterator[str]:
     assert shape is not None
     widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
     (least, most), high, height = sorted(widths), shape.height, ""
-    if high > MOST_UNEQUAL * least:
+    unequal = 3.0  # few mean such edges, and many forget a unit
+    if high > unequal * least:
         height = "most of the approach may be the compression of the column below the surface"
-    elif least > MOST_UNEQUAL * high:
+    elif least > unequal * high:
         height = "the fixed bottom is near, and stiffens what lies above it"
     if height:
         ratio = max(high / least, least / high)
@@ -244,7 +241,7 @@ def proportions(parts: SceneParts) -> Iterator[str]:
             f"the block is {high:g} mm high and {least:g} mm wide, a ratio of {ratio:.3g}: "
             f"{height}; block.height is the shorter side when not given"
         )
-    if most > MOST_UNEQUAL * least:
+    if most > unequal * least:
         yield (
             f"the block is {widths[0]:g} × {widths[1]:g} mm wide, a ratio of {most / least:.3g}: "
             "are these the lengths along x and y of the whole map?"
@@ -272,7 +269,7 @@ def coarse_cells(parts: SceneParts) -> Iterator[str]:
     assert shape is not None
     counts = zip(shape.cells[:2], parts.patches.grid, strict=True)
     cells = min(cells / patches for cells, patches in counts)
-    if cells * shape.degree < LEAST_CELLS_PER_PATCH:
+    if cells * shape.degree < 4:
         yield (
             f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones "
             "make the block stiffer by several per cent under a patch's pressure; refine "

@@ -13,9 +13,6 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.stepper import StepSolver
 from multiscale.readable import Observer
 
-_TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4
-"""Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
-
 
 class NewtonChoice(NamedTuple):
     """Which Newton solves the load steps, and why.
@@ -46,7 +43,8 @@ class LawCoupling(Coupling):
     @property
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
-        default = _TOLERANCE if self.summits is None else _SUMMITS_TOLERANCE
+        # finer tables on cells would trace the steps of single ones
+        default = 5e-4 if self.summits is None else 1e-4
         return self.scene.coupling.table_tolerance or default
 
     @abstractmethod

@@ -29,9 +29,6 @@ from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
 
-_CHECK, _FINER = 2.0, 6.0
-"""Solutions on the run's cells that an error check is worth, and where it solves a finer grid."""
-
 
 @dataclass(kw_only=True, eq=False)
 class MicroCoupling(PressedSurface):
@@ -159,9 +156,10 @@ class MicroCoupling(PressedSurface):
         else:
             size = math.prod(self.cells)
             if output.check != "none":
-                # a check solves a finer grid where the error of the grid is not outweighed
+                # A check is worth 2 solutions on these cells, and 6 where it solves a finer grid:
+                # where the error of the grid is not outweighed.
                 refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
-                each, finer = (_FINER, 4.0) if refines else (_CHECK, 1.0)
+                each, finer = (6.0, 4.0) if refines else (2.0, 1.0)
                 solutions += each * (steps if output.check == "all" else 1)
         unknowns, cycles = 0, 0.0
         if self.has_body:

@@ -33,17 +33,9 @@ from multiscale.readable import Detail, Observer, quantity
 
 Array = NDArray[np.float64]
 
-_SUMMITS_ROWS = 400
-"""Most rows of laws by summits. On cells a row costs a solution, which is dear."""
-_MOST_CYCLES_PER_STEP = 12
-"""Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
-steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
-patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
 and 8 × 8 patches."""
-_CYCLES_PER_ROW = 3.0
-"""Multigrid cycles of a row of consistent laws on a mesh, whose displacements it takes."""
 _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
@@ -54,7 +46,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
-        return MOST_ROWS if self.summits is None else _SUMMITS_ROWS
+        return MOST_ROWS if self.summits is None else 400  # on cells a row costs a solution
 
     def newton(self, table: LawTable | None = None) -> NewtonChoice:
         """Choose the Newton of the scene, or the one that is predicted to take fewer cycles.
@@ -95,8 +87,13 @@ class PatchLaws(LawCoupling, MicroCoupling):
         )
 
     def _full_cycles(self, steps: int) -> int:
-        """Return the multigrid cycles that load steps on the mesh are predicted to take."""
-        return steps * min(max(self.interfering_patches, 1), _MOST_CYCLES_PER_STEP)
+        """Return the multigrid cycles that load steps on the mesh are predicted to take.
+
+        A step that starts from earlier ones takes at most 12. With fewer patches that can touch it
+        takes about one for each (the paper's cube with 4 × 4 patches, 4 of them loaded: 39 in 8
+        steps; with 2 of 64 that can touch: 36 in 40).
+        """
+        return steps * min(max(self.interfering_patches, 1), 12)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
@@ -196,7 +193,8 @@ class ConsistentCoupling(PatchLaws):
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         cycles = super()._law_cycles(steps, rows)
-        return cycles if self.newton().condensed else cycles + _CYCLES_PER_ROW * rows
+        # a row takes the displacements of the mesh
+        return cycles if self.newton().condensed else cycles + 3.0 * rows
 
     @property
     def _made(self) -> str:

@@ -21,10 +21,6 @@ from multiscale.inputs.surfaces import located, make_surfaces
 
 Array = NDArray[np.float64]
 
-CLOSURE_RESERVE = 0.15
-"""Closure that laws are made for beyond the largest approach, relative to the largest interference.
-The surface of a bent block may rise between the loads of its patches."""
-
 
 @dataclass(kw_only=True, eq=False)
 class PressedSurface(Coupling):
@@ -97,7 +93,8 @@ class PressedSurface(Coupling):
     def largest_closures(self) -> Array:
         """Largest closure that the law of each patch is made for, shape (N,) [mm].
 
-        It is the largest mean approach of the patch and `CLOSURE_RESERVE`. Laws that hold at points
+        It is the largest mean approach of the patch and 15 % of the largest interference, for the
+        surface of a bent block may rise between the loads of its patches. Laws that hold at points
         need the approach at the corners of the patch. A free plane may tilt further than on a
         half-space.
         """
@@ -107,7 +104,7 @@ class PressedSurface(Coupling):
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
         if loading.tilt == "free":
             ends = ends + (ends.max() - plane.approach)
-        return ends + CLOSURE_RESERVE * self.largest_interference
+        return ends + 0.15 * self.largest_interference
 
     @property
     def _closes_at_corners(self) -> bool:

@@ -20,9 +20,6 @@ from multiscale.loading.stepper import StepSolver
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, MeshQuality, UnilateralContactProblem
 
-_NO_AREA = 1e-9
-"""Area of a node, relative to the largest, that counts as none."""
-
 
 class RoughMesh(NamedTuple):
     """A meshed rough block.
@@ -103,7 +100,7 @@ class ReferenceSolver(StepSolver):
         region, count = nodes.region[touching], latest.contacts
         share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
-        some = nodes.area > _NO_AREA * nodes.area.max()
+        some = nodes.area > 1e-9 * nodes.area.max()  # quadratic triangles: vertices have none
         spots = Spots(
             place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
             area=share * np.bincount(region, nodes.area[touching], minlength=count),

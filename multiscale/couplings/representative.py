@@ -38,13 +38,6 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 Array = NDArray[np.float64]
 
-_CYCLES_AT_POINTS = 24
-"""Multigrid cycles of a load step with laws at points: 6 to 60 on four parts."""
-_MANY_SAMPLES = 4.0
-"""Sides of a face over those of its sample below which its law is hardly representative."""
-_HALF_SPACE = 0.95
-"""Mean displacement of a square of a half-space by a uniform pressure, times E*, over its side."""
-
 
 @dataclass(kw_only=True, eq=False)
 class RepresentativeCoupling(LawCoupling):
@@ -136,7 +129,7 @@ class RepresentativeCoupling(LawCoupling):
             rows=rows,
             finite_slopes=self.finite_slopes,
             unknowns=unknowns,
-            cycles=unknowns * (SET_UP_CYCLES + steps * _CYCLES_AT_POINTS),
+            cycles=unknowns * (SET_UP_CYCLES + 24 * steps),  # 6 to 60 a step on four parts
             ranks=ranks,
         )
 
@@ -231,7 +224,7 @@ class RepresentativeCoupling(LawCoupling):
         side = math.sqrt(self.body.area)
         for region in self.samples:
             largest = max(max(surface.lengths) for surface in region.surfaces)
-            if side < _MANY_SAMPLES * largest:
+            if side < 4.0 * largest:
                 yield (
                     f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face "
                     f"about {quantity(side, 'mm')}: a sample stands for faces that are much larger"
@@ -244,7 +237,8 @@ class RepresentativeCoupling(LawCoupling):
         history, second = self.load_history, self.materials.second
         if self.both_elastic and second is not None and history.quantity == "force":
             pressure = history.largest / self.body.area
-            moved = _HALF_SPACE * pressure * side * second.surface_compliance
+            # mean displacement of a square of a half-space by a uniform pressure
+            moved = 0.95 * pressure * side * second.surface_compliance
             yield (
                 "the compliance of the counter-body, a half-space, counts on the scale of the "
                 f"sample alone; under the whole face it would add about {1e3 * moved:.3g} µm: give "

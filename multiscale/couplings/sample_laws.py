@@ -19,18 +19,6 @@ from multiscale.laws.refinement import MOST_ROWS
 from multiscale.laws.representative import representative_laws
 from multiscale.readable import Observer
 
-_CONCENTRATION = 10.0
-"""Largest local pressure that laws are made for, over the mean one on the face."""
-_CROWNED = 2.0
-"""The same over the largest pressure of smooth crowned bodies (Hertz), which roughness lowers."""
-_YIELDED = 0.95
-"""Largest pressure of laws under a hardness, relative to it: nearly all cells bear the hardness
-then, and at it the pressure is no function of closure."""
-_EXTENSION = 2.0
-"""Largest pressure of laws that turned out to end too early, over that of the earlier ones."""
-_RESERVE = 0.15
-"""Closure that laws are made for beyond the largest approach on the face, relative to it."""
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SampleLaws:
@@ -63,11 +51,12 @@ class SampleLaws:
             Collective.
         """
         hardness = self.model.hardness
-        most = math.inf if hardness is None else _YIELDED * hardness
+        # near the hardness nearly all cells bear it, and at it there is no function of closure
+        most = math.inf if hardness is None else 0.95 * hardness
         if before is None or not (reached := before.largest_pressure):
             pressure, closure = self.largest_loads()
         else:
-            pressure, closure = _EXTENSION * reached, None
+            pressure, closure = 2.0 * reached, None
             most = min(most, self._modulus)
         models = {
             id(one): self._model_of(region, one)
@@ -109,14 +98,14 @@ class SampleLaws:
         if history.quantity == "force":
             force = history.largest
             mean = force / face.area
-            return stated or max(_CONCENTRATION * mean, self._hertz(force=force)), None
+            return stated or self._peak(mean, force=force), None
         tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
         approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
         mean = approach / self.mean_compliance()
-        pressure = stated or max(_CONCENTRATION * mean, self._hertz(approach=approach))
+        pressure = stated or self._peak(mean, approach=approach)
         first = self.bodies.first
         preloaded = first is not None and first.body.preload is not None
-        return pressure, None if preloaded else (1.0 + _RESERVE) * approach
+        return pressure, None if preloaded else 1.15 * approach
 
     def mean_compliance(self) -> float:
         """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
@@ -132,19 +121,24 @@ class SampleLaws:
             total += float(moved @ one.areas / one.areas.sum())
         return total
 
-    def _hertz(self, *, force: float = 0.0, approach: float = 0.0) -> float:
-        """Return a bound of the pressure between smooth crowned bodies; 0 without a crown [MPa].
+    def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
+        """Return the largest local pressure that laws are made for [MPa].
+
+        It is ten times the mean pressure on the face, or twice the largest pressure of the smooth
+        crowned bodies, which roughness lowers.
 
         Source:
             Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
         """
         radii = [one for one in self.bodies.parts.scene.law.crown or () if one != "inf"]
         if not radii:
-            return 0.0
+            return 10.0 * mean
         modulus, radius = self._modulus, math.sqrt(math.prod(radii))
         if len(radii) == 1:
             radius, length = radii[0], min(self.bodies.parts.body.lengths)
-            line = math.sqrt(force / length * modulus / (math.pi * radius))
-            return _CROWNED * max(line, modulus * math.sqrt(0.5 * approach / radius))
-        point = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
-        return _CROWNED * max(point, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
+            peak = math.sqrt(force / length * modulus / (math.pi * radius))
+            under_approach = modulus * math.sqrt(0.5 * approach / radius)
+        else:
+            peak = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
+            under_approach = 2.0 / math.pi * modulus * math.sqrt(approach / radius)
+        return max(10.0 * mean, 2.0 * max(peak, under_approach))

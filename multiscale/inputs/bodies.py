@@ -29,8 +29,6 @@ LAW_BLOCK_CELLS: Cells = (40, 40, 25)
 FIELD_CELLS: Cells = (20, 20, 12)
 """Cells of a block that is meshed after the load for its fields under the mean pressures of
 patches."""
-_COVERED = 1e-6
-"""Part of the surface's rectangle beside the contact face that is rounding."""
 
 
 def block_section(scene: Scene) -> BlockSection:
@@ -206,7 +204,7 @@ class SceneBody:
             covered = float(face.areas[0]) / whole.area
         except InputError:  # no facet lies in it
             covered = 0.0
-        if covered < 1.0 - _COVERED:
+        if covered < 1.0 - 1e-6:  # rounding
             x, y = self.facts.lengths
             raise InputError(
                 f"the surface's rectangle, {lengths[0]:g} × {lengths[1]:g} mm, does not lie on the "

@@ -14,8 +14,6 @@ from multiscale.inputs.surfaces import located
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene
 
-_ROUNDING = 16.0 * float(np.finfo(float).eps)
-"""Approach over the largest height below which it does not change where the plane is."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
 
@@ -96,7 +94,8 @@ def check_load(
             allowed=f"numbers up to {count}",
             file=scene.file,
         )
-    resolved = _ROUNDING * max(float(np.abs(one.heights).max()) for one in surfaces)
+    eps = float(np.finfo(float).eps)
+    resolved = 16.0 * eps * max(float(np.abs(one.heights).max()) for one in surfaces)
     approaches = load_history_on(scene, surfaces).points
     if loading.approach is not None and 0.0 < max(approaches) < resolved:
         raise InputError(

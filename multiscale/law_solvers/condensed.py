@@ -24,12 +24,6 @@ from multiscale.loading.load_step import LoadStep
 
 Array = NDArray[np.float64]
 
-_MOST_STEPS = 100
-_MOST_HALVINGS = 40
-_MEMORY = 4  # residuals that a step is compared with: at kinks of the laws it may rise for a while
-_DECREASE = 1e-4  # share of the predicted decrease that a step must bring
-_PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plane gains a support
-
 
 class CondensedLaws(LawSolver):
     """Patch laws on the compliance of the block's patches; a load step is a small dense system.
@@ -133,8 +127,8 @@ def equilibrium(
 
 def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
     now = problem.at(local, plane)
-    recent: deque[float] = deque(maxlen=_MEMORY)
-    for iterations in range(_MOST_STEPS):
+    recent: deque[float] = deque(maxlen=4)  # at kinks of the laws a residual may rise for a while
+    for iterations in range(100):
         problem.force_scale = max(problem.force_scale, float(now.load[0]))
         if problem.relative_residual(now) <= TOLERANCE:
             return replace(now, iterations=iterations)
@@ -145,7 +139,7 @@ def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
         else:
             recent.clear()
             now = problem.at(now.local + step, now.plane + motion)
-    raise problem.failure("DIVERGED_MAX_IT", _MOST_STEPS)
+    raise problem.failure("DIVERGED_MAX_IT", 100)
 
 
 def _newton_step(problem: LoadedPatches, now: DenseState) -> tuple[Array, Array, bool]:
@@ -179,7 +173,7 @@ def _to_next_touch(problem: LoadedPatches, now: DenseState, motion: Array) -> tu
     if not coming.any():
         raise plane_failure(problem.control, "NO_SUPPORT")
     largest = max(float(np.abs(problem.levers.matrix @ now.plane).max()), float(gap[coming].max()))
-    way = np.maximum(gap[coming], 0.0) + _PAST_TOUCH * largest
+    way = np.maximum(gap[coming], 0.0) + 0.02 * largest  # beyond touch, for a support
     share = float(np.min(way / rise[coming]))
     return share * rise, share * motion
 
@@ -198,9 +192,9 @@ def _line_search(
     step and the one along the laws is taken where its residual is below the reference.
     """
     before = problem.norm(now)
-    for share in 0.5 ** np.arange(_MOST_HALVINGS):
+    for share in 0.5 ** np.arange(40):
         part, plane = share * step, now.plane + share * motion
-        trial, enough = problem.at(now.local + part, plane), 1.0 - _DECREASE * share
+        trial, enough = problem.at(now.local + part, plane), 1.0 - 1e-4 * share
         if problem.norm(trial) <= enough * before:
             return trial
         trial = min(trial, problem.along_laws(now, part, plane), key=problem.norm)

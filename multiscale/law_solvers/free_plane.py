@@ -16,10 +16,6 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 
-_OTHER_MODEL = 0.05
-"""Residual of closures, relative to the largest local approach, that shows that the laws were made
-for another macro model; between their rows it is hundredths of that."""
-
 
 class FreePlaneLaws(LawSolver):
     """Consistent laws under a plane without moment.
@@ -69,7 +65,7 @@ class FreePlaneLaws(LawSolver):
         closure = local - self._displacements(point.pressure[None])[0]
         residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
         residual /= float(np.abs(local).max()) or 1.0
-        if residual > _OTHER_MODEL:
+        if residual > 0.05:  # between rows of laws of this macro model it is hundredths of that
             raise NotConverged(
                 f"the patches at {control}",
                 reason="OTHER_BODY",

@@ -30,8 +30,6 @@ from support.collective import on_root
 
 Array = NDArray[np.float64]
 
-_MM2_PER_M2 = 1e6
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Conductances:
@@ -138,7 +136,7 @@ class ConductanceObserver(StepObserver):
         if section.temperature is not None and section.emissivity is not None:
             radiation = radiation_conductance(section.temperature, section.emissivity)
             per_area += (1.0 - share) * radiation
-        return per_area * float(self._conductances.areas.sum()) / _MM2_PER_M2
+        return per_area * float(self._conductances.areas.sum()) / 1e6  # from mm² to m²
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
