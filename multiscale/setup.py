@@ -17,9 +17,9 @@ from multiscale.auto.keys import (
 )
 from multiscale.auto.search import MeshError, coupling_by_accuracy, measured_mesh_error
 from multiscale.bodies.reader import read_bodies
-from multiscale.couplings.coupling import Coupling, Facts, Source
+from multiscale.couplings.coupling import Coupling, Source
 from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs.surfaces import make_surface
+from multiscale.inputs.surfaces import located, make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone
@@ -51,38 +51,30 @@ def make_setup(
     Note:
         Collective.
     """
-    first, counter = meshes = read_bodies(scene, comm)
-    facts: Facts = (first.facts if first else None, counter.facts if counter else None)
-    known, ready = resolved or {}, nodes or ClusterNodes()
-    coupling: Coupling = on_root_alone(
-        large_object_comm(comm),
-        lambda: _made(scene, known, ready, facts, like, mesh_error),
-    )
-    coupling.attach(comm, meshes)
+    with located(scene):
+        first, counter = meshes = read_bodies(scene, comm)
+        facts = first.facts if first else None, counter.facts if counter else None
+        source = Source(scene, facts, nodes or ClusterNodes(), like)
+        coupling: Coupling = on_root_alone(
+            large_object_comm(comm), lambda: _made(source, resolved or {}, mesh_error)
+        )
+        coupling.attach(comm, meshes)
     return coupling
 
 
-def _made(
-    scene: Scene,
-    known: Mapping[str, Any],
-    nodes: ClusterNodes,
-    facts: Facts,
-    like: Coupling | None,
-    mesh_error: MeshError,
-) -> Coupling:
+def _made(source: Source, known: Mapping[str, Any], mesh_error: MeshError) -> Coupling:
     """Return the coupling of a scene, with its auto values as they were or as they are chosen."""
-    began = time.perf_counter()
+    began, scene = time.perf_counter(), source.scene
     auto: frozenset[str] = frozenset() if known else auto_keys(scene)
     start = provisional(with_resolved(scene, known), auto)
 
     def build(stated: Scene) -> Coupling:
-        return coupling_class(stated).from_scene(Source(stated, facts, nodes))
+        return coupling_class(stated).from_scene(source._replace(scene=stated, like=None))
 
     if not known and is_measured(scene):
         chosen = coupling_by_accuracy(scene, start, build, mesh_error)
         return replace(chosen, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
         start = with_value(start, "patches.grid", map_grid(start, make_surface(start)))
-    x, y = known.get("micro") or (0, 0)
-    cells = (int(x), int(y)) if x else None
-    return coupling_class(start).from_scene(Source(start, facts, nodes, like, cells))
+    cells = known.get("micro") and (int(known["micro"][0]), int(known["micro"][1]))
+    return coupling_class(start).from_scene(source._replace(scene=start, cells=cells))

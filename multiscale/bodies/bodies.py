@@ -1,8 +1,12 @@
-"""The bodies of a scene: contact face, compliance under patches, terms, contact models on them.
+"""The bodies of a scene: contact face, compliance, contact models on them, fields.
 
 One rule holds for a counter-body that is a half-space. A compliance of the patches as a matrix is
 that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain those of the half-space.
+
+Fields are those of a body that was pressed as a mesh, whose displacements are kept. Elsewhere a
+body with a flat top is meshed after the load, and loaded by the contact pressures: by those of the
+cells or asperities, summed over the facets of the mesh, or with laws by the means of the patches.
 
 Theory: docs/theory.md, section 11.
 """
@@ -10,14 +14,15 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError, MaterialPair, Surface
+from geometry import InputError, MaterialPair, PatchGrid, Surface
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
@@ -27,8 +32,11 @@ from multiscale.laws.consistent import Displacements
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ElasticBody, FacePair, LoadedFace
+    from macro.fields import Pressures
 
 Array = NDArray[np.float64]
+Field = tuple[int, Array, "Pressures"]
+"""Number of the load step, this rank's displacements [mm], and the pressures [MPa]."""
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
@@ -180,6 +188,20 @@ class Bodies:
         key = (*self._as_text(), self.parts.patches, users_options())
         return cached("plain", key, compute, self.comm or MPI.COMM_SELF)["compliance"]
 
+    def mean_compliance(self) -> float:
+        """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
+
+        Note:
+            Collective.
+        """
+        from macro import FacePair, displacements_under
+
+        face, total = self.contact_face(), 0.0
+        for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
+            moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
+            total += float(moved @ one.areas / one.areas.sum())
+        return total
+
     def _as_text(self) -> tuple[Any, ...]:
         """Return all that the compliance of the meshes depends on, besides the patches."""
         parts, scene, found = self.parts, self.parts.scene, list[Any]()
@@ -253,6 +275,69 @@ def on_body(
         return replace(model, slopes=(slopes, others))
 
     return put
+
+
+def write_solved(path: Path, bodies: Bodies, parts: PatchGrid, states: Mapping[int, Array]) -> None:
+    """Write the fields of bodies under pressures of parts of their contact face.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        bodies: The bodies, meshed where they were not yet.
+        parts: The N parts.
+        states: Pressures by number of the load step, shape (N,) each [MPa].
+
+    Note:
+        Collective.
+    """
+    whole = bodies.contact_face()
+
+    def solved(face: LoadedFace) -> Iterator[Field]:
+        for number, pressure in sorted(states.items()):
+            solution = face.body.solve(face.load(pressure))
+            yield number, solution.x.array[: face.body.owned_dofs].copy(), pressure
+
+    _write(path, whole, solved, parts=parts)
+
+
+def write_displaced(
+    path: Path,
+    face: LoadedFace | FacePair,
+    states: Mapping[int, Array],
+    pressures: Callable[[int, bool], Pressures],
+) -> None:
+    """Write the fields of bodies whose displacements are known.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        face: The contact face of the body, or of both.
+        states: This rank's displacements by number of the load step [mm].
+        pressures: What is shown as pressure, by load step and whether it is on the counter-body.
+
+    Note:
+        Collective.
+    """
+    from macro import FacePair
+
+    def halves(counter: bool) -> Iterator[Field]:
+        for number, moved in sorted(states.items()):
+            own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
+            yield number, own, pressures(number, counter)
+
+    _write(path, face, lambda one: halves(one is getattr(face, "second", None)))
+
+
+def _write(
+    path: Path,
+    whole: LoadedFace | FacePair,
+    fields: Callable[[LoadedFace], Iterator[Field]],
+    parts: PatchGrid | None = None,
+) -> None:
+    import macro
+
+    both: list[Any] = [whole.first, whole.second] if isinstance(whole, macro.FacePair) else [whole]
+    for one, name in zip(both, (path.name, f"counter_{path.name}"), strict=False):
+        face = one if parts is None else replace(one, patches=parts)
+        macro.write_fields(path.with_name(name), face, fields(face))
 
 
 def free_bodies(bodies: list[ElasticBody]) -> None:

@@ -22,8 +22,7 @@ from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import Bodies, free_bodies
-from multiscale.bodies.fields import write_solved
+from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.couplings import describe
 from multiscale.couplings.cost import Work, cost_statement
 from multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, BodyFacts, Cells, SceneBody
@@ -555,6 +554,6 @@ class Coupling(SceneParts, ABC):
         """
         bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
         self._meshes = (None, None)
-        for name in ("solver", "bodies", "put_on_body", "_laws"):  # they hold the bodies' matrices
+        for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)
         free_bodies(bodies)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from multiscale.couplings.contact import AnalyticCoupling, ConcurrentCoupling
 from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.micro_coupling import AnalyticCoupling, ConcurrentCoupling
 from multiscale.couplings.patch_laws import ConsistentCoupling, IsolatedCoupling
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.couplings.representative import RepresentativeCoupling

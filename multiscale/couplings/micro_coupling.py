@@ -1,4 +1,10 @@
-"""Couplings of a micro model of the whole surface, with laws or without."""
+"""Couplings of a micro model of the whole surface; without laws the contact problem at every step.
+
+``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's body: they
+differ by a term of the compliance.
+
+Theory: docs/theory.md, sections 3 and 7.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, InputError, MaterialPair, Surface
+from geometry import Asperities, InputError, MaterialPair, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
@@ -24,8 +30,9 @@ from multiscale.couplings.contact_solver import (
 from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
+from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
+from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
 
@@ -53,7 +60,6 @@ class MicroCoupling(PressedSurface):
                 key="micro.model",
                 value=scene.micro.model,
                 allowed="half-space",
-                file=scene.file,
             )
         plane = prescribed_plane(history, surface)
         solves = cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel)
@@ -270,6 +276,47 @@ class MicroCoupling(PressedSurface):
             "summits_in_reach": int(self.interfering_summits.sum()),
             "border_maxima_in_reach": self.interfering_border_maxima,
         }
+
+
+@dataclass(kw_only=True, eq=False)
+class ConcurrentCoupling(MicroCoupling):
+    """The whole surface on the scene's body at every load step, without laws."""
+
+    shows_contacts: ClassVar[bool] = True
+
+    def _make_solver(self) -> StepSolver:
+        return self.contact_solver(self.model_on_body())
+
+    @property
+    def field_parts(self) -> PatchGrid:
+        """The parts of the contact face that contacts are seen on: facets of a block's mesh."""
+        nx, ny, _ = FIELD_CELLS if self.body.shape is None else self.body.shape.cells
+        if self.body.shape is None:
+            nx, ny = map(min, self.surface.grid, (nx, ny))
+        return PatchGrid(grid=(nx, ny), lengths=self.surface.lengths)
+
+    def coupling_statement(self) -> str:
+        """Say how contacts and bodies are put together."""
+        return (
+            "concurrent: the whole surface on the block at every load step, no laws; "
+            f"{describe.times(self.patches.grid)} patches gather the results"
+        )
+
+
+@dataclass(kw_only=True, eq=False)
+class AnalyticCoupling(ConcurrentCoupling):
+    """The micro model alone on a half-space, without finite elements."""
+
+    has_body: ClassVar[bool] = False
+    shows_contacts: ClassVar[bool] = False
+    patches_interact: ClassVar[bool] = False
+
+    def coupling_statement(self) -> str:
+        """Say how contacts and bodies are put together."""
+        counted = "; displacements, and so the approach, count from the mean of the surface"
+        return "analytic: the micro model alone on a half-space, no finite elements" + (
+            counted if self.scene.surface.periodic else ""
+        )
 
 
 def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> MicroModel:

@@ -20,9 +20,8 @@ from multiscale.bodies.bodies import on_body
 from multiscale.couplings.describe import times
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
-from multiscale.law_solvers.condensed import CondensedLaws
+from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from multiscale.law_solvers.embedded import EmbeddedLaws
-from multiscale.law_solvers.free_plane import FreePlaneLaws
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws

@@ -8,20 +8,19 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property, partial
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import PatchGrid, Regions, RigidPlane, Surface
-from micro import HalfSpaceModel
+from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
-from multiscale.couplings.sample_laws import SampleLaws
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
@@ -29,6 +28,8 @@ from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_sur
 from multiscale.law_solvers.embedded import ExtendedLaws
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
+from multiscale.laws.refinement import MOST_ROWS
+from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.readable import Observer, number, quantity
@@ -139,17 +140,90 @@ class RepresentativeCoupling(LawCoupling):
 
     # --- laws and load steps
 
-    @cached_property
-    def _laws(self) -> SampleLaws:
-        return SampleLaws(
-            bodies=self.bodies,
-            samples=self.samples,
-            model=self.micro,
-            tolerance=self.table_tolerance,
-        )
+    def _make_table(self, observe: Observer | None, before: LawTable | None = None) -> LawTable:
+        """Tabulate the laws, or extend earlier ones as far as the material allows.
 
-    def _make_table(self, observe: Observer | None) -> LawTable:
-        return self._laws.table(observe)
+        Args:
+            observe: Told of rows as they are made.
+            before: Laws that end too early; where they end as far as possible they come back.
+        """
+        modulus, hardness = self.materials.contact_modulus, self.micro.hardness
+        # near the hardness nearly all cells bear it, and at it there is no function of closure
+        most = math.inf if hardness is None else 0.95 * hardness
+        if before is None or not (reached := before.largest_pressure):
+            pressure, closure = self._largest_loads()
+        else:
+            pressure, closure = 2.0 * reached, None
+            most = min(most, modulus)
+        models = {
+            id(one): self._model_of(region, one)
+            for region in self.samples
+            for one in region.surfaces
+        }
+        made = representative_laws(
+            {region.name: region.surfaces for region in self.samples},
+            modulus,
+            largest_pressure=min(pressure, most),
+            largest_closure=closure,
+            tolerance=self.table_tolerance,
+            most_rows=MOST_ROWS,
+            make_model=lambda sample: models[id(sample)],
+            before=before,
+            comm=self.comm,
+            observe=observe,
+        )
+        return before if before is not None and made.rows == before.rows else made
+
+    def _model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
+        """Return the periodic model of a sample, with the slopes of its body where they count."""
+        pair = region.materials
+        model = replace(self.micro, surface=sample, contact_modulus=pair.contact_modulus)
+        if not self.finite_slopes:
+            return model
+        return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
+
+    def _largest_loads(self) -> tuple[float, float | None]:
+        """Return the largest local pressure that laws are made for [MPa], and closure [mm].
+
+        The closure is None where only a force, or other loads of the body, would tell it.
+
+        Note:
+            Collective.
+        """
+        stated, history, face = self.scene.law.largest_pressure, self.load_history, self.body
+        if history.quantity == "force":
+            force = history.largest
+            mean = force / face.area
+            return stated or self._peak(mean, force=force), None
+        tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
+        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
+        mean = approach / self.bodies.mean_compliance()
+        pressure = stated or self._peak(mean, approach=approach)
+        first = self.bodies.first
+        preloaded = first is not None and first.body.preload is not None
+        return pressure, None if preloaded else 1.15 * approach
+
+    def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
+        """Return the largest local pressure that laws are made for [MPa].
+
+        It is ten times the mean pressure on the face, or twice the largest pressure of the smooth
+        crowned bodies, which roughness lowers.
+
+        Source:
+            Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
+        """
+        radii = [one for one in self.scene.law.crown or () if one != "inf"]
+        if not radii:
+            return 10.0 * mean
+        modulus, radius = self.materials.contact_modulus, math.sqrt(math.prod(radii))
+        if len(radii) == 1:
+            radius, length = radii[0], min(self.body.lengths)
+            peak = math.sqrt(force / length * modulus / (math.pi * radius))
+            under_approach = modulus * math.sqrt(0.5 * approach / radius)
+        else:
+            peak = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
+            under_approach = 2.0 / math.pi * modulus * math.sqrt(approach / radius)
+        return max(10.0 * mean, 2.0 * max(peak, under_approach))
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         face = self.bodies.contact_face()
@@ -166,7 +240,7 @@ class RepresentativeCoupling(LawCoupling):
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""
-        longer = self._laws.table(None, before=table)
+        longer = self._make_table(None, before=table)
         if longer is table:
             return None
         self.table = longer

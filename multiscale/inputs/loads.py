@@ -39,7 +39,6 @@ def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
                 key="patches.grid",
                 value=list(grid),
                 allowed=f"at most {list(limit)}",
-                file=scene.file,
             )
 
 
@@ -66,7 +65,6 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
             key="load.approach",
             value=list(loading.approach),
             allowed=f"> {-depth:.6g} mm",
-            file=scene.file,
         )
     return replace(loading, approach=points, depth=depth)
 
@@ -92,7 +90,6 @@ def check_load(
             key="output.fields",
             value=fields,
             allowed=f"numbers up to {count}",
-            file=scene.file,
         )
     eps = float(np.finfo(float).eps)
     resolved = 16.0 * eps * max(float(np.abs(one.heights).max()) for one in surfaces)
@@ -103,7 +100,6 @@ def check_load(
             key="load.approach",
             value=list(loading.approach),
             allowed=f"at least {resolved:.3g} mm, for heights of this size",
-            file=scene.file,
         )
     _check_hardness(scene, area)
     _check_gap(scene, surfaces[0], approaches)
@@ -121,7 +117,6 @@ def check_load(
             key=key,
             value=list(points),
             allowed=f"at most {named}, {most:.6g} {unit}",
-            file=scene.file,
         )
 
 
@@ -136,7 +131,6 @@ def _check_hardness(scene: Scene, area: float) -> None:
         key="micro.hardness",
         value=f"{hardness:.6g} MPa",
         allowed=f"> {mean:.6g} MPa, or a smaller load.force",
-        file=scene.file,
     )
 
 
@@ -152,5 +146,4 @@ def _check_gap(scene: Scene, surface: Surface, approaches: Sequence[float]) -> N
             value=list(points),
             allowed=f"less than {most - deepest + max(points):.6g} mm, where the plane reaches the "
             "mean height; beyond it load.force",
-            file=scene.file,
         )

@@ -37,7 +37,6 @@ def check_memory(scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryReq
                 key=request.key,
                 value=list(value) if isinstance(value, tuple) else value,
                 allowed=f"what fits into {nodes.remedy(request)}{'; or ' * bool(other)}{other}",
-                file=scene.file,
             )
 
 

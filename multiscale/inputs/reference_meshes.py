@@ -210,7 +210,6 @@ def _check_block(scene: Scene) -> None:
             key="block.margin",
             value=block.margin,
             allowed="0",
-            file=scene.file,
         )
     if scene.reference.hexahedral and not block.element.startswith("Q"):
         raise InputError(
@@ -218,7 +217,6 @@ def _check_block(scene: Scene) -> None:
             key="block.element",
             value=block.element,
             allowed="Q1, Q2, or reference.mesh = 'tetrahedra'",
-            file=scene.file,
         )
 
 

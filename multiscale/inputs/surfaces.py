@@ -87,9 +87,7 @@ def laid_counter_surface(scene: Scene, section: CounterSurfaceSection, own: Surf
             return laid
         problem = "leaves no counter-surface that continues periodically over these sides"
         allowed = "multiples of 90 deg, of 180 deg on sides that differ"
-    raise InputError(
-        problem, key=f"counter_surface.{key}", value=value, allowed=allowed, file=scene.file
-    )
+    raise InputError(problem, key=f"counter_surface.{key}", value=value, allowed=allowed)
 
 
 def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
@@ -127,8 +125,8 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
 
 
 @contextmanager
-def located(scene: Scene, key: str) -> Iterator[None]:
-    """Give errors of the input that occur within the scene's file and a key.
+def located(scene: Scene, key: str | None = None) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and, without one, a key.
 
     Args:
         scene: The scene.

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid
-from multiscale.bodies.fields import write_displaced
+from multiscale.bodies.bodies import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
