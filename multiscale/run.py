@@ -82,7 +82,7 @@ class Run:
         self._observers: list[StepObserver] = [self.fields]
         if self.scene.output.contact != "none":
             self._observers.append(StiffnessObserver(self.coupling))
-        self._observers.append(WorkObserver())
+        self._observers.append(WorkObserver(self.coupling))
         if self.scene.conductance is not None:
             from multiscale.observers.conductance import ConductanceObserver  # others do without
 

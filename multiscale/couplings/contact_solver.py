@@ -165,48 +165,36 @@ class ContactSolver(StepSolver):
         self._start = state
 
 
-def prescribed_plane(load_history: LoadHistory, surface: Surface) -> RigidPlane | None:
-    """Return the rigid plane at the largest load; None where force or moments are prescribed.
-
-    Args:
-        load_history: The loads.
-        surface: The surface.
-    """
-    if load_history.quantity == "force" or load_history.slopes is None:
-        return None
-    return RigidPlane.above(surface, load_history.largest, load_history.slopes)
-
-
 def plane_at_largest_load(
-    load_history: LoadHistory, solver: StepSolver, surface: Surface
-) -> RigidPlane:
+    load_history: LoadHistory, solver: StepSolver | None, surface: Surface
+) -> RigidPlane | None:
     """Return the rigid plane at the largest load.
 
     Args:
         load_history: The loads.
-        solver: Finds the plane where the force or the moment is prescribed.
+        solver: Finds the plane where the force or the moment is prescribed; None leaves it open.
         surface: The surface.
 
     Raises:
         NotConverged: When the plane is not found in smaller steps either.
     """
-    if plane := prescribed_plane(load_history, surface):
-        return plane
+    if load_history.quantity != "force" and load_history.slopes is not None:
+        return RigidPlane.above(surface, load_history.largest, load_history.slopes)
+    if solver is None:
+        return None
     (step,) = load_steps(solver, load_history.up_to_largest)
     return RigidPlane.above(surface, step.approach_mm, step.tilt)
 
 
-def estimated_plane(load_history: LoadHistory, model: HalfSpaceModel) -> RigidPlane:
-    """Return the rigid plane at the largest load on a half-space of few cells.
+def on_few_cells(model: HalfSpaceModel) -> ContactSolver:
+    """Return what solves the contact of a half-space on few cells, which estimate planes.
+
+    On 1024² cells with waves down to a 256th of the side the approach was within 1.5 %.
 
     Args:
-        load_history: The loads.
         model: The half-space on the cells of the surface.
     """
     surface = model.surface
-    # on 1024² cells with waves down to a 256th of the side the approach was within 1.5 %
     x, y = (min(count, 96) for count in surface.grid)
-    coarse = model.resampled((x, y))
     whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
-    solver = ContactSolver(coarse, whole, patch_means(surface, whole))
-    return plane_at_largest_load(load_history, solver, surface)
+    return ContactSolver(model.resampled((x, y)), whole, patch_means(surface, whole))

@@ -16,10 +16,6 @@ from multiscale.scene.keys import bare_quantities
 from multiscale.scene.sections import MicroSection
 
 _INTERACTING = ("elliptic", "circular")
-LOCKING_FROM = 0.45
-"""Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
-cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
-are 0.5, 1.1 and 1.5 % too stiff."""
 
 
 def materials(parts: SceneParts) -> str:
@@ -216,12 +212,7 @@ def mesh_warnings(parts: SceneParts) -> Iterator[str]:
     """Yield what a user should know about bodies on meshes, or under laws of samples."""
     for facts in filter(None, (parts.body, parts.counter)):
         yield from facts.notes
-        if facts.degree == 1 and facts.poisson_ratio > LOCKING_FROM:
-            yield (
-                f"linear elements lock as Poisson's ratio comes near 0.5 (here "
-                f"{facts.poisson_ratio:g}): the body is too stiff by several per cent or more; "
-                "take element = 'quadratic'"
-            )
+        yield from locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
 
 
 def proportions(parts: SceneParts) -> Iterator[str]:
@@ -248,18 +239,29 @@ def proportions(parts: SceneParts) -> Iterator[str]:
         )
 
 
-def locking(poisson_ratio: float, degree: int) -> Iterator[str]:
-    """Yield a warning where linear elements of a block lock.
+def locking(
+    poisson_ratio: float, degree: int, what: str = "block", take: str = ""
+) -> Iterator[str]:
+    """Yield a warning where linear elements lock.
+
+    Two by two patches on 8 × 8 × 6 trilinear cells are 1.6 % too stiff at a Poisson's ratio of
+    0.45, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells are 0.5, 1.1 and 1.5 %
+    too stiff.
 
     Args:
-        poisson_ratio: Poisson's ratio of the block.
+        poisson_ratio: Poisson's ratio of the body.
         degree: Degree of the displacements.
+        what: The body.
+        take: What does not lock; by default what blocks can have.
     """
-    if degree == 1 and poisson_ratio > LOCKING_FROM:
+    if degree == 1 and poisson_ratio > 0.45:
+        take = take or (
+            "block.element = 'Q2' or 'P2', or coupling.compliance = 'decomposed', whose elements "
+            "are of high order"
+        )
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
-            "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
-            "coupling.compliance = 'decomposed', whose elements are of high order"
+            f"{what} is too stiff by several per cent or more; take {take}"
         )
 
 

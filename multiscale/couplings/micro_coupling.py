@@ -22,11 +22,7 @@ from geometry import Asperities, InputError, MaterialPair, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
-from multiscale.couplings.contact_solver import (
-    ContactSolver,
-    plane_at_largest_load,
-    prescribed_plane,
-)
+from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
@@ -50,7 +46,7 @@ class MicroCoupling(PressedSurface):
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         parts, scene = cls._parts(source), source.scene
-        began, surface, history = time.perf_counter(), parts["surface"], parts["load_history"]
+        began, surface = time.perf_counter(), parts["surface"]
         model = _stated_model(scene, surface, parts["materials"])
         if source.cells is not None and isinstance(model, HalfSpaceModel):
             model = model.resampled(source.cells)
@@ -61,11 +57,11 @@ class MicroCoupling(PressedSurface):
                 value=scene.micro.model,
                 allowed="half-space",
             )
-        plane = prescribed_plane(history, surface)
-        solves = cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel)
-        if plane is None and solves:  # laws end there, and statements say it of summits
+        solver = None
+        if cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel):
+            # laws end at this plane, and statements say it of summits
             solver = ContactSolver(model, parts["patches"], parts["mean_heights"])
-            plane = plane_at_largest_load(history, solver, surface)
+        plane = plane_at_largest_load(parts["load_history"], solver, surface)
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         return cls(micro=model, plane_at_largest_load=plane, **parts)
 

@@ -19,7 +19,7 @@ from geometry.contact_state import ContactState, Spots, peaks_of
 from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
-from multiscale.couplings.contact_solver import estimated_plane
+from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from multiscale.couplings.cost import SET_UP_CYCLES, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
@@ -195,7 +195,8 @@ class ReferenceCoupling(PressedSurface):
             contact_modulus=parts["materials"].contact_modulus,
             periodic=scene.surface.periodic,
         )
-        plane = estimated_plane(parts["load_history"], model)
+        plane = plane_at_largest_load(parts["load_history"], on_few_cells(model), surface)
+        assert plane is not None
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         meshes = reference_meshes(scene, surface, plane, source.nodes)
         return cls(plane_at_largest_load=plane, rough_meshes=meshes, **parts)

@@ -110,11 +110,6 @@ class RepresentativeCoupling(LawCoupling):
         """Whether finite slopes of the samples count: where the scene says so."""
         return bool(self.scene.micro.finite_slopes)
 
-    @property
-    def shown_bodies(self) -> list[BodyFacts]:
-        """What is known of the bodies that the record of a run tells."""
-        return [self.body] if self.counter is None else [self.body, self.counter]
-
     def newton(self, table: LawTable | None = None) -> NewtonChoice:
         """Choose the Newton that load steps are found with."""
         return NewtonChoice(False, "laws of samples hold at the points of the mesh")

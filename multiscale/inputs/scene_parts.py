@@ -116,8 +116,9 @@ class SceneParts:
 
     @property
     def shown_bodies(self) -> list[BodyFacts]:
-        """What is known of the bodies that the record of a run tells: those on meshes."""
-        return self.meshes
+        """What is known of the bodies that the record of a run tells: those loaded as meshes."""
+        loaded = self.meshes if self.regions is None else [self.body, self.counter]
+        return [one for one in loaded if one is not None]
 
     @property
     def both_elastic(self) -> bool:

@@ -76,7 +76,8 @@ class ConductanceObserver(StepObserver):
     """
 
     def __init__(self, coupling: Coupling, section: ConductanceSection) -> None:
-        self._coupling, self._section = coupling, section
+        super().__init__(coupling)
+        self._section = section
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""

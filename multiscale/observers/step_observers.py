@@ -20,7 +20,14 @@ _AFTER_UNLOADING = (
 
 
 class StepObserver:
-    """Sees every load step as it is accepted, and may add to it; this one adds nothing."""
+    """Sees every load step as it is accepted, and may add to it; this one adds nothing.
+
+    Args:
+        coupling: What finds the load steps.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        self._coupling = coupling
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with what the observer adds.
@@ -67,14 +74,7 @@ class WorkObserver(StepObserver):
 
 
 class StiffnessObserver(StepObserver):
-    """Adds the interfacial stiffness to load steps, where it is known.
-
-    Args:
-        coupling: What finds the load steps.
-    """
-
-    def __init__(self, coupling: Coupling) -> None:
-        self._coupling = coupling
+    """Adds the interfacial stiffness to load steps, where it is known."""
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with its interfacial stiffness."""
@@ -98,9 +98,9 @@ class ContactRecorder(StepObserver):
     """
 
     def __init__(self, coupling: Coupling) -> None:
-        self._coupling, self._asked = coupling, coupling.scene.output.contact
-        if coupling.has_laws and self._asked == "auto":
-            self._asked = "none"
+        super().__init__(coupling)
+        asked = coupling.scene.output.contact
+        self._asked = "none" if coupling.has_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen = 0
@@ -156,8 +156,8 @@ class ErrorCheck(StepObserver):
     """
 
     def __init__(self, coupling: Coupling, has_unloaded: Callable[[], bool]) -> None:
-        self._coupling, self._has_unloaded = coupling, has_unloaded
-        self._check = coupling.scene.output.check
+        super().__init__(coupling)
+        self._has_unloaded, self._check = has_unloaded, coupling.scene.output.check
         self._notes: dict[str, None] = {}
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
@@ -192,7 +192,7 @@ class FieldRecorder(StepObserver):
     """
 
     def __init__(self, coupling: Coupling) -> None:
-        self._coupling = coupling
+        super().__init__(coupling)
         self._wanted = coupling.scene.output.wants_fields
         self.kept: dict[int, Any] = {}
 
