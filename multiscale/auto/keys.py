@@ -72,7 +72,7 @@ def is_measured(scene: Scene) -> bool:
     """
     opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
     sized = scene.accuracy is None or not scene.reference.sizes_are_open
-    return opened or (coupling_class(scene).meshes_contact and not sized)
+    return opened or (coupling_class(scene).meshes_roughness and not sized)
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:

@@ -96,7 +96,7 @@ def coupling_by_accuracy(
     """
     search, auto, kind = _Search(given, build, mesh_error), auto_keys(given), coupling_class(start)
     if "surface.grid" in auto:
-        on_cells = start.micro.model == "half-space" and not kind.meshes_contact
+        on_cells = start.micro.model == "half-space" and not kind.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         start = on_waves(start, 8 if on_cells else 16)
     if kind.tolerance_by_accuracy and start.coupling.table_tolerance is None:
@@ -104,7 +104,7 @@ def coupling_by_accuracy(
     coupling = build(start)
     if "patches.grid" in auto:
         coupling = build(with_value(start, "patches.grid", map_grid(start, coupling.surface)))
-    if kind.meshes_contact:
+    if kind.meshes_roughness:
         return search.decided(*search.with_refined_meshes(cast(ReferenceCoupling, coupling)))
     if isinstance(coupling.micro, HalfSpaceModel):
         return search.kept_or_meshed(

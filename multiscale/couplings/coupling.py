@@ -82,8 +82,6 @@ class Coupling(SceneParts, ABC):
             None without laws.
     """
 
-    meshes_contact: ClassVar[bool] = False
-    """Whether the roughness itself is meshed, instead of being that of a micro model."""
     tolerance_by_accuracy: ClassVar[bool] = False
     """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
     shows_contacts: ClassVar[bool] = False

@@ -180,7 +180,7 @@ class ReferenceCoupling(PressedSurface):
         rough_meshes: The meshes, from coarse to fine.
     """
 
-    meshes_contact: ClassVar[bool] = True
+    meshes_roughness: ClassVar[bool] = True
     patches_interact: ClassVar[bool] = False
 
     rough_meshes: ReferenceMeshes
