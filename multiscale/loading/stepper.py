@@ -198,7 +198,7 @@ def load_steps(solver: StepSolver, load_history: LoadHistory) -> Iterator[LoadSt
     changes the force by too much is replaced by two.
 
     Args:
-        solver: What finds the equilibria.
+        solver: What finds the equilibria; without an attribute `past` it leaves nothing behind.
         load_history: The loads.
 
     Raises:
@@ -212,7 +212,7 @@ class LoadStepper:
     """Makes the load steps of a load history, see `load_steps`, from any position in it.
 
     Args:
-        solver: What finds the equilibria.
+        solver: What finds the equilibria; without an attribute `past` it leaves nothing behind.
         load_history: The loads.
         position: Where to start.
 
@@ -253,7 +253,7 @@ class LoadStepper:
         by_force = self._load_history.quantity == "force"
         if divisible and by_force and self._exceeds_limit(target):
             return None
-        past = self._solver.past
+        past = getattr(self._solver, "past", None)
         step = self._reached(target)
         if divisible and self._exceeds_limit(step.force_N):
             if past is not None:
