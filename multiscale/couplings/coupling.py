@@ -394,7 +394,7 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         self.check_has_laws(self.scene)
-        raise NotImplementedError
+        raise NotImplementedError  # couplings with laws make them
 
     @abstractmethod
     def _make_solver(self) -> StepSolver:

@@ -16,7 +16,6 @@ import numpy as np
 
 from geometry import Control, PatchGrid
 from geometry.contact_state import ContactState, Spots, peaks_of
-from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
@@ -127,7 +126,7 @@ class ReferenceSolver(StepSolver):
             peak_pressure=nodes.pressure[top],
         )
         return ContactState(
-            plane=RigidPlane(approach=latest.approach, tilt=latest.tilt),
+            plane=latest.plane,
             patches=self._patches,
             force=latest.force,
             spots=spots,

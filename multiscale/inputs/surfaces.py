@@ -55,8 +55,8 @@ def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
     own = sample_surface(scene, scene.surface, "surface")
     if scene.counter_surface is None:
         return own, None
-    counter = laid_counter_surface(scene, scene.counter_surface, own)
     with located(scene, "counter_surface"):
+        counter = laid_counter_surface(scene, scene.counter_surface, own)
         return facing(own, counter), counter
 
 
@@ -176,8 +176,8 @@ def region_samples(
     for (name, section, key), material in zip(parts, materials, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
         if above is not None:
-            laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
             with located(scene, "counter_surface"):
+                laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
                 surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
         samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
         pair = MaterialPair(first=material, second=second)
