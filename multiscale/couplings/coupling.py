@@ -432,17 +432,8 @@ class Coupling(SceneParts, ABC):
         detail = self.solver.detail(latest)
         return None if detail is None else (step, detail)
 
-    def contact_note(self, step: int, force: float) -> str:
-        """Return what a report says of the last contact that `contact` returned; empty for nothing.
-
-        Args:
-            step: Number of its load step.
-            force: Force of the contact [N].
-        """
-        return ""
-
-    def checked(self, step: LoadStep) -> LoadStep | None:
-        """Return a load step with its errors measured; None where they cannot be.
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step with its errors measured; as it is where they cannot be.
 
         Args:
             step: The load step.
@@ -453,7 +444,7 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        return None
+        return step
 
     def with_mesh_errors(
         self, steps: Sequence[LoadStep]

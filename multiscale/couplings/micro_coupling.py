@@ -134,10 +134,8 @@ class MicroCoupling(PressedSurface):
             zero=self.zero_error,
         )
 
-    def checked(self, step: LoadStep) -> LoadStep | None:
-        """Return a load step with its errors measured; None where they cannot be."""
-        if self.cells is None:
-            return None
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step of contacts on cells with its errors measured."""
         return checked(step, self.error_probe(), self.load_history, self.comm)
 
     def unmeasured(self) -> str:

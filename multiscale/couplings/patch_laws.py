@@ -28,7 +28,7 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Detail, Observer, quantity
+from multiscale.readable import Detail, Observer
 
 Array = NDArray[np.float64]
 
@@ -121,13 +121,6 @@ class PatchLaws(LawCoupling, MicroCoupling):
         detail = solver.detail(solver.latest)
         with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
         return None if detail is None else (with_peak, detail)
-
-    def contact_note(self, step: int, force: float) -> str:
-        """Return that the contact is not that of the laws."""
-        return Detail(
-            f"contact of load step {step}: the contact problem behind the laws, solved under the "
-            f"plane of the step, with a force of {quantity(force, 'N', 5)}"
-        )
 
     def notes(self, steps: Any) -> Iterator[str]:
         """Yield what a report says of the approximations behind load steps."""

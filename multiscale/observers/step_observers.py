@@ -11,6 +11,7 @@ from geometry import Control, NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 
 _AFTER_UNLOADING = (
@@ -138,9 +139,12 @@ class ContactRecorder(StepObserver):
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
         yield from self._failures
-        if self.records:
+        if self.records and self._coupling.has_laws:
             last = self.records[-1]
-            yield from filter(None, [self._coupling.contact_note(last.step, last.force_N)])
+            yield Detail(
+                f"contact of load step {last.step}: the contact problem behind the laws, solved "
+                f"under the plane of the step, with a force of {quantity(last.force_N, 'N', 5)}"
+            )
 
     def release(self) -> None:
         """Let go of the contact, whose blocks stay in memory as long as it is held."""
@@ -171,7 +175,7 @@ class ErrorCheck(StepObserver):
             return step
         with self._coupling.clock.phase("check"):
             try:
-                return self._coupling.checked(step) or step
+                return self._coupling.checked(step)
             except NotConverged as error:
                 self._notes[f"errors of load step {step.step} not measured: {error}"] = None
                 return step
