@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import PatchGrid, Surface
+from geometry import PatchGrid
 from geometry.materials import MaterialPair
 from geometry.patches import patch_means
 from multiscale.couplings.coupling import Coupling, Meshes, Source
@@ -27,11 +27,9 @@ class PressedSurface(Coupling):
     """A rough surface that is pressed as a whole.
 
     Attributes:
-        counter_surface: What of the surface is the counter-body's; None where that is smooth.
         mean_heights: Mean height of each patch, shape (N,) [mm].
     """
 
-    counter_surface: Surface | None = None
     mean_heights: Array
 
     @classmethod
@@ -39,7 +37,7 @@ class PressedSurface(Coupling):
         """Return the attributes that all couplings of one surface have."""
         began, scene, like = time.perf_counter(), source.scene, source.like
         check_memory(scene, source.nodes, cls.requests(scene))
-        if isinstance(like, PressedSurface):
+        if like is not None and like.regions is None:
             surface, counter_surface = like.surface, like.counter_surface
         else:
             surface, counter_surface = make_surfaces(scene)

@@ -75,6 +75,8 @@ class SceneParts:
         scene: The scene with its auto values resolved.
         surface: Its rough surface, with the heights of both sides where both are rough; under laws
             of samples the first sample.
+        counter_surface: What of it is the counter-body's; None where that is smooth, and under laws
+            of samples.
         patches: Partition of the interface.
         materials: The materials on both sides of the interface.
         body: What is known of the body below the surface.
@@ -93,6 +95,7 @@ class SceneParts:
 
     scene: Scene
     surface: Surface
+    counter_surface: Surface | None = None
     patches: PatchGrid
     materials: MaterialPair
     body: BodyFacts
