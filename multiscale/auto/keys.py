@@ -52,15 +52,6 @@ def auto_keys(scene: Scene) -> frozenset[str]:
     return frozenset(open_keys if scene.on_mesh else open_keys - {"block.cells"})
 
 
-def accuracy_of(scene: Scene) -> float:
-    """Return the relative error of the force that a scene may be left with, 2 % by default.
-
-    Args:
-        scene: The scene.
-    """
-    return scene.accuracy or 0.02
-
-
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 

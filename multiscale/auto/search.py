@@ -19,7 +19,6 @@ from geometry.zero import Zero
 from micro import HalfSpaceModel
 from multiscale.auto.keys import (
     MOST_HEIGHTS,
-    accuracy_of,
     auto_keys,
     chosen_coupling,
     map_grid,
@@ -123,8 +122,8 @@ class _Search:
 
     @property
     def accuracy(self) -> float:
-        """Relative error of the force that may be left."""
-        return accuracy_of(self.given)
+        """Relative error of the force that may be left, 2 % by default."""
+        return self.given.accuracy or 0.02
 
     def refined_cells(
         self, coupling: MicroCoupling, model: HalfSpaceModel

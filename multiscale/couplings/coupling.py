@@ -25,8 +25,14 @@ from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.couplings import describe
 from multiscale.couplings.cost import Work, cost_statement
-from multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, BodyFacts, Cells, SceneBody
-from multiscale.inputs.bodies import block_cells as cells_of_block
+from multiscale.inputs.bodies import (
+    FIELD_CELLS,
+    LAW_BLOCK_CELLS,
+    BodyFacts,
+    Cells,
+    SceneBody,
+    stated_cells,
+)
 from multiscale.inputs.memory import body_request, scene_requests
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import located
@@ -161,7 +167,7 @@ class Coupling(SceneParts, ABC):
         meshed = scene.on_mesh or (cls.has_body and bool(scene.output.fields))
         if scene.block is None or not meshed:
             return None
-        return cells_of_block(scene, cls.unstated_cells(scene))
+        return stated_cells(scene, cls.unstated_cells(scene))
 
     @classmethod
     def patch_limits(cls, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:

@@ -42,7 +42,7 @@ def block_section(scene: Scene) -> BlockSection:
     return scene.block
 
 
-def block_cells(scene: Scene, unstated: Cells) -> Cells:
+def stated_cells(scene: Scene, unstated: Cells) -> Cells:
     """Return the cells of the flat block's mesh.
 
     Args:
@@ -125,7 +125,7 @@ class BodyFacts:
             shape = BlockShape(
                 interface=lengths,
                 height=block.height_under(lengths),
-                cells=block_cells(scene, unstated),
+                cells=stated_cells(scene, unstated),
                 **part_of(block, BlockMeshing),
             )
         x, y = (length + 2.0 * shape.margin for length in shape.interface)
