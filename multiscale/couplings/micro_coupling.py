@@ -161,11 +161,9 @@ class MicroCoupling(PressedSurface):
                 refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
                 each, finer = (6.0, 4.0) if refines else (2.0, 1.0)
                 solutions += each * (steps if output.check == "all" else 1)
-        unknowns, cycles = 0, 0.0
-        if self.has_body:
-            unknowns = sum(facts.unknowns for facts in self.meshes)
-            cycles = FACE_CYCLES * unknowns
-        if self.has_body and self.scene.on_mesh:
+        unknowns = sum(facts.unknowns for facts in self.meshes) if self.has_body else 0
+        cycles = FACE_CYCLES * unknowns
+        if self.scene.on_mesh:
             unknowns = unknowns or self.body.unknowns
             cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
         return Work(

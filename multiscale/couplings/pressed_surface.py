@@ -45,7 +45,8 @@ class PressedSurface(Coupling):
         body, counter = source.facts
         body = body or BodyFacts.of_block(scene, surface, cls.unstated_cells(scene))
         materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
-        check_load(scene, (surface,), surface.area, body if cls.has_body else None)
+        history = load_history_on(scene, (surface,))
+        check_load(scene, history, (surface,), surface.area, body if cls.has_body else None)
         patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
         return {
             "scene": scene,
@@ -56,7 +57,7 @@ class PressedSurface(Coupling):
             "mean_heights": patch_means(surface, patches),
             "body": body,
             "counter": counter,
-            "load_history": load_history_on(scene, (surface,)),
+            "load_history": history,
             "seconds": {"surface": time.perf_counter() - began},
         }
 

@@ -67,10 +67,10 @@ class RepresentativeCoupling(LawCoupling):
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        check_load(scene, surfaces, body.area, body)
+        history, plane = load_history_on(scene, surfaces), None
+        check_load(scene, history, surfaces, body.area, body)
         modulus, hardness = materials.contact_modulus, scene.micro.hardness
         model = HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, hardness=hardness)
-        history, plane = load_history_on(scene, surfaces), None
         if history.quantity != "force":
             mean = model.reference_height - surface.mean_height
             plane = RigidPlane.above(surface, min(history.largest, mean))
