@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import InputError, MaterialPair, PatchGrid, Surface
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
@@ -29,12 +28,12 @@ from multiscale.bodies.mesh import MeshTerms, PairTerms
 from multiscale.inputs.bodies import SceneBody, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.laws.consistent import Displacements
+from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ElasticBody, FacePair, LoadedFace
     from macro.fields import Pressures
 
-Array = NDArray[np.float64]
 Field = tuple[int, Array, "Pressures"]
 """Number of the load step, this rank's displacements [mm], and the pressures [MPa]."""
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import InputError, Material, Surface
 from micro import (
@@ -31,14 +30,13 @@ from micro import (
     side_stress_modes,
     side_stresses,
 )
+from support.arrays import Array
 from support.checks import process_memory
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, PatchGrid
     from macro import FaceCompliance
     from macro.bodies import Sides
-
-Array = NDArray[np.float64]
 
 
 _CUBE_MODES = 8

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, RigidPlane, Surface, overlaps
 from geometry.contact_state import ContactState, Start
@@ -17,9 +16,8 @@ from micro import HalfSpaceModel, MicroModel, Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, load_steps
+from support.arrays import Array
 from support.collective import on_root, on_root_alone
-
-Array = NDArray[np.float64]
 
 
 class ContactSolver(StepSolver):

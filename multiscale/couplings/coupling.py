@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Control, InputError, PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
@@ -45,8 +44,8 @@ from multiscale.readable import Detail, percent, quantity
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
 Meshes = tuple[SceneBody | None, SceneBody | None]

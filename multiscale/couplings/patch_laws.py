@@ -10,9 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
@@ -29,8 +26,6 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Detail, Observer
-
-Array = NDArray[np.float64]
 
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4

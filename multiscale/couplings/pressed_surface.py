@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import PatchGrid
 from geometry.materials import MaterialPair
@@ -18,8 +17,7 @@ from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located, make_surfaces
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 @dataclass(kw_only=True, eq=False)

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
@@ -20,8 +19,7 @@ from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import listed
 from multiscale.scene.scene import Scene
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""

@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Control, NotConverged, PatchGrid, RigidPlane
 from geometry.plane_equilibrium import UNSUPPORTED
@@ -23,8 +22,7 @@ from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 class CondensedLaws(LawSolver):

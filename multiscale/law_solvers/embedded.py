@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid
 from multiscale.bodies.bodies import write_displaced
@@ -18,11 +17,10 @@ from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
+from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
-
-Array = NDArray[np.float64]
 
 
 class EmbeddedLaws(LawSolver):

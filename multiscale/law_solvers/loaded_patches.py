@@ -8,15 +8,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from geometry import Control, InputError, NotConverged, PatchGrid
 from geometry.rigid_plane import PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
 from multiscale.laws.patch_law import PatchLaws
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 TOLERANCE = 1e-12
 """Residual of a solution: of the closures relative to the largest approach, of the force and the

@@ -15,11 +15,9 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multiscale.loading.load_step import LoadStep
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 BALANCE = 1e-3
 """Energy that may be missing, relative to the largest, before a run says so. In 150 load steps on

@@ -9,9 +9,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from micro.conductance import (
     conductance_per_area,
     gas_conductance,
@@ -25,9 +22,8 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, quantity
 from multiscale.scene.bodies import ConductanceSection
+from support.arrays import Array
 from support.collective import on_root
-
-Array = NDArray[np.float64]
 
 _PER_AREA = {
     "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",
