@@ -13,20 +13,12 @@ from geometry.meshes.block import BlockShape, misalignment
 from geometry.meshes.expected_contact import places_in_reach
 from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
 from geometry.meshes.refined_block import RefinedShape
-from geometry.patches import (
-    Partition,
-    PatchGrid,
-    Regions,
-    UnevenPartition,
-    overlaps,
-    patch_means,
-)
+from geometry.patches import PatchGrid, Regions, overlaps, patch_means
 from geometry.preparation import Crop, Filter, Preparation
 from geometry.rigid_plane import Control, RigidPlane
-from geometry.spectrum import Spectrum
+from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
-from geometry.synthesis import synthesise
 from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 
 __all__ = [
@@ -40,7 +32,6 @@ __all__ = [
     "MaterialPair",
     "NotConverged",
     "NotInstalled",
-    "Partition",
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
@@ -51,7 +42,6 @@ __all__ = [
     "Roughness",
     "Spectrum",
     "Surface",
-    "UnevenPartition",
     "characteristic_size",
     "facing",
     "find_asperities",

@@ -18,8 +18,8 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.plane_equilibrium import slope_search
 from geometry.rigid_plane import Control
-from geometry.slope_search import slope_search
 from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium

@@ -25,10 +25,9 @@ FLOORS = {
         "checked_store",
     ],
     "geometry": [
-        "blocked_spline legendre_modes slope_search",
-        "interpolant materials",
-        "face_frame filters spectrum surface",
-        "patches statistics summits synthesis zero",
+        "interpolant legendre_modes materials",
+        "face_frame filters surface",
+        "patches spectrum statistics summits zero",
         "plausibility",
         "facing preparation rigid_plane",
         "files",
