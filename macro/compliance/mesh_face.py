@@ -31,8 +31,7 @@ from macro import compat
 from macro.bodies import MeshedBody
 from macro.compliance.face_compliance import FaceCompliance
 from macro.compliance.face_moments import FaceMoments
-from macro.elastic_body import ElasticBody
-from macro.elasticity import stiffness_form
+from macro.elastic_body import ElasticBody, stiffness_form
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.solvers import solve_linear, solved_at_once
 from macro.mesh.block import FLAT

@@ -5,7 +5,6 @@ Theory: section 12 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +14,9 @@ from numpy.typing import NDArray
 
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.stepped import SteppedShape
 from geometry.surface import Surface
 from macro import compat
-from macro.mesh.block import FLAT, BlockMesh, block_mesh, stepped_mesh
-from macro.mesh.tagged import TaggedMesh
+from macro.mesh.block import FLAT, BlockMesh, block_mesh
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -81,32 +78,15 @@ def rough_block_mesh(
     Note:
         Collective.
     """
-    check_cover(shape, surface)
+    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "the rough surface must cover the block's top",
+            value=shape.interface,
+            allowed=f"an interface of {surface.lengths} mm without margin",
+        )
     _check_depth(shape.height, surface)
     flat = block_mesh(shape, comm)
     return flat, move_onto(flat.mesh, surface, shape.height)
-
-
-def rough_stepped_mesh(
-    shape: SteppedShape, planes: Mapping[str, tuple[int, float]], surface: Surface, comm: Any
-) -> tuple[TaggedMesh, MeshQuality]:
-    """Mesh a block on boxes and move its nodes onto the roughness; see `rough_block_mesh`.
-
-    Args:
-        shape: The flat body; the top of its block is the surface's rectangle.
-        planes: Surfaces to mark, see `stepped_mesh`.
-        surface: The rough surface.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: As `rough_block_mesh` and `stepped_mesh` do.
-
-    Note:
-        Collective.
-    """
-    check_cover(shape.block, surface)
-    flat = stepped_mesh(shape, planes, comm)
-    return flat, move_onto(flat.mesh, surface, shape.block.height)
 
 
 def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
@@ -154,24 +134,6 @@ def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
         )
     points[:] = moved
     return quality
-
-
-def check_cover(shape: BlockShape | RefinedShape, surface: Surface) -> None:
-    """Refuse a surface that is not the top of a block.
-
-    Args:
-        shape: The flat block.
-        surface: The rough surface.
-
-    Raises:
-        InputError: When the rectangles differ, or the block has a margin.
-    """
-    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
-        raise InputError(
-            "the rough surface must cover the block's top",
-            value=shape.interface,
-            allowed=f"an interface of {surface.lengths} mm without margin",
-        )
 
 
 def _check_depth(depth: float, surface: Surface) -> None:

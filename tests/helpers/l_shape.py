@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from geometry import Control, RefinedShape, Surface, reference_shapes
 from geometry.meshes.expected_contact import contact_radius
-from geometry.meshes.stepped import SteppedShape
+from helpers.stepped import SteppedShape, rough_stepped_mesh
 from macro import (
     Material,
     MeshedBody,
@@ -23,7 +23,6 @@ from macro import (
     Support,
     UnilateralContactProblem,
     nodal_contact,
-    rough_stepped_mesh,
 )
 from multiscale import Scene, extrapolated
 

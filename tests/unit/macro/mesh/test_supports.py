@@ -67,7 +67,7 @@ def test_rotation_about_a_slanted_line():
 def test_stiffness_agrees():
     """The motions left are as many as the singular directions of the stiffness."""
     from geometry.materials import Material
-    from macro.elasticity import stiffness_form
+    from macro.elastic_body import stiffness_form
 
     box = tagged_box(COMM, cells=(2, 2, 1))
     space = compat.vector_space(box.mesh, 1)
