@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import inspect
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -173,7 +173,6 @@ def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
     return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
 
 
-@_compiling()
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous Lagrange space of displacements, three components per node.
 
@@ -181,26 +180,25 @@ def vector_space(mesh: Any, degree: int) -> Any:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
     """
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+    return scalar_space(mesh, degree, shape=(3,))
 
 
 @_compiling()
 def scalar_space(
     mesh: Any, degree: int, family: str = "Lagrange", *, shape: tuple[int, ...] = ()
 ) -> Any:
-    """Return a space of scalars, or of as many in every node as a tensor has components.
+    """Return a space of scalars, or of as many in every node as a vector or tensor has components.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
-        shape: Shape of the values: that of scalars, or (3, 3).
+        shape: Shape of the values: that of scalars, (3,) or (3, 3).
     """
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))
-    return (fem.TensorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
+    kinds = fem.FunctionSpace, fem.VectorFunctionSpace, fem.TensorFunctionSpace
+    return kinds[len(shape)](mesh, (family, degree))
 
 
 def cell_constant(mesh: Any, values: Any, name: str | None = None) -> Any:
@@ -242,27 +240,19 @@ def lagrange_degree(space: Any) -> int:
     return int(element.degree if isinstance(element.degree, int) else element.degree())
 
 
-_NODES = {
-    ("tetrahedron", 4): 1,
-    ("tetrahedron", 10): 2,
-    ("hexahedron", 8): 1,
-    ("hexahedron", 27): 2,
-}
-
-
-def displacement_degree(space: Any) -> int | None:
-    """Return the degree of a continuous Lagrange space of three components, 1 or 2, else None.
+def holds_displacements(space: Any) -> bool:
+    """Tell whether a space is continuous Lagrange of degree 1 or 2 with three components.
 
     Args:
         space: Function space on any mesh.
     """
     mesh, nodes = space.mesh, space.dofmap
     if nodes.index_map_bs != 3 or space.num_sub_spaces != 3 or mesh.geometry.dim != 3:
-        return None
-    layout = nodes.dof_layout
-    if len(layout.entity_dofs(0, 0)) != 1:  # vertices of other elements have no nodes of their own
-        return None
-    return _NODES.get((mesh.topology.cell_name(), layout.num_dofs))
+        return False
+    layout, counts = nodes.dof_layout, {"tetrahedron": (4, 10), "hexahedron": (8, 27)}
+    # vertices of other elements have no nodes of their own
+    own = len(layout.entity_dofs(0, 0)) == 1
+    return own and layout.num_dofs in counts.get(mesh.topology.cell_name(), ())
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
@@ -358,8 +348,7 @@ def assemble_matrix(form: Any, conditions: Sequence[Any], kind: str = "aij") -> 
         Collective.
     """
     matrix = fem_petsc.create_matrix(form, kind)
-    fem_petsc.assemble_matrix(matrix, form, list(conditions), 1.0)
-    matrix.assemble()
+    assemble_matrix_into(matrix, form, conditions)
     return matrix
 
 
@@ -484,35 +473,33 @@ def collect_garbage(comm: PETSc.Comm) -> None:
             PETSc.garbage_cleanup(of)
 
 
-class VtxFile:
-    """A VTX file of one Lagrange function of any degree at many times; none without ADIOS2.
+@contextmanager
+def vtx_writer(path: str) -> Iterator[Callable[[float, Any], None]]:
+    """Yield a function that writes a Lagrange function of any degree at a time to a VTX file.
+
+    The file is made with the first function; without ADIOS2 there is none.
 
     Args:
         path: Folder to write, ending in ``.bp``.
 
     Note:
-        Collective. It is made with the first function that is written.
+        Collective.
     """
+    made: list[Any] = []
 
-    def __init__(self, path: str) -> None:
-        self._path = path
-        self._file: Any = None
-        self._shown: Any = None
-
-    def __enter__(self) -> VtxFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._file is not None:
-            self._file.close()
-
-    def write(self, time: float, function: Any) -> None:
-        """Write the function at a time."""
+    def write(time: float, function: Any) -> None:
         if not HAS_VTX:
             return
-        if self._file is None:
-            self._shown = function
-            comm = function.function_space.mesh.comm
-            self._file = io.VTXWriter(comm, self._path, [function])
-        self._shown.x.array[:] = function.x.array
-        self._file.write(float(time))
+        if not made:
+            made.extend(
+                (function, io.VTXWriter(function.function_space.mesh.comm, path, [function]))
+            )
+        shown, file = made
+        shown.x.array[:] = function.x.array
+        file.write(float(time))
+
+    try:
+        yield write
+    finally:
+        if made:
+            made[1].close()

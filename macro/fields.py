@@ -64,11 +64,11 @@ def write_fields(
     def functions() -> Iterator[tuple[int, list[Any]]]:
         for number, displacement, pressure in steps:
             moved = body.function(displacement)
-            vtx.write(number, moved)
+            write_vtx(number, moved)
             shown = [] if pressure is None else [_facet_pressures(face, pressure)]
             yield number, [*_of_body(body, moved), *shown]
 
-    with compat.VtxFile(str(Path(path).with_suffix(".bp"))) as vtx:
+    with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())
 
 

@@ -63,7 +63,7 @@ def check_space(space: Any) -> None:
     Raises:
         InputError: On all ranks.
     """
-    fits = compat.displacement_degree(space) is not None
+    fits = compat.holds_displacements(space)
     straight = fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8)
     if not straight:
         raise InputError(
