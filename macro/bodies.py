@@ -58,6 +58,11 @@ class Block(ElasticBody):
         return self.mesh.shape.degree
 
     @property
+    def materials(self) -> Material:
+        """The one material."""
+        return self.material
+
+    @property
     def poisson_ratio(self) -> float:
         """Poisson's ratio."""
         return self.material.poisson_ratio

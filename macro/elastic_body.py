@@ -15,6 +15,7 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.materials import Material
 from macro import compat
 from macro.linear_solvers.multigrid import Lattice
 from macro.linear_solvers.node_matrices import Stiffened
@@ -110,6 +111,7 @@ class ElasticBody:
         mesh: Its dolfinx mesh as ``mesh.mesh``, and ``mesh.facet_tags``.
         normal: Direction out of the contact face, along which `reaction` is taken, shape (3,).
         tractions: Loaded surfaces, beside the contact.
+        materials: Elastic constants of the whole body, or by marker of the volumes.
         degree: Polynomial degree of the displacements.
         poisson_ratio: Largest Poisson's ratio in the body.
         cell_lame: Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,)
@@ -124,6 +126,7 @@ class ElasticBody:
     mesh: Any
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     tractions: Sequence[Traction] = ()
+    materials: Any
     degree: Any
     poisson_ratio: Any
     cell_lame: Any
@@ -159,6 +162,19 @@ class ElasticBody:
     def owned_dofs(self) -> int:
         """Number of degrees of freedom that this rank owns."""
         return 3 * int(self.space.dofmap.index_map.size_local)
+
+    def materials_of(self, cells: NDArray[np.int32]) -> set[Material]:
+        """Return the materials of some cells, those of all ranks together.
+
+        Args:
+            cells: This rank's part of the cells, shape (n,).
+        """
+        if isinstance(self.materials, Material):
+            own = {self.materials} if len(cells) else set()
+        else:
+            tags, by_tag = self.mesh.cell_tags, self.materials.items()
+            own = {material for tag, material in by_tag if np.isin(cells, tags.find(tag)).any()}
+        return set().union(*self.comm.allgather(own))
 
     @property
     def quadrature_degree(self) -> int:

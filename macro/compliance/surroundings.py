@@ -158,25 +158,11 @@ def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> Co
 
 def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> Material:
     """Return the one material of the cells under the rectangle."""
-    cells = np.unique(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
-    own = _pairs(body, cells)
-    pairs = set().union(*body.comm.allgather(own))
-    if len(pairs) != 1:
+    materials = body.materials_of(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
+    if len(materials) != 1:
         raise InputError(
             "the surface's rectangle lies on several materials",
-            value=len(pairs),
+            value=len(materials),
             allowed="one material under the rectangle",
         )
-    first, shear = pairs.pop()
-    return Material(
-        young_modulus=shear * (3.0 * first + 2.0 * shear) / (first + shear),
-        poisson_ratio=0.5 * first / (first + shear),
-    )
-
-
-def _pairs(body: ElasticBody, cells: NDArray[np.int32]) -> set[tuple[float, float]]:
-    """Return the pairs of Lamé's constants of cells."""
-    first, shear = (np.atleast_1d(np.asarray(part, float)) for part in body.cell_lame)
-    if len(first) == 1:
-        return {(float(first[0]), float(shear[0]))}
-    return set(zip(first[cells].tolist(), shear[cells].tolist(), strict=True))
+    return materials.pop()

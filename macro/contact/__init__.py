@@ -10,6 +10,6 @@
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 
-Both problems with laws are solved by `newton`; all three give a `contact_state`. `face_nodes` and
-`facet_area` read results off a rough top.
+Both problems with laws are solved by `newton`; all three give a `contact_state`. `face_nodes` reads
+results off a rough top.
 """

@@ -27,8 +27,14 @@ from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import Guess
-from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
+from macro.contact.rough_face import (
+    ContactSolution,
+    Guess,
+    PlaneOverNodes,
+    RoughFace,
+    largest,
+    not_found,
+)
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
 
 Array = NDArray[np.float64]

@@ -55,7 +55,7 @@ class FaceContactState:
         patch_closure: Their mean closures: the approach of the plane less the displacement of the
             face into the body, and, with laws, less the macroscopic gap, shape (N,) [mm].
         contact_area: Real contact area [mm²]; None where a law does not know it. Of meshed
-            roughness, with its border within facets, see `macro.contact.facet_area.covered`.
+            roughness, with its border within facets, see `macro.contact.face_nodes.covered`.
         displacement: This rank's owned displacements, dof by dof, those by other loads than the
             contact included [mm]; in a user's own problem they are in the user's function.
         reaction: Force that the supports bear [N]; equals ``force`` in equilibrium.

@@ -208,14 +208,7 @@ class _Reader:
 
     def _at_face(self, body: MeshedBody, facets: ContactFacets) -> Material:
         """Return the material of the cells at a face, which must be one."""
-        materials = body.materials
-        if isinstance(materials, Material):
-            return materials
-        tags = body.mesh.cell_tags
-        of_cells = np.zeros(int(tags.indices.max(initial=-1)) + 1, dtype=np.int64)
-        of_cells[tags.indices] = tags.values
-        here = set(map(int, of_cells[facets.cell]))
-        found = {materials[tag] for part in self._comm.allgather(here) for tag in part}
+        found = body.materials_of(facets.cell)
         if len(found) > 1:
             raise InputError(
                 "the contact face has cells of several materials",

@@ -141,7 +141,7 @@ class Reference:
         mesh, _ = rough_stepped_mesh(shape, HELD, self.surface, comm)
         supports = [Support(tag=mesh.facet_names["held"])]
         body = MeshedBody(mesh, Material(**ELASTIC), supports, order=shape.degree)
-        face = RoughFace.of_body(body, mesh.facet_names["rough"], LENGTHS)
+        face = RoughFace(body, mesh.facet_names["rough"], LENGTHS)
         problem = UnilateralContactProblem(face, top)
         states = [problem.solve(Control(approach=approach)) for approach in self.approaches]
         nodes = nodal_contact(problem, states[-1])
