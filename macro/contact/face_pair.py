@@ -9,9 +9,8 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,10 +18,9 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, vstack
 from scipy.spatial import cKDTree
 
-from geometry.patches import PatchGrid
 from macro import compat
 from macro.body_pair import BodyPair
-from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, normal_rows
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
@@ -38,10 +36,6 @@ _UNLIKE = 1e-6
 """Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
 
 
-_SAMPLED = ("weight", "x", "y", "depth", "patch")
-
-
-@dataclass(frozen=True, eq=False)
 class FacePair(ContactFace):
     """Patches on the contact faces of a body and its counter-body.
 
@@ -54,25 +48,12 @@ class FacePair(ContactFace):
         Everything here is collective.
     """
 
-    first: LoadedFace
-    second: LoadedFace
+    def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
+        self.first, self.second = first, second
+        self.body = BodyPair(first.body, second.body)
+        self.comm, self.patches = first.comm, first.patches
 
     @cached_property
-    def body(self) -> BodyPair:
-        """Both bodies."""
-        return BodyPair(self.first.body, self.second.body)
-
-    @property
-    def comm(self) -> Any:
-        """Communicator of both meshes."""
-        return self.first.comm
-
-    @property
-    def patches(self) -> PatchGrid | Outline:  # type: ignore[override]
-        """Patches on both faces."""
-        return self.first.patches
-
-    @property
     def areas(self) -> Array:
         """Areas of the patches on the first face, shape (N,) [mm²]."""
         return self.first.areas
@@ -80,13 +61,13 @@ class FacePair(ContactFace):
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        one, other = self.first.patchwise, self.second.patchwise
         if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.areas):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),
                 allowed="patches that lie on both faces, or laws at points",
             )
+        one, other = self.first.patchwise, self.second.patchwise
         return self._both(one, _local_rows(one.operator), _local_rows(other.operator), other.depth)
 
     @cached_property
@@ -101,7 +82,8 @@ class FacePair(ContactFace):
             matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
             matrix.transpose(transposed)
             both.append(_local_rows(transposed))
-        samples = {name: getattr(one, name)[kept] for name in _SAMPLED}
+        names = ("weight", "x", "y", "depth", "patch")
+        samples = {name: getattr(one, name)[kept] for name in names}
         return self._both(replace(one, **samples), both[0], both[1], depth[kept])
 
     @property
@@ -167,44 +149,26 @@ def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Ar
     facet, local = np.full(len(points), -1), np.zeros_like(points)
     if not count or not len(points):
         return facet, local
+
+    def look(wanted: NDArray[np.intp], candidates: NDArray[np.intp]) -> None:
+        """Note which points, by their indices, lie on the facet that is tried for each."""
+        at = facets.local(candidates, points[wanted])
+        beyond = at.sum(axis=1) if corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
+        inside = (at.min(axis=1, initial=0.0) >= -_SLACK) & (beyond <= 1.0 + _SLACK)
+        facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
+
     middles = corners.mean(axis=1)
     tree = cKDTree(middles)
     reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max())
     nearest = min(_NEAREST, count)
-    neighbours = tree.query(points, k=nearest)[1].reshape(len(points), nearest)
-    for candidates in neighbours.T:
+    for candidates in tree.query(points, k=nearest)[1].reshape(len(points), nearest).T:
         left = np.flatnonzero(facet < 0)
-        _try(facets, points, left, candidates[left], facet, local)
+        look(left, candidates[left])
     for point in np.flatnonzero(facet < 0):  # near large facets, or beside the face
-        around = np.array(tree.query_ball_point(points[point], reach), dtype=np.intp)
-        for candidate in around[:, None]:
+        for candidate in tree.query_ball_point(points[point], reach):
             if facet[point] < 0:
-                _try(facets, points, np.array([point]), candidate, facet, local)
+                look(np.array([point]), np.array([candidate]))
     return facet, local
-
-
-def _try(
-    facets: ContactFacets,
-    points: Array,
-    wanted: NDArray[np.intp],
-    candidates: NDArray[np.intp],
-    facet: NDArray[np.intp],
-    local: Array,
-) -> None:
-    """Write the facets and coordinates of those points that lie on the facets tried for them.
-
-    Args:
-        facets: Facets in the plane.
-        points: All points, shape (n, 2) [mm].
-        wanted: Indices of the points that are looked for, shape (m,).
-        candidates: The facet that is tried for each of them, shape (m,).
-        facet: The facet of every point, shape (n,).
-        local: Its coordinates there, shape (n, 2).
-    """
-    at = facets.local(candidates, points[wanted])
-    beyond = at.sum(axis=1) if facets.corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
-    inside = (at.min(axis=1, initial=0.0) >= -_SLACK) & (beyond <= 1.0 + _SLACK)
-    facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
 
 
 def _local_rows(matrix: PETSc.Mat) -> csr_matrix:

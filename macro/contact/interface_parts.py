@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, get_args
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -42,16 +42,6 @@ class ChosenFace:
     marked: Any
     lower: Array
     lengths: tuple[float, float]
-
-    def moved(self, x: float, y: float) -> ChosenFace:
-        """Return the same face with its coordinates counted from a point of them [mm]."""
-        shift = np.array([x, y])
-        facets = replace(
-            self.facets,
-            frame=self.facets.frame.moved(x, y),
-            corners=self.facets.corners - shift,
-        )
-        return replace(self, facets=facets, lower=self.lower - shift)
 
 
 def check_space(space: Any) -> None:
@@ -189,10 +179,8 @@ def laws_on_face(
         lengths: Sides of that rectangle [mm].
 
     Raises:
-        InputError: When these are no laws, or not as many as patches, or there is no such mode.
+        InputError: When these are no laws, or not as many as patches.
     """
-    if mode is not None and mode not in get_args(Mode):
-        raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
     if not isinstance(patches, PatchGrid | None):
         raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
     shift = np.zeros(2)

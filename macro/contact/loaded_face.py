@@ -5,7 +5,6 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,12 +54,16 @@ class Outline:
     lengths: tuple[float, float]
 
 
-class ContactFace(ABC):
+class ContactFace:
     """The contact face of a body, or of two bodies that are pressed together.
 
     Attributes:
         body: The body, or both.
         patches: Patches on the face, in its frame; or the outline of a face in regions.
+        comm: MPI communicator.
+        areas: Areas of the patches, shape (N,) [mm²].
+        patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
+        pointwise: Laws at quadrature points.
 
     Note:
         Everything is collective.
@@ -68,34 +71,23 @@ class ContactFace(ABC):
 
     body: Any
     patches: PatchGrid | Outline
+    comm: Any
+    areas: Any
+    patchwise: Any
+    pointwise: Any
 
-    @property
-    @abstractmethod
-    def comm(self) -> Any:
-        """MPI communicator."""
-
-    @property
-    @abstractmethod
-    def areas(self) -> Array:
-        """Areas of the patches, shape (N,) [mm²]."""
-
-    @property
-    @abstractmethod
-    def patchwise(self) -> Sampling:
-        """Laws at the mean closures of the patches, which are distributed over the ranks."""
-
-    @property
-    @abstractmethod
-    def pointwise(self) -> Sampling:
-        """Laws at quadrature points."""
-
-    @abstractmethod
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of pressures that are uniform on every patch.
 
         Args:
             pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
         """
+        sampling = self.patchwise
+        values = sampling.operator.createVecRight()
+        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
+        load = sampling.operator.createVecLeft()
+        sampling.operator.mult(values, load)
+        return load
 
     def sampling(self, mode: Mode) -> Sampling:
         """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
@@ -248,19 +240,6 @@ class LoadedFace(ContactFace):
             patch=own,
             count=self.patches.count,
         )
-
-    def load(self, pressures: Array) -> PETSc.Vec:
-        """Return the nodal load of pressures that are uniform on every patch.
-
-        Args:
-            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
-        """
-        sampling = self.patchwise
-        values = sampling.operator.createVecRight()
-        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
-        load = sampling.operator.createVecLeft()
-        sampling.operator.mult(values, load)
-        return load
 
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:

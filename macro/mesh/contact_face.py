@@ -87,6 +87,10 @@ class ContactFacets:
             self, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
         )
 
+    def moved(self, x: float, y: float) -> ContactFacets:
+        """Return the facets with coordinates that count from a point of the plane [mm]."""
+        return replace(self, frame=self.frame.moved(x, y), corners=self.corners - (x, y))
+
     def local(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
