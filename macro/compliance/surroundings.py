@@ -19,16 +19,13 @@ from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import OuterFacets, outer_facets
+from macro.mesh.tagged import FLAT_IN_FILES
 from support.errors import InputError
 
 Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
 
-_FLAT = 1e-6
-"""Distance from a plane, relative to the rectangle, and angle to it, that are rounding."""
-_COVERED = 1e-6
-"""Part of an area that is rounding."""
 _STRIP = 0.25
 """Height of the strip of a free side that must be whole, relative to the rectangle's shorter side
 or the thickness: the distance that sides count up to as quarter-spaces."""
@@ -72,14 +69,14 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     """
     comm, area = body.comm, float(np.prod(rectangle.lengths))
     covered = _area_in(body, facets, rectangle)
-    if covered < (1.0 - _COVERED) * area:
+    if covered < (1.0 - FLAT_IN_FILES) * area:
         raise InputError(
             "the surface's rectangle reaches beyond the contact face",
             value=f"{covered:.6g} of {area:.6g} mm² on the face",
             allowed="a rectangle on the face",
         )
     outer = outer_facets(body.space, 2)
-    frame, slack = facets.frame, _FLAT * min(rectangle.lengths)
+    frame, slack = facets.frame, FLAT_IN_FILES * min(rectangle.lengths)
     height = frame.height(outer.points.reshape(-1, 3)).reshape(outer.weights.shape)
     above = comm.allreduce(float(height.max(initial=0.0)), op=MPI.MAX)
     thickness = _thickness(comm, outer, facets, rectangle, height)
@@ -139,12 +136,12 @@ def _free_plane(
     plane = FaceFrame(origin=frame.in_space(corner), axes=axes)
     level = np.abs(plane.height(free.points.reshape(-1, 3))).reshape(free.weights.shape)
     flat = (level.max(axis=1, initial=0.0) < slack) & np.all(
-        free.normals @ outward > 1.0 - _FLAT, axis=1
+        free.normals @ outward > 1.0 - FLAT_IN_FILES, axis=1
     )
     chosen = contact_sides(body, free.among(flat), plane)
     length = rectangle.lengths[1 - axis]
     area = _area_in(body, chosen, PatchGrid(grid=(1, 1), lengths=(length, strip)))
-    return area > (1.0 - _COVERED) * length * strip
+    return area > (1.0 - FLAT_IN_FILES) * length * strip
 
 
 def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> ContactFacets:

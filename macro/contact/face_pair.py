@@ -24,6 +24,7 @@ from macro.contact.loaded_face import ContactFace, LoadedFace, normal_rows
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import distributed
 from macro.mesh.contact_face import ContactFacets
+from macro.mesh.tagged import FLAT_IN_FILES
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -32,8 +33,6 @@ _NEAREST = 12
 """Facets of the nearest middles that a point is looked for in first."""
 _SLACK = 1e-8
 """Distance beyond a facet, in its own coordinates, at which a point still counts as on it."""
-_UNLIKE = 1e-6
-"""Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
 
 
 class FacePair(ContactFace):
@@ -61,7 +60,7 @@ class FacePair(ContactFace):
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.areas):
+        if np.any(np.abs(self.first.areas - self.second.areas) > FLAT_IN_FILES * self.areas):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),

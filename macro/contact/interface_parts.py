@@ -17,14 +17,11 @@ from macro.contact.contact_forces import ContactLaw
 from macro.contact.loaded_face import Mode
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import facet_indices
-from macro.mesh.tagged import TaggedMesh, bounding_box, planar_face
+from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
 from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
-
-_PARALLEL = 1e-6
-"""Largest deviation of a given frame's normal from that of the face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -103,7 +100,7 @@ def chosen_face(
     if frame is None:
         placed = contact_facets(mesh, facets, plane.frame)
         return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
-    if np.abs(frame.normal - plane.frame.normal).max() > _PARALLEL:
+    if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
         raise InputError(
             "the frame's normal is not that of the face",
             value=frame.normal.tolist(),

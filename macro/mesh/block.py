@@ -20,6 +20,7 @@ from geometry.meshes.lattice import (
 )
 from geometry.meshes.refined_block import RefinedShape
 from macro import compat
+from macro.mesh.tagged import TaggedMesh
 from support.collective import on_root
 
 BOTTOM, TOP, SIDES = 1, 2, 3
@@ -30,26 +31,17 @@ FLAT = 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BlockMesh:
-    """A block's mesh, distributed over the ranks of a communicator.
+class BlockMesh(TaggedMesh):
+    """A block's mesh, its facets marked BOTTOM, TOP or SIDES.
 
     Args:
-        mesh: The dolfinx mesh; lengths in mm.
-        facet_tags: Its outer facets that this rank owns, marked BOTTOM, TOP or SIDES.
         shape: The shape that was meshed.
         planes: Indices of the grid planes across x, y and z that every row of ``mesh.geometry.x``
             lies on in the flat block, shape (n, 3); None for meshes without grid planes.
     """
 
-    mesh: Any
-    facet_tags: Any
     shape: BlockShape | RefinedShape
     planes: NDArray[np.intp] | None = None
-
-    @property
-    def comm(self) -> Any:
-        """Communicator of the mesh."""
-        return self.mesh.comm
 
 
 def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -211,15 +211,8 @@ class OuterFacets:
 
     def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
         """Return some of the facets, shape of the choice (f,)."""
-        return OuterFacets(
-            cell=self.cell[chosen],
-            side=self.side[chosen],
-            points=self.points[chosen],
-            normals=self.normals[chosen],
-            weights=self.weights[chosen],
-            nodes=self.nodes[chosen],
-            values=self.values,
-        )
+        names = ("cell", "side", "points", "normals", "weights", "nodes")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def outer_facets(space: Any, exact: int) -> OuterFacets:

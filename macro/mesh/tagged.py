@@ -126,11 +126,9 @@ def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None
     )
 
 
-_FLAT = 1e-6
-"""Distance from the plane, relative to the face, that is rounding of coordinates in files."""
-
-_CLOSED = 0.5
-"""Least length of the sum of a face's areas as vectors, relative to its area."""
+FLAT_IN_FILES = 1e-6
+"""Part of the size of a face that is rounding in files: distance from its plane, and areas; also
+the components of normals."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,17 +139,13 @@ class PlanarFace:
         frame: The coordinates; the plane goes through the highest node.
         lengths: Sides of the bounding rectangle along e1 and e2 [mm].
         area: Area of the facets of all ranks [mm²].
-        facets: Number of the facets of all ranks.
         deviation: Half the difference of height between the highest and the lowest node [mm].
-        steepest: Largest slope of a facet against the plane.
     """
 
     frame: FaceFrame
     lengths: tuple[float, float]
     area: float
-    facets: int
     deviation: float
-    steepest: float
 
 
 def planar_face(
@@ -180,51 +174,39 @@ def planar_face(
     Note:
         Collective. The results do not depend on the ranks but for rounding.
     """
-    told = _Words(name=str(tag) if name is None else name, key=key)
-    comm = tagged.comm
+    named, comm = repr(str(tag) if name is None else name), tagged.comm
+
+    def refused(problem: str, allowed: str | None = None) -> InputError:
+        return InputError(f"the surface {named} {problem}", key=key, allowed=allowed)
+
     corners, outward, inner = _facets(tagged, tag)
     count, inside = comm.allreduce(len(corners) + inner), comm.allreduce(inner)
     if not count:
-        raise told.error("has no facets that belong to cells")
+        raise refused("has no facets that belong to cells")
     if inside:
-        raise told.error(f"has {inside} of {count} facets inside the body, between two cells")
+        raise refused(f"has {inside} of {count} facets inside the body, between two cells")
     areas = np.linalg.norm(outward, axis=1)
     area, total = comm.allreduce(float(areas.sum())), comm.allreduce(outward.sum(axis=0))
-    if np.linalg.norm(total) < _CLOSED * area:
-        raise told.error("is not planar: its facets face different ways and close around a body")
+    if np.linalg.norm(total) < 0.5 * area:
+        raise refused("is not planar: its facets face different ways and close around a body")
     frame = FaceFrame.across(total)
-    local = corners.reshape(-1, 3) @ frame.axes.T
-    lower, upper = bounding_box(local, comm)
+    lower, upper = bounding_box(corners.reshape(-1, 3) @ frame.axes.T, comm)
     upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
     flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
     lengths, off = upper[:2] - lower[:2], 0.5 * float(upper[2] - lower[2])
-    if off > max(deviation, _FLAT * float(lengths.max())) or flattest <= 0.0:
+    if off > max(deviation, FLAT_IN_FILES * float(lengths.max())) or flattest <= 0.0:
         angle = np.degrees(np.arccos(np.clip(flattest, -1.0, 1.0)))
-        limit = f"at most {deviation:.4g} mm" if deviation else "a planar face"
-        raise told.error(
+        raise refused(
             f"is not planar: its nodes are up to {off:.4g} mm off the plane through it, and its "
             f"facets up to {angle:.2g}° from it",
-            allowed=limit,
+            f"at most {deviation:.4g} mm" if deviation else "a planar face",
         )
     return PlanarFace(
         frame=FaceFrame.through(np.stack([lower, upper]) @ frame.axes, total),
         lengths=(float(lengths[0]), float(lengths[1])),
         area=area,
-        facets=count,
         deviation=off,
-        steepest=float(np.sqrt(1.0 - min(flattest, 1.0) ** 2) / flattest),
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Words:
-    """How errors name the face."""
-
-    name: str
-    key: str | None
-
-    def error(self, problem: str, allowed: str | None = None) -> InputError:
-        return InputError(f"the surface {self.name!r} {problem}", key=self.key, allowed=allowed)
 
 
 def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:

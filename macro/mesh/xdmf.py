@@ -64,12 +64,11 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
         raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
     if facets is None:
         facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
-    cells = cells and _filled(mesh, cells)
     names = layout.names
     return TaggedMesh(
         mesh=mesh,
-        facet_tags=_of_owned_cells(mesh, facets),
-        cell_tags=cells,
+        facet_tags=facets,
+        cell_tags=cells and _filled(mesh, cells),
         facet_names=names.get("facets") or _numbers(facets, comm),
         cell_names=names.get("cells") or ({} if cells is None else _numbers(cells, comm)),
     )
@@ -213,19 +212,3 @@ def _filled(mesh: Any, tags: Any) -> Any:
     values = np.full(cells.size_local + cells.num_ghosts, NO_GROUP, np.int32)
     values[tags.indices] = tags.values
     return dmesh.meshtags(mesh, 3, np.arange(len(values), dtype=np.int32), values)
-
-
-def _of_owned_cells(mesh: Any, tags: Any) -> Any:
-    """Return tags of facets without those facets that belong to ghost cells alone.
-
-    Args:
-        mesh: dolfinx mesh.
-        tags: Tags of its facets.
-    """
-    mesh.topology.create_connectivity(2, 3)
-    cells = mesh.topology.connectivity(2, 3)
-    owned = mesh.topology.index_map(3).size_local
-    indices = np.asarray(tags.indices)
-    ends = cells.offsets[indices], cells.offsets[indices + 1] - 1  # a facet has one cell or two
-    kept = np.minimum(*(cells.array[end] for end in ends)) < owned
-    return dmesh.meshtags(mesh, 2, indices[kept], np.asarray(tags.values)[kept])

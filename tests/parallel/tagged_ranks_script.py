@@ -42,7 +42,7 @@ def measures(tagged):
     for name, tag in tagged.facet_names.items():
         face = planar_face(tagged, tag)
         frame = [*face.frame.origin, *face.frame.axes.ravel()]
-        faces[name] = [*frame, *face.lengths, face.area, face.deviation, face.facets]
+        faces[name] = [*frame, *face.lengths, face.area, face.deviation]
     support = SimpleNamespace(
         tag=next(iter(tagged.facet_names.values())), displacement=(0, None, 0)
     )
