@@ -44,9 +44,6 @@ _END = 0.75
 _AT_TOP, _BETWEEN, _AT_BOTTOM = 9, 6, 4
 """Degrees along z."""
 
-_COARSER = 2
-"""Degrees less, across and along z, in the elements that estimate the error of the usual ones."""
-
 
 class Line(NamedTuple):
     """Shape functions along one axis, at the points of Gauss' rule on every element.
@@ -132,25 +129,21 @@ def _shape_functions(t: Array, degree: int) -> tuple[Array, Array]:
     return np.concatenate([ends, rest]), np.concatenate([[-even, even], slopes])
 
 
-def block_lines(
-    lengths: tuple[float, float], height: float, count: int, *, coarse: bool = False
-) -> tuple[Line, Line, Line]:
+def block_lines(lengths: tuple[float, float], height: float, count: int) -> tuple[Line, Line, Line]:
     """Return functions for modes of pressure: one element across the top, more along z.
 
     Args:
         lengths: Sides of the top [mm].
         height: Height of the block [mm].
         count: Modes along a side of the top.
-        coarse: Whether to take lower degrees, to estimate the error of the usual ones.
 
     Returns:
         Functions along x, y and z.
     """
-    less = _COARSER if coarse else 0
-    x, y = (across(length, count + _MORE - less, count) for length in lengths)
+    x, y = (across(length, count + _MORE, count) for length in lengths)
     ticks = levels(lengths, height, count)
     degrees = [_AT_BOTTOM, *(_BETWEEN,) * (len(ticks) - 3), _AT_TOP][-(len(ticks) - 1) :]
-    return x, y, upwards(ticks, [degree - less for degree in degrees])
+    return x, y, upwards(ticks, degrees)
 
 
 def levels(lengths: tuple[float, float], height: float, count: int) -> Array:

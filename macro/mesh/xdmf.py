@@ -64,11 +64,12 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
         raise InputError(f"dolfinx cannot read it: {line}", allowed=_ALLOWED) from error
     if facets is None:
         facets = dmesh.meshtags(mesh, 2, np.empty(0, np.int32), np.empty(0, np.int32))
+    cells = cells and _filled(mesh, cells)
     names = layout.names
     return TaggedMesh(
         mesh=mesh,
         facet_tags=facets,
-        cell_tags=cells and _filled(mesh, cells),
+        cell_tags=cells,
         facet_names=names.get("facets") or _numbers(facets, comm),
         cell_names=names.get("cells") or ({} if cells is None else _numbers(cells, comm)),
     )
