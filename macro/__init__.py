@@ -28,10 +28,9 @@ from macro.contact.unilateral_problem import (
 )
 from macro.elastic_body import ElasticBody
 from macro.fields import AtPoints, write_fields, write_rough_fields
-from macro.mesh.block import BOTTOM, SIDES, TOP, block_mesh
+from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.rough_surface import MeshQuality, rough_block_mesh
 from macro.mesh.supports import Support, Traction, check_supports
 from macro.mesh.tagged import TaggedMesh, planar_face
 from macro.mesh.xdmf import write_mesh

@@ -99,71 +99,45 @@ def mesh_from_gmsh(model: Any, comm: Any) -> Any:
 def mesh_from_cells(
     cells: NDArray[np.int64],
     points: NDArray[np.float64],
-    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]],
+    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]] | None,
     comm: Any,
 ) -> Any:
-    """Make a mesh of straight cells without ghosts; every cell stays on its rank.
+    """Make a mesh of straight cells.
 
     Args:
-        cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
-            shape (cells, 8 or 4); there may be none.
+        cells: Numbers of the nodes of this rank's share of the hexahedra or tetrahedra in the order
+            of dolfinx, shape (cells, 8 or 4); there may be none.
         points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
-        neighbours: Indices of this rank's cells next to those of other ranks, and these ranks; at
-            least one pair for every common facet and none twice.
+        neighbours: None to let dolfinx distribute the cells, with ghosts in 0.5 and none later. For
+            cells that stay on their rank, without ghosts: indices of this rank's cells next to
+            those of other ranks, and these ranks; at least one pair for every common facet and none
+            twice.
         comm: MPI communicator.
 
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-    owners = np.full(len(cells), comm.rank)
-    if not _makes_ghosts():
-        stay = _adjacency(np.arange(len(cells)), owners)
-        domain = _straight_domain(cells)
-        return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
-    # dolfinx 0.5 finds common vertices through ghosts, which it drops afterwards
-    rows = np.concatenate([np.arange(len(cells)), neighbours[0]])
-    stay = _adjacency(rows, np.concatenate([owners, neighbours[1]]))
-    domain = _straight_domain(cells)
-    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+    kind = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
+    older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5
+    options: dict[str, Any] = {"domain" if older else "e": _straight_domain(kind, older)}
+    if neighbours is not None:
+        rows, ranks = np.arange(len(cells)), np.full(len(cells), comm.rank)
+        if older:  # it finds common vertices through ghosts, which it drops afterwards
+            rows, ranks = map(np.concatenate, zip((rows, ranks), neighbours, strict=True))
+            options["ghost_mode"] = dmesh.GhostMode.none
+        stay = _adjacency(rows, ranks)
+        options["partitioner"] = lambda *_: stay
+    return dmesh.create_mesh(comm, cells=cells, x=points, **options)
 
 
-@quiet_compiler()
-def partitioned_mesh(cells: NDArray[np.int64], points: NDArray[np.float64], comm: Any) -> Any:
-    """Make a mesh of straight cells, which dolfinx distributes over the ranks.
-
-    Args:
-        cells: Numbers of the nodes of this rank's share of the cells in the order of dolfinx, shape
-            (cells, 8 or 4); there may be none.
-        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
-        comm: MPI communicator.
-
-    Note:
-        Collective. There are ghost cells in dolfinx 0.5, and none later. The coordinate element is
-        that of `mesh_from_gmsh`.
-    """
-    domain = _straight_domain(cells)
-    if _makes_ghosts():
-        return dmesh.create_mesh(comm, cells, points, domain)
-    return dmesh.create_mesh(comm, cells=cells, x=points, e=domain)
-
-
-def _makes_ghosts() -> bool:
-    """Tell whether meshes from cells take a mode of ghosts, as in dolfinx 0.5."""
-    return "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters
-
-
-def _straight_domain(cells: NDArray[np.int64]) -> Any:
+def _straight_domain(kind: str, older: bool) -> Any:
     """Return the coordinate element of straight hexahedra or tetrahedra, as UFL's mesh."""
-    cell = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
-    if not _makes_ghosts():
-        variant = basix.LagrangeVariant.equispaced
-        return ufl.Mesh(
-            basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
-        )
-    straight = ufl.FiniteElement(
-        "Lagrange", ufl.Cell(cell, geometric_dimension=3), 1, variant="equispaced"
-    )
-    return ufl.Mesh(ufl.VectorElement(straight))
+    if older:
+        cell = ufl.Cell(kind, geometric_dimension=3)
+        straight = ufl.FiniteElement("Lagrange", cell, 1, variant="equispaced")
+        return ufl.Mesh(ufl.VectorElement(straight))
+    variant = basix.LagrangeVariant.equispaced
+    return ufl.Mesh(basix.ufl.element("Lagrange", kind, 1, variant, shape=(3,), dtype=np.float64))
 
 
 def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:

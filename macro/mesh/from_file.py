@@ -81,7 +81,7 @@ def _from_gmsh(path: Path, comm: Any) -> TaggedMesh:
     cells, points = np.empty((0, corners), np.int64), np.empty((0, 3))
     if whole:
         cells, points = whole[0].cells, whole[0].points
-    mesh = compat.partitioned_mesh(cells, points, comm)
+    mesh = compat.mesh_from_cells(cells, points, None, comm)
     return TaggedMesh(
         mesh=mesh,
         facet_tags=facet_tags(mesh, facets, tags_of_facets, facet_names),

@@ -10,7 +10,7 @@ from geometry import RefinedShape
 from geometry.meshes.gmsh_session import gmsh_session
 from geometry.meshes.refined_block import generate, size_near
 from macro import TaggedMesh, compat
-from macro.mesh.rough_surface import move_onto
+from macro.mesh.block import move_onto
 from support.collective import on_root
 
 ROUGH = "rough"

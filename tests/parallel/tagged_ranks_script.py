@@ -55,7 +55,6 @@ def measures(tagged):
         "faces": faces,
         "motions": free_motions(tagged, [support]),
         "parts": parts(mesh),
-        "facets_of_ranks": COMM.allgather(len(tagged.facet_tags.indices)),
         "first_face_of_ranks": COMM.allgather(len(tagged.facet_tags.find(support.tag))),
     }
 
@@ -96,7 +95,7 @@ def pushed():
     cells[::3] = cells[::3, ::-1]
     points = alone.geometry.x + 0.02 * np.sin(np.outer(np.arange(63), [1.0, 2.0, 3.0]))
     share = slice(None) if COMM.rank == 0 else slice(0)
-    mesh = compat.partitioned_mesh(cells[share], points[share], COMM)
+    mesh = compat.mesh_from_cells(cells[share], points[share], None, COMM)
     none = np.empty(0, np.int32)
     crooked = TaggedMesh(mesh=mesh, facet_tags=dmesh.meshtags(mesh, 2, none, none))
     check_cells(crooked)

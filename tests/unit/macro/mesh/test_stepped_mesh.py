@@ -6,7 +6,7 @@ from helpers.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from mpi4py import MPI
 
 from geometry import InputError, RefinedShape, Spectrum, Surface, synthesise
-from macro.mesh.rough_surface import move_onto
+from macro.mesh.block import move_onto
 
 COMM = MPI.COMM_SELF
 SHAPE = SteppedShape(
