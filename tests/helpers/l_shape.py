@@ -14,7 +14,7 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from geometry import Control, RefinedShape, Surface, reference_shapes
-from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import contact_radius
 from helpers.stepped import SteppedShape, rough_stepped_mesh
 from macro import (
     Material,
