@@ -73,6 +73,10 @@ class TaggedMesh:
         """
         return bounding_box(self.mesh.geometry.x, self.comm)
 
+    def facet_name(self, tag: int) -> str:
+        """Return the name of a tag of facets; its number where it has none."""
+        return {number: name for name, number in self.facet_names.items()}.get(tag, str(tag))
+
     def facet_tag(self, wanted: str | int, *, key: str | None = None) -> int:
         """Return the tag of facets by its name or number.
 
@@ -161,7 +165,7 @@ def planar_face(
     Args:
         tagged: The mesh.
         tag: Tag of the facets.
-        name: Name of the face, for errors; its tag by default.
+        name: Name of the face, for errors; that of its tag by default.
         deviation: Largest distance of a node from the plane half-way between the highest and the
             lowest that is allowed [mm]: half the height of a crown. Rounding of the coordinates
             always is.
@@ -174,7 +178,7 @@ def planar_face(
     Note:
         Collective. The results do not depend on the ranks but for rounding.
     """
-    named, comm = repr(str(tag) if name is None else name), tagged.comm
+    named, comm = repr(name or tagged.facet_name(tag)), tagged.comm
 
     def refused(problem: str, allowed: str | None = None) -> InputError:
         return InputError(f"the surface {named} {problem}", key=key, allowed=allowed)

@@ -168,14 +168,10 @@ class _Reader:
         """Return the plane of the contact face with all its regions."""
         from macro.mesh.tagged import PlanarFace, planar_face
 
-        names = {tag: name for name, tag in mesh.facet_names.items()}
         curved = self._scene.law.representative
         allowed = _MOST_CURVED * self._shortest(mesh) if curved else 0.0
         faces = [
-            planar_face(
-                mesh, tag, name=names.get(tag), deviation=allowed, key=f"{self._key}.contact"
-            )
-            for tag in tags
+            planar_face(mesh, tag, deviation=allowed, key=f"{self._key}.contact") for tag in tags
         ]
         first, corners = faces[0], []
         for face, tag in zip(faces, tags, strict=True):
@@ -183,7 +179,7 @@ class _Reader:
             apart = abs(height) > max(allowed, _SAME_PLANE * max(first.lengths))
             if apart or face.frame.normal @ first.frame.normal < 1.0 - _SAME_PLANE:
                 raise InputError(
-                    f"the surface {names.get(tag, str(tag))!r} does not lie in the plane of the "
+                    f"the surface {mesh.facet_name(tag)!r} does not lie in the plane of the "
                     f"contact face: it is {height:.4g} mm above it",
                     key="law.regions",
                 )
