@@ -23,6 +23,7 @@ from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.supports import Traction
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -113,9 +114,6 @@ class ElasticBody:
         tractions: Loaded surfaces, beside the contact.
         materials: Elastic constants of the whole body, or by marker of the volumes.
         degree: Polynomial degree of the displacements.
-        poisson_ratio: Largest Poisson's ratio in the body.
-        cell_lame: Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,)
-            [MPa].
         held: What the supports prescribe.
         linear: The same body with linear displacements; for quadratic ones, made on first use.
 
@@ -128,8 +126,6 @@ class ElasticBody:
     tractions: Sequence[Traction] = ()
     materials: Any
     degree: Any
-    poisson_ratio: Any
-    cell_lame: Any
     held: Any
     linear: Any
 
@@ -163,6 +159,33 @@ class ElasticBody:
         """Number of degrees of freedom that this rank owns."""
         return 3 * int(self.space.dofmap.index_map.size_local)
 
+    @property
+    def poisson_ratio(self) -> float:
+        """Largest Poisson's ratio in the body."""
+        if isinstance(self.materials, Material):
+            return self.materials.poisson_ratio
+        return max(material.poisson_ratio for material in self.materials.values())
+
+    @cached_property
+    def cell_lame(self) -> tuple[Any, Any]:
+        """Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,) [MPa]."""
+        if isinstance(self.materials, Material):
+            return self.materials.lame
+        cells = self.mesh.mesh.topology.index_map(3)
+        constants = np.zeros((2, cells.size_local + cells.num_ghosts))
+        tags = self.mesh.cell_tags
+        for tag, material in self.materials.items() if tags is not None else ():
+            constants[:, tags.find(tag)] = np.array(material.lame)[:, None]
+        bare = int(np.sum(constants[1] == 0.0))
+        if bare:
+            raise InputError(
+                f"{bare} cells of the body have no material",
+                key="materials",
+                value=sorted(self.materials),
+                allowed="the markers of all volumes",
+            )
+        return constants[0], constants[1]
+
     def materials_of(self, cells: NDArray[np.int32]) -> set[Material]:
         """Return the materials of some cells, those of all ranks together.
 
@@ -170,7 +193,7 @@ class ElasticBody:
             cells: This rank's part of the cells, shape (n,).
         """
         if isinstance(self.materials, Material):
-            own = {self.materials} if len(cells) else set()
+            own = {self.materials} if len(cells) else set[Material]()
         else:
             tags, by_tag = self.mesh.cell_tags, self.materials.items()
             own = {material for tag, material in by_tag if np.isin(cells, tags.find(tag)).any()}

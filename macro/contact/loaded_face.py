@@ -193,16 +193,20 @@ class LoadedFace(ContactFace):
         Raises:
             InputError: When a patch has no part of the face.
         """
-        points = self.quadrature
-        local = np.bincount(points.patch, weights=points.weight, minlength=self.patches.count)
-        areas = self.comm.allreduce(local, op=MPI.SUM)
+        (areas,) = self._integrals(1.0)
         if not np.all(areas > 0.0):
             raise InputError(
                 "patches that have no part of the contact face",
                 value=int(np.sum(areas == 0.0)),
                 allowed="patches that each cover a part of it",
             )
-        return np.asarray(areas)
+        return areas
+
+    def _integrals(self, *fields: Array | float) -> Array:
+        """Return the integrals of fields at this rank's points over the patches, (fields, N)."""
+        points, count = self.quadrature, self.patches.count
+        local = [np.bincount(points.patch, points.weight * field, count) for field in fields]
+        return np.asarray(self.comm.allreduce(np.array(local), op=MPI.SUM))
 
     @cached_property
     def pointwise(self) -> Sampling:
@@ -261,11 +265,7 @@ class LoadedFace(ContactFace):
     def _means(self) -> tuple[Array, Array, Array]:
         """Mean place of the patches on the face, and its depth there, shape (N,) each [mm]."""
         points, patches = self.quadrature, self.patches
-        moments = [
-            np.bincount(points.patch, points.weight * values, minlength=patches.count)
-            for values in (points.x, points.y, points.depth)
-        ]
-        means = self.comm.allreduce(np.array(moments), op=MPI.SUM) / self.areas
+        means = self._integrals(points.x, points.y, points.depth) / self.areas
         if isinstance(patches, Outline):
             return means[0], means[1], means[2]
         whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
