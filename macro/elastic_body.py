@@ -23,9 +23,8 @@ from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.supports import Traction
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def strain(displacement: Any) -> Any:

@@ -20,9 +20,8 @@ from macro.contact.face_contact_state import FaceContactState
 from macro.contact.loaded_face import LoadedFace
 from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
+from support.arrays import Array
 from support.collective import on_root
-
-Array = NDArray[np.float64]
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""

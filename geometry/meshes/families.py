@@ -20,16 +20,15 @@ from dataclasses import replace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 

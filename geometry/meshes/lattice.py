@@ -14,7 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from support.arrays import Array
+
 Numbers = NDArray[np.int64]
 Counts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]

@@ -7,9 +7,9 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 
 _EXACT = 2.0**53

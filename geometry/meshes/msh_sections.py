@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.meshes.msh_numbers import ByteNumbers, Numbers, TextNumbers, whole
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 
 ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"

@@ -15,11 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from geometry.legendre_modes import mode_values
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _MORE = 6
 """Degree across the top beyond the number of modes. With 4, 6 and 8 the compliance of a free cube

@@ -26,10 +26,10 @@ from macro.bodies import Sides
 from macro.compliance.cache import cached
 from macro.compliance.elements import Line, block_lines
 from macro.linear_solvers.solvers import solved_at_once
+from support.arrays import Array
 from support.collective import shared
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Parity = tuple[int, int]
 """Parity of a pressure along x and along y: 0 even, 1 odd."""
 

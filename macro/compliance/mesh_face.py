@@ -37,9 +37,8 @@ from macro.linear_solvers.solvers import solve_linear, solved_at_once
 from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.facets import OuterFacets, outer_facets
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""

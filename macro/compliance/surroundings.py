@@ -27,9 +27,9 @@ from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import OuterFacets, outer_facets
 from macro.mesh.tagged import FLAT_IN_FILES
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
 

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
@@ -36,9 +35,7 @@ from macro.contact.rough_face import (
     not_found,
 )
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from support.arrays import Array, Flags
 
 _LOOSE, _CLOSER = 0.1, 1e-2
 """Relative residuals of solves while the active set changes much, and while it changes little."""

@@ -39,8 +39,7 @@ from macro.contact.rough_face import (
 from macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
 from macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from macro.linear_solvers.options import conjugate_gradients, reason_name
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""

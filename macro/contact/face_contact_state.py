@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rigid_plane import RigidPlane
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 class NodalContact(NamedTuple):

@@ -20,8 +20,8 @@ from geometry.patches import PatchGrid
 from macro import compat
 from macro.contact.rough_face import RoughFace
 from macro.mesh.contact_face import triangle_areas
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _NO_AREA = 1e-9

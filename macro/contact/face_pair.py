@@ -33,9 +33,8 @@ from macro.linear_solvers.options import (
 )
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.tagged import FLAT_IN_FILES
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _NEAREST = 12
 """Facets of the nearest middles that a point is looked for in first."""

@@ -25,10 +25,9 @@ from macro.contact.loaded_face import LoadedFace, Mode
 from macro.contact.sampling import crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
+from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def _result(name: str, meaning: str) -> Any:

@@ -18,10 +18,9 @@ from macro.contact.loaded_face import Mode
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import facet_indices
 from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
+from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

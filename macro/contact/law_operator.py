@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from macro.contact.interface import Interface
 from macro.mesh.facets import facet_nodes
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 PACKAGE = "dolfinx_external_operator"
 

@@ -29,9 +29,9 @@ from macro.mesh.contact_face import (
     facet_quadrature,
     top_facets,
 )
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 _ALONG_AXIS = 1e-14
 """Component of a unit normal that is rounding."""
 _WHOLE = 1e-9

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 
 from geometry.face_frame import UPWARD
 from geometry.patches import PatchGrid
@@ -22,10 +21,8 @@ from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import TOP
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from support.arrays import Array, Flags
 from support.errors import InputError, NotConverged
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,10 +26,9 @@ from geometry.meshes.refined_block import RefinedShape
 from geometry.surface import Surface
 from macro import compat
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.collective import on_root
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 BOTTOM, TOP, SIDES = 1, 2, 3
 """Markers of the block's faces: z = −height, z = 0, and the four planes between them."""

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from macro import compat
 from macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _FLAT = 1e-8
 """Volume at a corner, relative to the product of its edges, that counts as none."""

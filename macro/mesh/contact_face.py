@@ -14,8 +14,7 @@ from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
 from macro.mesh.facets import facet_indices, facet_nodes
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _BILINEAR_STEPS = 8
 """Newton steps that invert the bilinear map of a quadrilateral; a parallelogram needs none."""

@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from macro import compat
+from support.arrays import Array
 from support.errors import InputError
 
 Ints = NDArray[np.int64]
@@ -177,9 +178,6 @@ def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
     sides = len(compat.reference_facets(topology.cell_name())[1])
     order = np.argsort(facet, kind="stable")
     return facet[order].astype(np.int64), order // sides, order % sides
-
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

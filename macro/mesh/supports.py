@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 
 from macro.mesh.facets import facet_nodes
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _FREE = 1e-12
 """Square of a support's movement, relative to the largest in a motion of the same size, that is

@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
-from numpy.typing import NDArray
 
 from geometry.face_frame import FaceFrame
 from macro import compat
 from macro.mesh.facets import facet_nodes
-from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_SHOWN = 12
-"""Names that a message lists."""
+from support.arrays import Array
+from support.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -112,21 +106,17 @@ def bounding_box(points: Array, comm: Any) -> tuple[Array, Array]:
 def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None) -> int:
     if isinstance(wanted, str) and wanted in names:
         return names[wanted]
-    tag = int(wanted) if not isinstance(wanted, str) or wanted.strip().isdecimal() else None
+    tag = int(wanted) if str(wanted).strip().lstrip("-").isdecimal() else None
     if tag is not None and (tag in names.values() or not names):
         return tag
-    folded = {name.casefold(): name for name in names}
-    near = get_close_matches(str(wanted).casefold(), folded, n=1)
-    hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
-    listed = [
-        repr(name) if name != str(number) else name for name, number in list(names.items())[:_SHOWN]
-    ]
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    hint = did_you_mean(str(wanted), names)
+    listed = [name if name == str(number) else repr(name) for name, number in names.items()]
+    more = f" and {len(listed) - 12} more" if len(listed) > 12 else ""
     raise InputError(
         f"the mesh has no {what} of this name{hint}" if names else f"the mesh has no named {what}s",
         value=wanted,
         key=key,
-        allowed=", ".join(listed) + more if names else "a number",
+        allowed=", ".join(listed[:12]) + more if names else "a number",
     )
 
 
