@@ -25,6 +25,7 @@ from geometry.meshes.lattice import (
 from geometry.meshes.refined_block import RefinedShape
 from geometry.surface import Surface
 from macro import compat
+from macro.mesh.facets import exterior_facets
 from macro.mesh.tagged import TaggedMesh
 from support.arrays import Array
 from support.collective import on_root
@@ -92,8 +93,7 @@ def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
             on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
             mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
         mesh.geometry.x[:] *= shape.unit
-    mesh.topology.create_connectivity(2, 3)
-    facets = np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
+    facets = exterior_facets(mesh)
     level = dmesh.compute_midpoints(mesh, 2, facets)[:, 2] / shape.height
     markers = np.select([level < -1.0 + FLAT, level > -FLAT], [BOTTOM, TOP], SIDES)
     tags = dmesh.meshtags(mesh, 2, facets, markers.astype(np.int32))

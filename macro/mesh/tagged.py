@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from dolfinx import mesh as dmesh
 
 from geometry.face_frame import FaceFrame
 from macro import compat
-from macro.mesh.facets import facet_nodes
+from macro.mesh.facets import exterior_facets, facet_nodes
 from support.arrays import Array
 from support.errors import InputError, did_you_mean
 
@@ -210,15 +209,12 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
         Their corners, shape (n, 3 or 4, 3) [mm]; outward vectors as long as their areas, shape
         (n, 3) [mm²]; the number of facets between two cells, each counted on one rank.
     """
-    mesh = tagged.mesh
-    topology = mesh.topology
-    facets = np.asarray(tagged.facet_tags.find(tag))
-    outer = np.isin(facets, dmesh.exterior_facet_indices(topology))
-    own = facets < topology.index_map(2).size_local
+    mesh, facets = tagged.mesh, np.asarray(tagged.facet_tags.find(tag))
+    outer = np.isin(facets, exterior_facets(mesh))
+    own = facets < mesh.topology.index_map(2).size_local
     nodes = facet_nodes(mesh, facets[outer])
-    owned = nodes.cell < topology.index_map(3).size_local
-    corners = mesh.geometry.x[nodes.corners[owned]]
-    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell[owned]]].mean(axis=1)
+    corners = mesh.geometry.x[nodes.corners]
+    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell]].mean(axis=1)
     # half the product of the diagonals of a quadrilateral
     ends = (1, 0, 2, 0) if corners.shape[1] == 3 else (3, 0, 2, 1)
     u, v = (corners[:, ends[k]] - corners[:, ends[k + 1]] for k in (0, 2))

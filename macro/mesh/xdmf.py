@@ -102,17 +102,21 @@ def _layout(path: Path) -> _Layout:
             f"the mesh has cells that do not fit{flat}", value=kinds[mesh], allowed=_ALLOWED
         )
     _check_data(uniform[mesh], path)
-    tagged = {
-        name: kinds[name] for name, grid in uniform.items() if grid.find("Attribute") is not None
-    }
-    of_facets = [name for name, kind in tagged.items() if kind == _CELLS[kinds[mesh]]]
-    of_cells = [name for name, kind in tagged.items() if kind == kinds[mesh]]
-    for several, what in ((of_facets, "facets"), (of_cells, "cells")):
+
+    def tags_of(what: str, kind: str) -> str | None:
+        """Return the name of the one set of tags on cells of a kind."""
+        several = [
+            name
+            for name, grid in uniform.items()
+            if kinds[name] == kind and grid.find("Attribute") is not None
+        ]
         if len(several) > 1:
             raise InputError(
                 f"the file has several sets of tags of {what}", value=several, allowed="one"
             )
-    facets, cells = (next(iter(found), None) for found in (of_facets, of_cells))
+        return several[0] if several else None
+
+    facets, cells = tags_of("facets", _CELLS[kinds[mesh]]), tags_of("cells", kinds[mesh])
     return _Layout(mesh=mesh, facets=facets, cells=cells, names=_names(root))
 
 
