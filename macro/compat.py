@@ -32,9 +32,6 @@ _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compi
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
-_ROUNDING = 1e-12
-"""Value of a basis function that is rounding."""
-
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
 
@@ -252,7 +249,7 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
     values = element.tabulate(0, points)[0].reshape(len(points), -1)
-    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
+    return np.where(np.abs(values) < 1e-12, 0.0, values)
 
 
 def lagrange_gradients(

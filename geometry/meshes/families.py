@@ -35,9 +35,6 @@ Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 EDGES = 3.0
 """Edges along the radius of a typical contact in the finest tetrahedra, by default."""
 
-_GROWTH = 1.2
-"""Increase of the edge length per distance, with one edge along a contact's radius."""
-
 
 def reference_shapes(
     surface: Surface,
@@ -100,7 +97,7 @@ def reference_shapes(
             places=places_in_reach(surface, approach, spacing=fine, tilt=tilt),
             fine=fine,
             coarse=max(coarse, fine),
-            growth=_GROWTH / edges,
+            growth=1.2 / edges,
             element=element or "P2",
         )
 

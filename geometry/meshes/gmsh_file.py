@@ -15,9 +15,6 @@ from support.errors import InputError
 
 Table = NDArray[np.int64]
 
-_STRAIGHT = 1e-6
-"""Distance of a node within a cell from its place on straight edges, relative to the cell."""
-
 _ALLOWED = "tetrahedra alone, or hexahedra alone"
 
 _CORNERS = {"tetrahedron": [0, 1, 2, 3], "hexahedron": [0, 1, 3, 2, 4, 5, 7, 6]}
@@ -185,7 +182,7 @@ def _check_straight(nodes: Array, middles: Sequence[Sequence[int]]) -> None:
     size = np.ptp(nodes[:, :corners], axis=1).max(axis=1)
     for k, ends in enumerate(middles, start=corners):
         straight = nodes[:, list(ends)].mean(axis=1)
-        off |= np.abs(nodes[:, k] - straight).max(axis=1) > _STRAIGHT * size
+        off |= np.abs(nodes[:, k] - straight).max(axis=1) > 1e-6 * size
     if off.any():
         raise InputError(
             f"{off.sum()} of {len(off)} cells are of second order with curved edges; make a mesh "

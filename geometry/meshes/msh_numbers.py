@@ -12,9 +12,6 @@ from support.errors import InputError
 
 Table = NDArray[np.int64]
 
-_EXACT = 2.0**53
-"""Whole numbers up to this are exact as floats."""
-
 
 class TextNumbers:
     """Numbers between spaces and line ends.
@@ -114,7 +111,8 @@ def whole(values: Array) -> Table:
     Raises:
         InputError: When one is not, or too large.
     """
-    if not (np.abs(values) <= _EXACT).all() or (values != np.rint(values)).any():
+    exact = np.abs(values) <= 2.0**53  # as floats
+    if not exact.all() or (values != np.rint(values)).any():
         raise InputError("a number or a count of the mesh is no whole number")
     return values.astype(np.int64)
 

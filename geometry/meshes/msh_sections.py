@@ -35,9 +35,6 @@ KINDS = {
 }  # fmt: skip
 """Dimension, nodes and name of gmsh's kinds of elements of first and second order."""
 
-_MOST_TAGS = 100_000
-"""Most numbers beside an element's nodes: its groups and the parts of the mesh it is in."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Elements:
@@ -238,7 +235,7 @@ def _rows_of_bytes(numbers: Numbers, count: int) -> Iterator[tuple[int, int, Tab
     """Yield kind, number of tags, and tags with nodes of elements of binary files."""
     while count > 0:
         kind, rows, tags = map(int, whole(numbers.table(1, "iii"))[0])
-        if rows < 1 or not 0 <= tags <= _MOST_TAGS:
+        if rows < 1 or not 0 <= tags <= 100_000:
             raise InputError("a section of the file has elements that make no sense")
         _, nodes, _ = _kind(kind)
         yield kind, tags, whole(numbers.table(rows, "i" * (1 + tags + nodes)))[:, 1:]

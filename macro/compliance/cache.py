@@ -33,7 +33,6 @@ MOST_BYTES = 500_000_000
 
 _SUFFIX = ".arrays"
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-_ROOT = 0  # user number of the administrator, who may fill a directory for all
 
 _SOURCES = "macro", "micro", "geometry"
 """Packages whose sources make the cached arrays."""
@@ -117,7 +116,7 @@ def _read(path: Path, words: str) -> Arrays | None:
         facts = os.fstat(file.fileno())
         if not stat.S_ISREG(facts.st_mode) or facts.st_mode & _OTHERS_WRITE:
             return None
-        if facts.st_uid not in (os.geteuid(), _ROOT):
+        if facts.st_uid not in (os.geteuid(), 0):  # the administrator may fill it for all
             return None
         record = read_record(file.read())
         if record["key"] == words:

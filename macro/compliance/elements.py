@@ -33,9 +33,6 @@ _LOW = 0.05
 at the edges of the clamped bottom. With 0.15 the mean compliance of a cube was too small by 1.9e-4
 at ν = 0.3 and 1.3e-3 at 0.45, with 0.05 by 0.9e-4 and 4.9e-4."""
 
-_GROWTH = 4.0
-"""Height of an element relative to that of the one above."""
-
 _END = 0.75
 """Distance from the clamped bottom within which a tall block needs finer elements, in widths."""
 
@@ -157,7 +154,7 @@ def levels(lengths: tuple[float, float], height: float, count: int) -> Array:
     depths = [0.0]
     while step < 0.6 * low and depths[-1] < 0.5 * width:
         depths.append(step)
-        step *= _GROWTH
+        step *= 4.0
     if low - depths[-1] > 2.0 * _END * width:
         depths.append(low - _END * width)
     if len(depths) > 1 or height > step:

@@ -33,9 +33,6 @@ from support.errors import InputError
 Parity = tuple[int, int]
 """Parity of a pressure along x and along y: 0 even, 1 odd."""
 
-_NEGLIGIBLE = 1e-13
-"""Share of the largest entry below which an entry is the rounding error of a zero integral."""
-
 
 class Response(NamedTuple):
     """Response of the top to modes of pressure: integrals over the top of modes times fields.
@@ -182,7 +179,8 @@ class ParityBlock:
             left = one.slopes if axis == slopes[0] else one.values
             right = other.slopes if axis == slopes[1] else other.values
             matrix = (left * one.weights) @ right.T
-            large = np.abs(matrix) > _NEGLIGIBLE * np.abs(matrix).max(initial=0.0)
+            # smaller entries are the rounding of integrals that are zero
+            large = np.abs(matrix) > 1e-13 * np.abs(matrix).max(initial=0.0)
             factors.append(csr_matrix(np.where(large, matrix, 0.0)))
         # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
         share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0

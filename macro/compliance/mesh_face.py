@@ -33,6 +33,7 @@ from macro.compliance.face_compliance import FaceCompliance, stresses_in_face
 from macro.compliance.surroundings import FaceMoments
 from macro.elastic_body import ElasticBody, stiffness_form
 from macro.linear_solvers.options import PREFIX
+from macro.linear_solvers.selection import FACTORISED
 from macro.linear_solvers.solvers import solve_linear, solved_at_once
 from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
@@ -42,14 +43,8 @@ from support.errors import InputError
 
 MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
-_FACTORISED = 100_000
-"""Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
-_MORE = 4
-"""Degree of the quadrature of tractions beyond that of two basis functions."""
-_SAME = 1e-9
-"""Relative difference of elastic constants that is rounding."""
 
 
 class HalfSpaceFields(Protocol):
@@ -179,7 +174,7 @@ class _Corrections:
         fields: HalfSpaceFields,
     ) -> None:
         frame = facets.frame.moved(*rectangle.origin)
-        outer = outer_facets(body.space, 2 * body.degree + _MORE)
+        outer = outer_facets(body.space, 2 * body.degree + 4)
         level = np.abs(frame.height(outer.points)).max(axis=1, initial=0.0)
         outer = outer.among(level > FLAT * max(rectangle.lengths))
         self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
@@ -254,7 +249,7 @@ class _Corrections:
             for values, own in zip(body.cell_lame, self._material.lame, strict=True)
         ]
         size = sum(self._material.lame)
-        other = np.abs(differences[0]) + np.abs(differences[1]) > _SAME * size
+        other = np.abs(differences[0]) + np.abs(differences[1]) > 1e-9 * size
         if not body.comm.allreduce(bool(other.any())):
             return None
         cells = [np.where(other, values, 0.0) for values in differences]
@@ -270,7 +265,7 @@ def _solutions(
 ) -> Iterator[tuple[int, Array]]:
     """Yield every mode and its displacements, this rank's owned ones."""
     free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
-    if body.dofs <= _FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
+    if body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
         right = np.stack([free * loads.load(mode) for mode in range(count)], axis=1)
         yield from enumerate(solved_at_once(body.stiffness, right).T)
         return

@@ -33,10 +33,6 @@ from support.errors import InputError
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
 
-_STRIP = 0.25
-"""Height of the strip of a free side that must be whole, relative to the rectangle's shorter side
-or the thickness: the distance that sides count up to as quarter-spaces."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surroundings:
@@ -94,7 +90,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
     height = frame.height(outer.points)
     above = comm.allreduce(float(height.max(initial=0.0)), op=MPI.MAX)
     thickness = _thickness(comm, outer, frame, rectangle)
-    strip = _STRIP * min(*rectangle.lengths, thickness)
+    strip = 0.25 * min(*rectangle.lengths, thickness)  # as deep as quarter-spaces count
     free, slack = outer.among(~_held(body, outer)), FLAT_IN_FILES * min(rectangle.lengths)
     sides = [_is_free(body, free, _side(frame, rectangle, k), strip, slack) for k in range(4)]
     return Surroundings(

@@ -40,23 +40,8 @@ from support.arrays import Array, Flags
 _LOOSE, _CLOSER = 0.1, 1e-2
 """Relative residuals of solves while the active set changes much, and while it changes little."""
 
-_FEW = 200
-"""The set changes little when at most one active node in this many changes."""
-
 _PATIENCE = 10
 """Solves without progress before nodes change one by one."""
-
-_CLOSED = 1e-8
-"""Gap relative to the largest displacement below which a node counts as touching."""
-
-_ROUNDING = 1e-15
-"""Interference relative to the block's size that is rounding."""
-
-_SOFT = 8.0
-"""Stiffness of the springs under a plane without support: E* times this over the block's width."""
-
-_NO_FORCE = 1e-17
-"""Force over E* and the square of half the diagonal that counts as zero."""
 
 
 @dataclass(slots=True, eq=False)
@@ -103,8 +88,10 @@ class PrimalDualActiveSet:
         self._residual = body.stiffness.createVecRight()
         self.points = len(top.dofs)
         modulus, half = face.modulus, plane.levers.half
-        self._zero_force, self._rounding = _NO_FORCE * modulus * half**2, _ROUNDING * half
-        self._springs = top.area * modulus * _SOFT / (2.0 * half)
+        # what counts as no force, and as no interference
+        self._zero_force, self._rounding = 1e-17 * modulus * half**2, 1e-15 * half
+        # under a plane without support: E* eight times over the block's width
+        self._springs = top.area * modulus * 8.0 / (2.0 * half)
 
     def solve(self, control: Control, guess: Guess) -> ContactSolution:
         """Find the contact of a load step.
@@ -146,7 +133,8 @@ class PrimalDualActiveSet:
                 return self._converged(now, sets, spent)
             fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
             sets += changed > 0
-            if changed > max(1, total // _FEW) and waited <= _PATIENCE:
+            # more than one active node in 200
+            if changed > max(1, total // 200) and waited <= _PATIENCE:
                 tolerance = _LOOSE
             else:
                 tolerance = self._tolerance if tolerance <= _CLOSER else _CLOSER
@@ -209,7 +197,7 @@ class PrimalDualActiveSet:
         now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
         forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
-        slack = _CLOSED * largest(now.displacement.array_r, self._comm)
+        slack = 1e-8 * largest(now.displacement.array_r, self._comm)
         forces = np.where(now.active, forces, 0.0)
         return ContactSolution(
             end=Guess(now.plane, now.displacement.array_r.copy(), forces),

@@ -55,20 +55,10 @@ INTERFERENCE = {1: 1e-8, 2: 1e-5}
 the largest displacement, by the element's degree. On quadratic facets the conditions of
 neighbouring points are nearly dependent, and multipliers that share a load converge slowly."""
 
-_SOFT, _HARD = 30.0, 1000.0
-"""First and usual stiffness k, in E* over the size of the facet."""
-
-_HARDER, _HARDEST = 10.0, 10.0
+_HARDER = 10.0
 """Factor of k between updates, and its largest factor beyond the usual one."""
 
-_FALL = 0.1
-"""Factor by which an update must reduce the interference; otherwise k grows."""
-
 _MOST_UPDATES = 40
-_NO_FORCE = 1e-6
-"""Nodal force relative to the largest one that counts as zero."""
-
-_TINY = 1e-300
 
 
 class AugmentedLagrangian:
@@ -95,7 +85,7 @@ class AugmentedLagrangian:
         (distance,) = top.with_ghosts(plane.distance)
         self._points = points = loaded.quadrature
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
-        self._stiff, self._soft = _HARD * unit, _SOFT * unit
+        self._stiff, self._soft = 1000.0 * unit, 30.0 * unit  # usual and first stiffness
         self._tolerance = contact_tolerance()
         self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
@@ -135,14 +125,14 @@ class AugmentedLagrangian:
             # interference of points without pressure, interference or gap of points under pressure
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
             allowed = self._interference * largest(displacement.array_r, comm)
-            ratio = depth / max(allowed, _TINY)
+            ratio = depth / max(allowed, 1e-300)
             hard = bool(np.all(law.slope >= self._stiff))
             hard = bool(comm.allreduce(hard, op=MPI.LAND))
             if hard and tolerance <= self._tolerance and ratio <= 1.0:
                 return self._converged(displacement, steps, spent)
             law.multiplier = law.pressure(closure)
-            if hard and ratio > _FALL * before:
-                hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
+            if hard and ratio > 0.1 * before:  # the interference falls too slowly
+                hardest = np.minimum(_HARDER * hardest, _HARDER * self._stiff)
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             if hard:
@@ -222,7 +212,7 @@ class AugmentedLagrangian:
         gap = -self._plane.interference(plane, -displacement.array_r[self._top.dofs])
         comm = self._body.comm
         pressed = largest(nodal_force, comm)
-        touching = nodal_force > _NO_FORCE * pressed
+        touching = nodal_force > 1e-6 * pressed
         if pressed:
             touching |= gap < self._interference * largest(displacement.array_r, comm)
         return ContactSolution(

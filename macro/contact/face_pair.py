@@ -36,11 +36,6 @@ from macro.mesh.tagged import FLAT_IN_FILES
 from support.arrays import Array
 from support.errors import InputError
 
-_NEAREST = 12
-"""Facets of the nearest middles that a point is looked for in first."""
-_SLACK = 1e-8
-"""Distance beyond a facet, in its own coordinates, at which a point still counts as on it."""
-
 
 @dataclass(frozen=True, eq=False)
 class BodyPair:
@@ -277,13 +272,13 @@ def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Ar
         """Note which points, by their indices, lie on the facet that is tried for each."""
         at = facets.local(candidates, points[wanted])
         beyond = at.sum(axis=1) if corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
-        inside = (at.min(axis=1, initial=0.0) >= -_SLACK) & (beyond <= 1.0 + _SLACK)
+        inside = (at.min(axis=1, initial=0.0) >= -1e-8) & (beyond <= 1.0 + 1e-8)
         facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
 
     middles = corners.mean(axis=1)
     tree = cKDTree(middles)
     reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max())
-    nearest = min(_NEAREST, count)
+    nearest = min(12, count)
     for candidates in tree.query(points, k=nearest)[1].reshape(len(points), nearest).T:
         left = np.flatnonzero(facet < 0)
         look(left, candidates[left])

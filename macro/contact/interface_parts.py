@@ -136,10 +136,6 @@ def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
 
 
-_ROUNDING = 1e-12
-"""Shift of patches, relative to the face, that is rounding."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InterfaceLaws:
     """Laws of patches on a face.
@@ -192,7 +188,7 @@ def laws_on_face(
         if patches is None:
             patches = laws.patches
             shift = lower + 0.5 * np.asarray(lengths) - patches.middle
-            shift[np.abs(shift) < _ROUNDING * max(lengths)] = 0.0
+            shift[np.abs(shift) < 1e-12 * max(lengths)] = 0.0
         laws = laws.laws
     if not isinstance(laws, Sequence) or not laws or not all(map(_is_law, laws)):
         raise InputError(

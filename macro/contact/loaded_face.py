@@ -32,10 +32,6 @@ from macro.mesh.contact_face import (
 from support.arrays import Array
 from support.errors import InputError
 
-_ALONG_AXIS = 1e-14
-"""Component of a unit normal that is rounding."""
-_WHOLE = 1e-9
-"""Part of a patch beyond the face that is rounding."""
 Mode = Literal["patchwise", "pointwise"]
 
 
@@ -268,7 +264,7 @@ class LoadedFace(ContactFace):
         means = self._integrals(points.x, points.y, points.depth) / self.areas
         if isinstance(patches, Outline):
             return means[0], means[1], means[2]
-        whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
+        whole = np.abs(self.areas - patches.areas) <= 1e-9 * patches.areas
         x, y = np.where(whole, patches.centres.T, means[:2])
         return x, y, means[2]
 
@@ -289,7 +285,7 @@ def normal_rows(
         outward: Normal n out of the body, shape (3,).
         nodes: Number of all nodes.
     """
-    axes = np.flatnonzero(np.abs(outward) > _ALONG_AXIS)
+    axes = np.flatnonzero(np.abs(outward) > 1e-14)
     columns = (3 * numbers[used][:, None] + axes).ravel()
     starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
     entries = (-weights[used][:, None] * outward[axes]).ravel()

@@ -13,9 +13,6 @@ from macro.mesh.tagged import TaggedMesh
 from support.arrays import Array
 from support.errors import InputError
 
-_FLAT = 1e-8
-"""Volume at a corner, relative to the product of its edges, that counts as none."""
-
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""
 
@@ -46,7 +43,7 @@ def check_cells(tagged: TaggedMesh) -> None:
     for start in range(0, len(vertices), _CHUNK):
         part = slice(start, start + _CHUNK)
         quality[part], hands[part] = _volumes(mesh.geometry.x[vertices[part]])
-    bad = quality <= _FLAT
+    bad = quality <= 1e-8  # of the product of the edges
     handedness = {hand for hands_there in comm.allgather(set(hands[~bad])) for hand in hands_there}
     if len(handedness) > 1:
         bad |= _folded(mesh, vertices)

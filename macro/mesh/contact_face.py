@@ -16,11 +16,6 @@ from macro.mesh.block import TOP, BlockMesh
 from macro.mesh.facets import facet_indices, facet_nodes
 from support.arrays import Array
 
-_BILINEAR_STEPS = 8
-"""Newton steps that invert the bilinear map of a quadrilateral; a parallelogram needs none."""
-_BENT = 1e-12
-"""Deviation from a parallelogram, relative to its edges, that is rounding."""
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FacetQuadrature:
@@ -104,9 +99,10 @@ class ContactFacets:
         if corners.shape[1] == 3:
             return s
         twist = corners[:, 0] - corners[:, 1] - corners[:, 2] + corners[:, 3]
-        bent = (np.abs(twist).max(axis=1) > _BENT * np.abs(edges).max(axis=(1, 2)))[facet]
+        # a parallelogram needs no Newton step to invert the map
+        bent = (np.abs(twist).max(axis=1) > 1e-12 * np.abs(edges).max(axis=(1, 2)))[facet]
         edges, twist = edges[facet[bent]], twist[facet[bent]]
-        for _ in range(_BILINEAR_STEPS if bent.any() else 0):
+        for _ in range(8 if bent.any() else 0):
             at = s[bent]
             miss = np.einsum("nij,nj->ni", edges, at) + twist * at.prod(axis=1)[:, None]
             slope = edges + twist[:, :, None] * at[:, None, ::-1]

@@ -15,10 +15,6 @@ from macro.mesh.tagged import TaggedMesh
 from support.arrays import Array
 from support.errors import InputError
 
-_FREE = 1e-12
-"""Square of a support's movement, relative to the largest in a motion of the same size, that is
-rounding: supports over a part in 10⁶ of the body's length still hold rotations."""
-
 _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""
 
@@ -188,7 +184,8 @@ def free_motions(tagged: TaggedMesh, supports: Sequence[Support]) -> list[str]:
                 rows = np.concatenate([np.tile(along, (len(arms), 1)), np.cross(arms, along)], 1)
                 square += rows.T @ rows
     values, vectors = np.linalg.eigh(tagged.comm.allreduce(square))
-    free = vectors[:, values <= _FREE * max(float(values[-1]), 1.0)].T
+    # supports over a part in 10⁶ of the body's length still hold rotations
+    free = vectors[:, values <= 1e-12 * max(float(values[-1]), 1.0)].T
     return _in_words(free, centre, size)
 
 
