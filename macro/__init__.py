@@ -27,7 +27,7 @@ from macro.contact.unilateral_problem import (
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
-from macro.fields import AtPoints, write_fields, write_rough_fields
+from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
@@ -39,7 +39,6 @@ __all__ = [
     "BOTTOM",
     "SIDES",
     "TOP",
-    "AtPoints",
     "Block",
     "ContactFacets",
     "ContactLaw",
