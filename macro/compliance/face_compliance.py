@@ -327,5 +327,5 @@ def stresses_in_face(material: Material, strains: Sequence[Array], area: float |
     plane = modulus / (1.0 - nu**2)
     stresses = np.stack([plane * (xx + nu * yy), plane * (yy + nu * xx), modulus / (1.0 + nu) * xy])
     if area is not None:
-        stresses[:2] -= nu / (1.0 - nu) / area * np.eye(len(xx))
+        stresses[:2] -= nu / (1.0 - nu) * (np.eye(len(xx)) / area)
     return stresses

@@ -157,8 +157,8 @@ def _gathered(
         below, beside = fields.modes()
         normal, stresses = normal + below, stresses + beside
     (xx, yy, xy), nu, modulus = stresses, material.poisson_ratio, material.young_modulus
-    strain = xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
-    growth = (np.eye(len(normal)) / area - area * strain) / modulus
+    work = xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
+    growth = np.eye(len(normal)) / area / modulus - area * (work / modulus)
     return FaceCompliance.of(normal, growth, stresses)
 
 
