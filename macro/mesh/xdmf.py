@@ -176,7 +176,7 @@ def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
         raise InputError(
             "meshes are not written in this format", value=path.suffix, allowed=".xdmf"
         )
-    tags = {"facets": tagged.facet_tags, "cells": _owned(tagged)}
+    tags = {"facets": tagged.facet_tags, "cells": tagged.cell_tags}
     with compat.quiet_compiler(), io.XDMFFile(tagged.comm, str(path), "w") as file:
         file.write_mesh(tagged.mesh)
         for name, each in tags.items():
@@ -184,17 +184,6 @@ def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
                 each.name = name
                 compat.write_tags(file, each, tagged.mesh)
     on_root(tagged.comm, lambda: _add_names(path, tagged))
-
-
-def _owned(tagged: TaggedMesh) -> Any:
-    """Return the tags of the cells that this rank owns; None where there are none."""
-    if tagged.cell_tags is None:
-        return None
-    own = tagged.cell_tags.indices < tagged.mesh.topology.index_map(3).size_local
-    indices, values = (
-        np.asarray(part)[own] for part in (tagged.cell_tags.indices, tagged.cell_tags.values)
-    )
-    return dmesh.meshtags(tagged.mesh, 3, indices, values)
 
 
 def _add_names(path: Path, tagged: TaggedMesh) -> None:
