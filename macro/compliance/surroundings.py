@@ -139,20 +139,12 @@ def _is_free(
     plane, length = side
     level = np.abs(plane.height(free.points)).max(axis=1, initial=0.0)
     upright = np.all(free.normals @ plane.normal > 1.0 - FLAT_IN_FILES, axis=1)
-    chosen = contact_sides(body, free.among((level < slack) & upright), plane)
+    flat = free.among((level < slack) & upright)
+    chosen = contact_facets(body.space.mesh, flat.facet, plane)
     whole = PatchGrid(grid=(1, 1), lengths=(length, strip))
     weight = LoadedFace(body, chosen, whole, degree=1).quadrature.weight
     area = body.comm.allreduce(float(weight.sum()))
     return bool(area > (1.0 - FLAT_IN_FILES) * length * strip)
-
-
-def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> ContactFacets:
-    """Return outer facets in a plane as facets of that plane."""
-    mesh = body.space.mesh
-    mesh.topology.create_connectivity(3, 2)
-    table = mesh.topology.connectivity(3, 2)
-    facets = table.array[table.offsets[outer.cell] + outer.side]
-    return contact_facets(mesh, facets.astype(np.int32), frame)
 
 
 class Moments(NamedTuple):

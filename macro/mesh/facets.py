@@ -163,8 +163,8 @@ class OuterFacets:
     """Outer facets of the cells that this rank owns, and q quadrature points on each.
 
     Args:
-        cell: Rank-local cell of every facet, shape (f,).
-        side: Index of the facet in its cell, shape (f,).
+        facet: Rank-local index of every facet, shape (f,).
+        side: Its index in its cell, shape (f,).
         points: Places, shape (f, q, 3) [mm].
         normals: Outward unit normals, shape (f, q, 3).
         weights: Weights, whose sum over all ranks is the area of the body, shape (f, q) [mm²].
@@ -172,7 +172,7 @@ class OuterFacets:
         values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
     """
 
-    cell: NDArray[np.int32]
+    facet: NDArray[np.int32]
     side: Indices
     points: Array
     normals: Array
@@ -187,7 +187,7 @@ class OuterFacets:
 
     def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
         """Return some of the facets, shape of the choice (f,)."""
-        names = ("cell", "side", "points", "normals", "weights", "nodes")
+        names = ("facet", "side", "points", "normals", "weights", "nodes")
         return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
@@ -204,7 +204,8 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     mesh = space.mesh
     name, degree = mesh.topology.cell_name(), compat.lagrange_degree(space)
     vertices, corners = compat.reference_facets(name)
-    outer = facet_nodes(mesh, exterior_facets(mesh))
+    facets = exterior_facets(mesh)
+    outer = facet_nodes(mesh, facets)
     cell, side = outer.cell, outer.side
     shape_nodes = compat.cell_vertices(mesh)[cell]
     shape = compat.geometry_degree(mesh)
@@ -227,7 +228,7 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     areas *= outwards[side, None, None]
     sizes = np.linalg.norm(areas, axis=2)
     return OuterFacets(
-        cell=cell,
+        facet=facets,
         side=side,
         points=np.einsum("fqa,faj->fqj", values[side], places),
         normals=areas / sizes[..., None],
