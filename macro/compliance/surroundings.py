@@ -13,7 +13,6 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
@@ -88,7 +87,7 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
         )
     outer, frame = outer_facets(body.space, 2), facets.frame
     height = frame.height(outer.points)
-    above = comm.allreduce(float(height.max(initial=0.0)), op=MPI.MAX)
+    above = comm.allreduce(float(height.max(initial=0.0)), max)
     thickness = _thickness(comm, outer, frame, rectangle)
     strip = 0.25 * min(*rectangle.lengths, thickness)  # as deep as quarter-spaces count
     free, slack = outer.among(~_held(body, outer)), FLAT_IN_FILES * min(rectangle.lengths)
@@ -106,8 +105,8 @@ def _thickness(comm: Any, outer: OuterFacets, frame: FaceFrame, rectangle: Patch
     depth, places = -frame.height(outer.points), frame.in_plane(outer.points) - rectangle.origin
     inside = np.all((places > 0.0) & (places < rectangle.lengths), axis=-1)
     under = inside & (outer.normals @ frame.normal < -0.5)
-    least = comm.allreduce(float(depth[under].min(initial=np.inf)), op=MPI.MIN)
-    deepest = comm.allreduce(float(depth.max(initial=0.0)), op=MPI.MAX)
+    least = comm.allreduce(float(depth[under].min(initial=np.inf)), min)
+    deepest = comm.allreduce(float(depth.max(initial=0.0)), max)
     return float(min(least, deepest))
 
 
@@ -201,7 +200,7 @@ class FaceMoments:
         """
         values = displacement.x.array
         local = np.stack([self._modes @ (part @ values) for part in self._operators])
-        total = self._body.comm.allreduce(local, op=MPI.SUM) / self._area
+        total = self._body.comm.allreduce(local) / self._area
         return Moments(*total)
 
     def load(self, mode: int) -> Array:

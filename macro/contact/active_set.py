@@ -21,7 +21,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
@@ -220,14 +219,14 @@ class PrimalDualActiveSet:
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
         comm = self._comm
-        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, op=MPI.MIN)
+        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, min)
         alone = np.zeros_like(moved)
         if comm.rank == lowest:
             alone[np.argmax(moved)] = True
         return alone
 
     def _norm(self, values: Array) -> float:
-        return float(np.sqrt(self._comm.allreduce(float(values @ values), op=MPI.SUM)))
+        return float(np.sqrt(self._comm.allreduce(float(values @ values))))
 
     def _count(self, flags: Flags) -> int:
-        return int(self._comm.allreduce(int(np.count_nonzero(flags)), op=MPI.SUM))
+        return int(self._comm.allreduce(int(np.count_nonzero(flags))))

@@ -16,7 +16,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csc_array
@@ -126,8 +125,7 @@ class AugmentedLagrangian:
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
             allowed = self._interference * largest(displacement.array_r, comm)
             ratio = depth / max(allowed, 1e-300)
-            hard = bool(np.all(law.slope >= self._stiff))
-            hard = bool(comm.allreduce(hard, op=MPI.LAND))
+            hard = comm.allreduce(bool(np.all(law.slope >= self._stiff)), min)
             if hard and tolerance <= self._tolerance and ratio <= 1.0:
                 return self._converged(displacement, steps, spent)
             law.multiplier = law.pressure(closure)

@@ -107,8 +107,3 @@ class FaceContactState:
     def tilt(self) -> tuple[float, float]:
         """Change of the approach along x and y [mm/mm]."""
         return self.plane.tilt
-
-    @property
-    def residual(self) -> float:
-        """Norm of the residual at the end; not a number where it is not known."""
-        return float(self.residuals[-1]) if len(self.residuals) else np.nan

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from dolfinx import fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
@@ -126,7 +125,7 @@ class TopNodes:
 
     def patch_sums(self, values: Array) -> Array:
         """Return the sums of nodal values over every patch, shape (N,), on every rank."""
-        return self._sum(self._shares.T @ values)
+        return np.asarray(self._body.comm.allreduce(self._shares.T @ values))
 
     def patch_means(self, values: Array) -> Array:
         """Return the means of nodal values over every patch, shape (N,), on every rank.
@@ -137,7 +136,8 @@ class TopNodes:
         means = np.empty(self.patches.count)
         means[~empty] = self.patch_sums(self.area * values)[~empty] / self._patch_areas[~empty]
         if empty.any():
-            means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
+            total = self._body.comm.allreduce
+            means[empty] = total(nearest.T @ values) / total(nearest.sum(axis=0))
         return means
 
     def regions(self, touching: NDArray[np.bool_]) -> tuple[Index, int]:
@@ -221,9 +221,6 @@ class TopNodes:
         """Return the global numbers of rank-local nodes."""
         index_map = self._body.space.dofmap.index_map
         return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
-
-    def _sum(self, values: Array) -> Array:
-        return self._body.comm.allreduce(values, op=MPI.SUM)
 
 
 class FacetLattice(NamedTuple):

@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
@@ -202,7 +201,7 @@ class LoadedFace(ContactFace):
         """Return the integrals of fields at this rank's points over the patches, (fields, N)."""
         points, count = self.quadrature, self.patches.count
         local = [np.bincount(points.patch, points.weight * field, count) for field in fields]
-        return np.asarray(self.comm.allreduce(np.array(local), op=MPI.SUM))
+        return np.asarray(self.comm.allreduce(np.array(local)))
 
     @cached_property
     def pointwise(self) -> Sampling:

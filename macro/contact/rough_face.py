@@ -10,7 +10,6 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from mpi4py import MPI
 
 from geometry.face_frame import UPWARD
 from geometry.patches import PatchGrid
@@ -234,4 +233,4 @@ def largest(values: Array, comm: Any) -> float:
     Note:
         Collective.
     """
-    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), max))

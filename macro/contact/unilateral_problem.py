@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-from mpi4py import MPI
 
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
@@ -127,7 +126,7 @@ class UnilateralContactProblem:
         weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
         region, contacts = top.regions(touching)
         pressure, patch_force = top.pressure(nodal_force), top.patch_sums(solution.nodal_force)
-        whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
+        whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0))
         (approach, tx, ty), (xc, yc) = map(float, plane), map(float, self._plane.centre)
         return FaceContactState(
             plane=RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)),
@@ -147,7 +146,7 @@ class UnilateralContactProblem:
             nodes=round(nodes),
             contacts=contacts,
             mean_separation=float(volume / whole),
-            peak_pressure=body.comm.allreduce(float(pressure.max(initial=0.0)), op=MPI.MAX),
+            peak_pressure=body.comm.allreduce(float(pressure.max(initial=0.0)), max),
             nodal=NodalContact(
                 x=top.x,
                 y=top.y,

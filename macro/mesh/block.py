@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
-from mpi4py import MPI
 from numpy.typing import NDArray
 
 from geometry.meshes.block import BlockShape
@@ -195,8 +194,8 @@ def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
     if compat.geometry_degree(mesh) == 2:
         _straighten(mesh, moved)
     quality = MeshQuality(
-        thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), op=MPI.MIN)),
-        steepest=float(comm.allreduce(_steepest(mesh, depth, rise), op=MPI.MAX)),
+        thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), min)),
+        steepest=float(comm.allreduce(_steepest(mesh, depth, rise), max)),
     )
     if quality.steepest > _STEEPEST:
         raise InputError(
@@ -231,7 +230,7 @@ def _check_sides(mesh: Any, surface: Surface, depth: float) -> None:
     above = points[points[:, 2] > -depth + slack]
     beyond = np.maximum(-above, above - np.array([*surface.lengths, 0.0]))
     beyond[:, 2] = above[:, 2]
-    worst = mesh.comm.allreduce(float(beyond.max(initial=0.0)), op=MPI.MAX)
+    worst = mesh.comm.allreduce(float(beyond.max(initial=0.0)), max)
     if worst > slack:
         raise InputError(
             "the body is wider than its rough face within the depth that the roughness decays in",
