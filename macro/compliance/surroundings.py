@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,22 +146,6 @@ def _is_free(
     return bool(area > (1.0 - FLAT_IN_FILES) * length * strip)
 
 
-class Moments(NamedTuple):
-    """Integrals over the rectangle of modes times fields, divided by the area, shape (K²,) each.
-
-    Attributes:
-        normal: Displacements into the body [mm].
-        xx: Strains along x.
-        yy: Strains along y.
-        xy: Shear strains ε_xy, half the change of the angle.
-    """
-
-    normal: Array
-    xx: Array
-    yy: Array
-    xy: Array
-
-
 class FaceMoments:
     """Modes on a rectangle of the contact face of a body.
 
@@ -184,24 +168,23 @@ class FaceMoments:
         number = max(body.comm.allreduce(len(facets.cell)), 1)
         degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much
         self.points = LoadedFace(body, facets, rectangle, degree=degree).quadrature
-        x, y = (
-            mode_values(at - start, length, count)
-            for at, start, length in zip(
-                (self.points.x, self.points.y), rectangle.origin, rectangle.lengths, strict=True
-            )
-        )
-        self._modes = (x[:, None] * y).reshape(count**2, -1) * self.points.weight
+        (x, y), (lx, ly) = rectangle.origin, rectangle.lengths
+        along_x = mode_values(self.points.x - x, lx, count)
+        along_y = mode_values(self.points.y - y, ly, count)
+        self._modes = (along_x[:, None] * along_y).reshape(count**2, -1) * self.points.weight
 
-    def of(self, displacement: Any) -> Moments:
-        """Return the moments of a displacement.
+    def of(self, displacement: Any) -> Array:
+        """Return integrals over the rectangle of modes times fields, divided by the area, (4, K²).
+
+        The fields are the displacements into the body [mm], and the strains along x, along y and
+        in shear, ε_xy: half the change of the angle.
 
         Args:
             displacement: dolfinx Function, ghosts up to date [mm].
         """
         values = displacement.x.array
         local = np.stack([self._modes @ (part @ values) for part in self._operators])
-        total = self._body.comm.allreduce(local) / self._area
-        return Moments(*total)
+        return np.asarray(self._body.comm.allreduce(local) / self._area)
 
     def load(self, mode: int) -> Array:
         """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
