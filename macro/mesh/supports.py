@@ -49,81 +49,60 @@ def check_supports(
     tagged: TaggedMesh,
     supports: Sequence[Support],
     contact: int | None = None,
+    tractions: Sequence[Traction] = (),
     *,
     key: str | None = None,
 ) -> None:
-    """Refuse supports that do not hold the body, or that are on the contact face.
+    """Refuse supports that do not hold the body, and loads that do nothing.
 
     Args:
         tagged: The mesh.
         supports: Surfaces with prescribed displacements.
         contact: Tag of the contact face.
-        key: Key of the scene that the supports come from, for errors.
+        tractions: Surfaces under tractions.
+        key: Section of the scene that has ``supports`` and ``tractions``, for errors.
 
     Raises:
-        InputError: On all ranks, when a support has no facets, when one is the contact face, when
-            two prescribe different displacements of one surface or of nodes that two surfaces
-            share, and when a rigid motion is left; the error says which.
+        InputError: On all ranks, when a surface has no facets or is the contact face, when two
+            supports prescribe different displacements of one surface or of nodes that two surfaces
+            share, when a traction acts along what a support holds, and when a rigid motion is left;
+            the error says which.
 
     Note:
         Collective.
     """
+    where = key and f"{key}.supports"
     for support in supports:
-        _check_surface(tagged, support.tag, contact, "held", key)
+        _check_surface(tagged, support.tag, contact, "held", where)
     for one, other in combinations(supports, 2):
         for axis, pair in enumerate(zip(one.displacement, other.displacement, strict=True)):
             if None not in pair and pair[0] != pair[1]:
-                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, key)
+                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, where)
     left = free_motions(tagged, supports)
     if left:
         raise InputError(
             f"the supports leave the body free to move: {'; '.join(left)}",
-            key=key,
+            key=where,
             allowed="supports that hold all rigid motions, without help of the contact",
         )
-
-
-def check_tractions(
-    tagged: TaggedMesh,
-    tractions: Sequence[Traction],
-    supports: Sequence[Support],
-    contact: int | None = None,
-    *,
-    key: str | None = None,
-) -> None:
-    """Refuse tractions that are no loads: on the contact face, or along what supports hold.
-
-    Args:
-        tagged: The mesh.
-        tractions: Surfaces under tractions.
-        supports: Surfaces with prescribed displacements.
-        contact: Tag of the contact face.
-        key: Key of the scene that the tractions come from, for errors.
-
-    Raises:
-        InputError: On all ranks.
-
-    Note:
-        Collective.
-    """
     for traction in tractions:
-        name = _check_surface(tagged, traction.tag, contact, "loaded", key)
+        _check_surface(tagged, traction.tag, contact, "loaded", key and f"{key}.tractions")
         for support in supports:
             for axis, stress in enumerate(traction.stress):
                 on_held = support.tag == traction.tag and support.displacement[axis] is not None
                 if on_held and stress:
                     raise InputError(
-                        f"the surface {name!r} is held along {'xyz'[axis]}, where a traction of "
-                        f"{stress:g} MPa does nothing",
-                        key=key,
+                        f"the surface {tagged.facet_name(support.tag)!r} is held along "
+                        f"{'xyz'[axis]}, where a traction of {stress:g} MPa does nothing",
+                        key=key and f"{key}.tractions",
                         allowed="tractions along directions that no support holds",
                     )
 
 
 def _check_surface(
     tagged: TaggedMesh, tag: int, contact: int | None, how: str, key: str | None
-) -> str:
-    """Return the name of a surface that is to be held or loaded, after refusing what cannot be."""
+) -> None:
+    """Refuse surfaces that cannot be held or loaded."""
     name = tagged.facet_name(tag)
     if tag == contact:
         raise InputError(
@@ -131,7 +110,6 @@ def _check_surface(
         )
     if not any(tagged.comm.allgather(len(tagged.facet_tags.find(tag)))):
         raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
-    return name
 
 
 def _check_apart(

@@ -115,8 +115,7 @@ class _Reader:
 
     def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
         """Return the elastic body with its supports and loads."""
-        from macro import MeshedBody, Support, Traction
-        from macro.mesh.supports import check_supports, check_tractions
+        from macro import MeshedBody, Support, Traction, check_supports
 
         section, key = self._section, self._key
         supports = [
@@ -126,14 +125,12 @@ class _Reader:
             )
             for one in section.supports
         ]
-        for tag in contact:
-            check_supports(mesh, supports, tag, key=f"{key}.supports")
         loads = [
             Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
             for one in section.tractions
         ]
         for tag in contact:
-            check_tractions(mesh, loads, supports, tag, key=f"{key}.tractions")
+            check_supports(mesh, supports, tag, loads, key=key)
         x, y, z = map(float, frame.normal)
         order = 1 if section.element == "linear" else 2
         return MeshedBody(
