@@ -36,17 +36,23 @@ Mode = Literal["patchwise", "pointwise"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """What stands for patches on a face that is covered as a whole.
+    """What stands for patches on a face that is covered as a whole, in regions.
 
     Attributes:
+        region: Region of every facet of this rank, shape (facets,). Its facets may lie anywhere in
+            the plane.
         count: Number of regions.
-        middle: Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm].
-        lengths: Sides of the bounding rectangle [mm].
+        lengths: Sides of the bounding rectangle, which begins at the origin [mm].
     """
 
+    region: NDArray[np.intp]
     count: int
-    middle: Array
     lengths: tuple[float, float]
+
+    @property
+    def middle(self) -> Array:
+        """Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm]."""
+        return 0.5 * np.asarray(self.lengths)
 
 
 class ContactFace:
@@ -112,11 +118,9 @@ class LoadedFace(ContactFace):
             is Lagrange of degree 1 or 2.
         facets: Facets of the face, in its frame.
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
+            Or the regions of the whole face, which have a law each at their points.
         degree: Polynomial degree that the quadrature is exact for; None: that of products of two
             basis functions.
-        region: Region of every facet, on a face in regions that have a law each at its points,
-            shape (facets,); None on a face with patches. A region takes the place of a patch; its
-            facets may lie anywhere in the plane.
 
     Note:
         Everything here is collective. A rank may own no facet, or no part of a patch.
@@ -126,7 +130,6 @@ class LoadedFace(ContactFace):
     facets: ContactFacets
     patches: PatchGrid | Outline
     degree: int | None = None
-    region: NDArray[np.intp] | None = None
 
     @classmethod
     def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:
@@ -155,8 +158,7 @@ class LoadedFace(ContactFace):
             lengths: Sides of the rectangle around all of them, from the origin of the frame [mm].
         """
         region = np.repeat(np.arange(len(parts)), [len(part.cell) for part in parts])
-        outline = Outline(len(parts), 0.5 * np.asarray(lengths), lengths)
-        return cls(body, parts[0].joined(parts[1:]), outline, region=region)
+        return cls(body, parts[0].joined(parts[1:]), Outline(region, len(parts), lengths))
 
     @property
     def space(self) -> Any:
@@ -171,8 +173,7 @@ class LoadedFace(ContactFace):
     @cached_property
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank."""
-        parts = self.region if isinstance(self.patches, Outline) else self.patches
-        assert parts is not None
+        parts = self.patches.region if isinstance(self.patches, Outline) else self.patches
         return facet_quadrature(self.facets, self.space, parts, degree=self.quadrature_degree)
 
     @property
