@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -114,10 +115,10 @@ def _arrays(content: MshContent) -> MeshArrays:
 
 def _kind_of_cells(content: MshContent) -> int:
     """Return the one kind of all cells."""
-    counts: dict[int, int] = {}
+    counts = Counter[int]()
     for part in content.elements:
         if KINDS[part.kind][0] == 3 and len(part.nodes):
-            counts[part.kind] = counts.get(part.kind, 0) + len(part.nodes)
+            counts[part.kind] += len(part.nodes)
     kinds = ", ".join(f"{count} × {KINDS[kind][2]}" for kind, count in counts.items())
     if not counts:
         flat = any(KINDS[part.kind][0] == 2 for part in content.elements)

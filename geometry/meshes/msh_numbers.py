@@ -79,12 +79,8 @@ class ByteNumbers:
         row = np.dtype([(str(k), self._types[kind]) for k, kind in enumerate(kinds)])
         if rows < 0 or self.at + rows * row.itemsize > len(self._data):
             raise _too_short()
-        if len(set(kinds)) == 1:
-            flat = np.frombuffer(self._data, self._types[kinds[0]], rows * len(kinds), self.at)
-            numbers = flat.reshape(rows, len(kinds)).astype(np.float64)
-        else:
-            parts = np.frombuffer(self._data, row, rows, self.at)
-            numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
+        parts = np.frombuffer(self._data, row, rows, self.at)
+        numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
         self.at += rows * row.itemsize
         return numbers
 

@@ -162,7 +162,7 @@ def _read_entities(mesh: MshContent, numbers: Numbers, version: float, *, parts:
     counts = whole(numbers.table(1, "uuuu"))[0]
     for dimension, count in enumerate(counts):
         for _ in range(count):
-            tag = _integer(numbers)
+            tag = _count(numbers, "i")
             if parts:
                 numbers.table(1, "ii")
                 numbers.table(_count(numbers), "i")
@@ -269,9 +269,6 @@ def _kind(kind: int) -> tuple[int, int, str]:
     return KINDS[kind]
 
 
-def _count(numbers: Numbers) -> int:
-    return int(whole(numbers.table(1, "u"))[0, 0])
-
-
-def _integer(numbers: Numbers) -> int:
-    return int(whole(numbers.table(1, "i"))[0, 0])
+def _count(numbers: Numbers, kind: str = "u") -> int:
+    """Return the next number, a size unless it is said to be an int."""
+    return int(whole(numbers.table(1, kind))[0, 0])
