@@ -80,7 +80,6 @@ class AugmentedLagrangian:
     def __init__(self, face: RoughFace, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._body, self._top, self._plane = face.body, top, plane
         body, loaded = face.body, face.loaded
-        self._sampling = sampling = loaded.pointwise
         (distance,) = top.with_ghosts(plane.distance)
         self._points = points = loaded.quadrature
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
@@ -89,7 +88,7 @@ class AugmentedLagrangian:
         self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
-        self._forces = ContactForces(loaded, sampling, [self.law], none)
+        self._forces = ContactForces(loaded, loaded.pointwise, [self.law], none)
         self.equilibrium = Equilibrium(body, self._forces)
         self._preconditioner = StiffPreconditioner(
             body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree
@@ -201,11 +200,9 @@ class AugmentedLagrangian:
         return slope_search(slope_after, -float(residual.dot(step)), 1.0) is not None
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self._forces.closure(displacement), self._forces.plane.copy()
-        pressure, load = self.law.pressure(closure), displacement.duplicate()
-        samples = self._sampling.operator.createVecRight()
-        samples.array[:] = pressure
-        self._sampling.operator.mult(samples, load)
+        load, forces = displacement.duplicate(), self._forces
+        forces.write(displacement, load)
+        pressure, plane = self.law.pressure(forces.closure(displacement)), forces.plane.copy()
         nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.interference(plane, -displacement.array_r[self._top.dofs])
         comm = self._body.comm
