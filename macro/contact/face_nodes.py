@@ -188,13 +188,12 @@ class TopNodes:
     def _shares(self) -> csr_array:
         """Share of every node of this rank that belongs to every patch, shape (n, N)."""
         # four points around each node, of which two or four may lie in other patches
-        slack, count = 1e-9 * max(self.patches.lengths), len(self.x)
-        x = np.concatenate([self.x - slack, self.x - slack, self.x + slack, self.x + slack])
-        y = np.concatenate([self.y - slack, self.y + slack, self.y - slack, self.y + slack])
-        across, along = self.patches.borders_x, self.patches.borders_y
-        inside = (x > across[0]) & (x < across[-1]) & (y > along[0]) & (y < along[-1])
+        steps = 1e-9 * max(self.patches.lengths) * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
+        around = (np.column_stack([self.x, self.y]) + steps[:, None]).reshape(-1, 2)
+        count, lower = len(self.x), np.array(self.patches.origin)
+        inside = np.all((around > lower) & (around < lower + self.patches.lengths), axis=1)
         rows = np.tile(np.arange(count), 4)[inside]
-        columns = self.patches.index_of(x[inside], y[inside])
+        columns = self.patches.index_of(*around[inside].T)
         entries = 1.0 / np.bincount(rows, minlength=count)[rows]
         return coo_array((entries, (rows, columns)), shape=(count, self.patches.count)).tocsr()
 
