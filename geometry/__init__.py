@@ -10,8 +10,12 @@ from geometry.facing import facing, laid_on, mirrored, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
-from geometry.meshes.expected_contact import places_in_reach
-from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
+from geometry.meshes.families import (
+    characteristic_size,
+    places_in_reach,
+    reference_shapes,
+    suggested_fine,
+)
 from geometry.meshes.refined_block import RefinedShape
 from geometry.patches import PatchGrid, Regions, overlaps, patch_means
 from geometry.preparation import Crop, Filter, Preparation

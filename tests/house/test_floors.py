@@ -43,10 +43,10 @@ FLOORS = {
     "macro": [
         "form_cache",
         "compat",
-        "elasticity mesh",
+        "mesh",
         "linear_solvers",
         "elastic_body",
-        "bodies body_pair",
+        "bodies",
         "contact",
         "compliance fields",
     ],
