@@ -194,10 +194,10 @@ class FaceTerms(ABC):
         if self.side_term is not None:
             half_space += self.side_term.patch_compliance(patches) / modulus
             # of 16 × 16 patches the one in the corner is 0.3 % off with 8 modes, < 0.1 % with 12
-            count = max(count, min(max(patches.shape), 12))
+            count = max(count, min(max(patches.grid), 12))
         else:
             # of 4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 %
-            count = max(count, min(2 * max(patches.shape), 32))
+            count = max(count, min(2 * max(patches.grid), 32))
         correction = self.term(self.face(comm, modes=count))
         return np.asarray(half_space + correction.patch_compliance(patches))
 

@@ -9,8 +9,6 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
-import numpy as np
-
 from geometry import BlockShape, InputError, Material, PatchGrid, Surface
 from geometry.face_frame import FaceFrame
 from geometry.meshes.block import BlockMeshing
@@ -177,12 +175,8 @@ class SceneBody:
         Args:
             place: The point in the present coordinates [mm].
         """
-        frame = self.frame.moved(*place)
-        facets = tuple(
-            replace(part, frame=frame, corners=part.corners - np.asarray(place))
-            for part in self.facets
-        )
-        return replace(self, frame=frame, facets=facets)
+        facets = tuple(part.moved(*place) for part in self.facets)
+        return replace(self, frame=self.frame.moved(*place), facets=facets)
 
     def check_covers(self, lengths: tuple[float, float]) -> None:
         """Refuse a surface that does not lie on the contact face of the placed body.

@@ -84,15 +84,13 @@ class EmbeddedLaws(LawSolver):
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
-        from macro import AtPoints
-
         of_patches = isinstance(self.table.patches, PatchGrid)
 
         def pressures(number: int, counter: bool) -> Any:
             shown = states[number][1]
             if of_patches:
                 return shown
-            return None if counter else AtPoints(shown)
+            return None if counter else shown
 
         moved = {number: state[0] for number, state in states.items()}
         write_displaced(path, self.face, moved, pressures)
