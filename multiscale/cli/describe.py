@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
 from multiscale.couplings import describe
-from multiscale.couplings.cost import cost_statements
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
@@ -49,7 +48,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     memory, ranks = peak_memory(), 1 if comm is None else comm.size
     load_finite_elements(scene, comm)
     coupling = _coupling(scene, comm)
-    cost = on_root_alone(comm, lambda: list(cost_statements(coupling, memory, ranks)))
+    cost = on_root_alone(comm, lambda: list(coupling.cost_statements(memory, ranks)))
     shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
     terminal.show_plan(comm, coupling, cost, shortages)
 

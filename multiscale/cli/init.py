@@ -16,7 +16,7 @@ from multiscale.cli.new_scene import (
     scene_text,
     sensible_force,
 )
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import block_section
 from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import refuse_detached_processes
 from multiscale.output import terminal

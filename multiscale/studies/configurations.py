@@ -18,7 +18,7 @@ from typing import Any, TypeAlias, cast
 from geometry.meshes.families import suggested_fine
 from micro import MODELS
 from multiscale.couplings.coupling import Coupling
-from multiscale.inputs.block import LAW_BLOCK_CELLS, block_section
+from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from multiscale.inputs.loads import load_history_on, patch_grid
 from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.surfaces import make_surface

@@ -42,7 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import interval_overlaps
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import block_section
 from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid, times
 from multiscale.studies.running import CaseResult
 

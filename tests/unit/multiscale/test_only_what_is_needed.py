@@ -16,7 +16,6 @@ from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
-from multiscale.couplings.cost import cost_statements
 from multiscale.output.results import write_results
 from multiscale.results.contact_record import ContactRecord
 
@@ -116,11 +115,11 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     if kind != "isolated" or load == "approach":
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("multiscale.bodies.bodies.Bodies.contact_face", never)
-    monkeypatch.setattr("multiscale.bodies.block.BlockTerms.face", never)
+    monkeypatch.setattr("multiscale.bodies.face_terms.BlockTerms.face", never)
     monkeypatch.setattr("multiscale.couplings.micro_coupling.on_body", never)
     monkeypatch.setattr("multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
-    said = dict(setup.statements(cost_statements(setup, 1e8, 1)))
+    said = dict(setup.statements(setup.cost_statements(1e8, 1)))
     assert {"work", "cost", "load", "coupling", "contact"} <= set(said)
     assert all(isinstance(text, str) for text in setup.warnings())
 

@@ -10,10 +10,10 @@ from dataclasses import replace
 import pytest
 
 from multiscale import Run, Scene, make_setup
-from multiscale.auto import mesh_search, search
+from multiscale.auto import search
 from multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
-from multiscale.couplings import work
-from multiscale.couplings.work import SOLUTIONS_OF_LAWS
+from multiscale.couplings import cost
+from multiscale.couplings.cost import SOLUTIONS_OF_LAWS
 from multiscale.machine import ClusterNodes
 from multiscale.output import terminal
 from multiscale.output.provenance import provenance
@@ -214,8 +214,8 @@ def test_a_choice_does_not_know_how_fast_the_machine_is(monkeypatch, speed, thre
     for name in ("perf_counter", "monotonic", "process_time", "time"):
         clock = getattr(time, name)
         monkeypatch.setattr(time, name, lambda clock=clock: clock() * speed)
-    for rate in ("CELL_PRODUCTS", "UNKNOWN_CYCLES"):
-        monkeypatch.setattr(work, rate, speed * getattr(work, rate))
+    for rate in ("_CELL_PRODUCTS", "_UNKNOWN_CYCLES"):
+        monkeypatch.setattr(cost, rate, speed * getattr(cost, rate))
     monkeypatch.setenv("OMP_NUM_THREADS", threads)
     for many in (2, 200):
         given = scene(load={"steps": many})
@@ -244,7 +244,7 @@ def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
 
 
 def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
-    monkeypatch.setattr(mesh_search, "_MOST_UNKNOWNS", 1000)
+    monkeypatch.setattr(search, "_MOST_UNKNOWNS", 1000)
     monkeypatch.setattr(search, "_TRIALS", 1)
     setup = make_setup(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"

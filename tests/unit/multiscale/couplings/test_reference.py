@@ -276,7 +276,7 @@ def test_tetrahedra_are_small_where_contact_can_occur():
     statements = dict(setup.statements())
     assert "tetrahedra (P2)" in statements["block"]
     assert "across a typical contact" in statements["block"]
-    assert not hasattr(setup, "micro")
+    assert setup.micro is None
 
 
 def test_the_blocks_cells_are_not_the_references():

@@ -7,8 +7,7 @@ import pytest
 
 from geometry import InputError
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.couplings.estimate import plane_at_largest_load
+from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
