@@ -213,16 +213,16 @@ class ContactPreconditioner:
         if body is None:
             return
         comm = self._face.comm
-        if self._slope is not None:
-            both = (np.abs(slope - self._slope).max(initial=0.0), slope.max(initial=0.0))
-            change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
-            if change <= _MOVED * largest:
-                return
+        known = np.zeros_like(slope) if self._slope is None else self._slope
+        both = (np.abs(slope - known).max(initial=0.0), slope.max(initial=0.0))
+        change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
+        if change <= _MOVED * largest:
+            return
         self._slope = slope.copy()
         if self._with_laws is not None:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
-        if self._largest(slope) > _STIFF:
+        if largest:
             springs = springs_at(self._face.points_by_dofs, slope)
             self._stiffened = Stiffened(body.stiffness, springs)
             self._with_laws = body.solver_of(self._stiffened)
