@@ -60,12 +60,21 @@ class DisplacementBasis:
         self._comm = equilibrium.body.comm
         self.vectors: list[Array] = []
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
+        self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
 
     def __len__(self) -> int:
         return len(self.vectors)
 
-    def add(self, displacement: PETSc.Vec) -> None:
-        """Add the part of a displacement that is new to the basis; collective."""
+    def add(self, displacement: PETSc.Vec, pressure: Array) -> None:
+        """Add the part of a displacement that is new to the basis.
+
+        Args:
+            displacement: The displacement [mm].
+            pressure: Pressures of this rank's samples that it follows from, shape (n,) [MPa].
+
+        Note:
+            Collective.
+        """
         stiffness = self._equilibrium.body.stiffness
         work, force = displacement.copy(), displacement.duplicate()
         vector, before = work.array, 0.0
@@ -75,6 +84,7 @@ class DisplacementBasis:
             shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
             for share, each in zip(shares, self.vectors, strict=True):
                 vector -= share * each
+            pressure = pressure - shares @ self._pressures
         stiffness.mult(work, force)
         square = self._sum(vector @ force.array_r)
         if not square > _ROUNDING**2 * before:
@@ -85,11 +95,15 @@ class DisplacementBasis:
         first = max(0, len(self) + 1 - self._size)
         self.vectors = [*self.vectors, vector.copy()][first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
+        self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
 
-    def write_guess(self, into: PETSc.Vec) -> None:
+    def write_guess(self, into: PETSc.Vec) -> Array:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
         It solves y = Wᵀ B p(closure(W y)) by damped Newton steps, which need not converge.
+
+        Returns:
+            The pressures of this rank's samples that the guess follows from, shape (n,) [MPa].
         """
         y = np.zeros(len(self))
         value, slope = self._projected(y)
@@ -109,6 +123,7 @@ class DisplacementBasis:
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
+        return np.asarray(y @ self._pressures)
 
     def _projected(self, y: Array) -> tuple[Array, Array]:
         """Return the equilibrium's residual and tangent in the basis."""

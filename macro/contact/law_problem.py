@@ -19,6 +19,7 @@ from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.equations import Equilibrium
 from macro.contact.face_contact_state import FaceContactState
+from macro.contact.first_steps import FirstSteps
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
 from macro.contact.newton import Newton
@@ -28,6 +29,10 @@ from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
+
+
+_ROUGHLY = 1e-3
+"""Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
 
 class LawContactProblem:
@@ -78,6 +83,8 @@ class LawContactProblem:
             self.equilibrium, face if mode == "pointwise" else None, body.solver
         )
         self.newton = Newton(self.equilibrium, self._preconditioner)
+        update = self._preconditioner.update
+        self._first_steps = FirstSteps(self.equilibrium, sampling, update)
         condensed = " or, on a very soft body, coupling.newton = 'condensed'"
         steps = "take more load steps (load.steps)"
         self._remedies = {"": steps + condensed if mode == "patchwise" else steps}
@@ -100,39 +107,49 @@ class LawContactProblem:
         """
         equilibrium = self.equilibrium
         self.forces.prescribe(control, self._plane)
+        started = 0 if len(self.basis) else self.start_from(np.ones(self._face.patches.count), _ROUGHLY)
         solution = equilibrium.body.stiffness.createVecRight()
-        self.basis.write_guess(solution)
+        pressure = self.basis.write_guess(solution)
+        residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, pressure)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
-        self.basis.add(solution)
         self._closure, body = self.forces.closure(solution), equilibrium.body
+        self.basis.add(solution, self.forces.pressure(self._closure))
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
             displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
             reaction=body.reaction(solution),
-            iterations=report.iterations,
-            linear_iterations=report.linear_iterations,
-            residuals=report.residuals,
+            iterations=len(residuals) + report.iterations,
+            linear_iterations=started + spent + report.linear_iterations,
+            residuals=np.concatenate([residuals, report.residuals]),
             reason=report.reason,
         )
         compat.collect_garbage(solution.comm)
         return state
 
-    def start_from(self, pressure: Array) -> None:
+    def start_from(self, pressure: Array, tolerance: float | None = None) -> int:
         """Add the displacements by mean pressures of the patches to the initial guesses.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
+            tolerance: Largest relative residual of the displacements; None: the linear solver's.
+
+        Returns:
+            The iterations of its linear solve.
 
         Note:
-            Collective; one linear solve.
+            Collective.
         """
         if not pressure.any():
-            return
-        body = self.equilibrium.body
-        displacement = body.stiffness.createVecRight()
-        solve_linear(body.solver, self._face.load(pressure), displacement)
-        self.basis.add(displacement)
+            return 0
+        body, sampling = self.equilibrium.body, self._sampling
+        samples, load = sampling.values, body.stiffness.createVecLeft()
+        samples.array[:] = pressure[sampling.patch]
+        sampling.operator.mult(samples, load)
+        displacement = load.duplicate()
+        iterations = solve_linear(body.solver, load, displacement, tolerance=tolerance)
+        self.basis.add(displacement, pressure[sampling.patch])
+        return iterations
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.
@@ -170,9 +187,6 @@ class LawContactProblem:
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
 
-_STIFF = 1.0
-"""Stiffness of laws over that of the elements, at the node where it is largest, from which on the
-preconditioner has it."""
 _MOVED = 0.5
 """Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
 """

@@ -142,13 +142,16 @@ def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
     return copy
 
 
-def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:
+def solve_linear(
+    solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec, *, tolerance: float | None = None
+) -> int:
     """Solve and return the number of iterations.
 
     Args:
         solver: The solver.
         load: Right-hand side.
         solution: Receives the solution.
+        tolerance: Largest residual relative to the load, if that is more than the solver's own.
 
     Raises:
         NotConverged: With the name of PETSc's reason.
@@ -156,7 +159,10 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
     Note:
         Collective.
     """
+    own = solver.getTolerances()[0]
+    solver.setTolerances(rtol=max(own, tolerance or 0.0))
     solver.solve(load, solution)
+    solver.setTolerances(rtol=own)
     if solver.reason < 0:
         raise NotConverged(
             "the linear solve of the block",

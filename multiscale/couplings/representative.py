@@ -229,11 +229,9 @@ class RepresentativeCoupling(LawCoupling):
         return self._solver_on(self.bodies.contact_face(), table)
 
     def _solver_on(self, face: LoadedFace | FacePair, table: LawTable) -> EmbeddedLaws:
-        from macro import FacePair, LawContactProblem
+        from macro import LawContactProblem
 
         problem = LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
-        if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
-            problem.start_from(np.ones(face.patches.count))
         return EmbeddedLaws(problem, table, face)
 
     def _crown(self) -> Callable[[Array, Array], Array] | None:
