@@ -107,10 +107,9 @@ class LawContactProblem:
         """
         equilibrium = self.equilibrium
         self.forces.prescribe(control, self._plane)
-        started = 0 if len(self.basis) else self.start_from(np.ones(self._face.patches.count), _ROUGHLY)
+        started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
-        pressure = self.basis.write_guess(solution)
-        residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, pressure)
+        residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self._closure, body = self.forces.closure(solution), equilibrium.body
         self.basis.add(solution, self.forces.pressure(self._closure))
@@ -127,29 +126,36 @@ class LawContactProblem:
         compat.collect_garbage(solution.comm)
         return state
 
-    def start_from(self, pressure: Array, tolerance: float | None = None) -> int:
-        """Add the displacements by mean pressures of the patches to the initial guesses.
+    def start_from(self, pressure: Array) -> None:
+        """Take the displacements by mean pressures of the patches for the latest solution.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
-            tolerance: Largest relative residual of the displacements; None: the linear solver's.
-
-        Returns:
-            The iterations of its linear solve.
 
         Note:
-            Collective.
+            Collective; one linear solve.
         """
-        if not pressure.any():
-            return 0
-        body, sampling = self.equilibrium.body, self._sampling
-        samples, load = sampling.values, body.stiffness.createVecLeft()
-        samples.array[:] = pressure[sampling.patch]
-        sampling.operator.mult(samples, load)
-        displacement = load.duplicate()
-        iterations = solve_linear(body.solver, load, displacement, tolerance=tolerance)
-        self.basis.add(displacement, pressure[sampling.patch])
+        if pressure.any():
+            samples = pressure[self._sampling.patch]
+            self.basis.add(self._displacement(samples)[0], samples)
+
+    def _start(self) -> int:
+        """Add the displacement by a uniform pressure to the basis, and return the iterations."""
+        samples = np.ones(len(self._sampling.weight))
+        displacement, iterations = self._displacement(samples, _ROUGHLY)
+        self.basis.add(displacement, samples, solved=False)
         return iterations
+
+    def _displacement(
+        self, pressure: Array, tolerance: float | None = None
+    ) -> tuple[PETSc.Vec, int]:
+        """Solve for the displacement by pressures of this rank's samples."""
+        body, sampling = self.equilibrium.body, self._sampling
+        load = body.stiffness.createVecLeft()
+        sampling.values.array[:] = pressure
+        sampling.operator.mult(sampling.values, load)
+        displacement = load.duplicate()
+        return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.
