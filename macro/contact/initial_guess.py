@@ -123,7 +123,8 @@ class DisplacementBasis:
         Returns:
             The lines of the next step from there.
         """
-        forces, stiffness, y = self._equilibrium.forces, self.stiffness, self._last
+        forces, stiffness = self._equilibrium.forces, self.stiffness
+        y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
         pressure = y @ self._pressures
         closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
         lines = law_lines(forces, closure, pressure, stiffness)

@@ -145,7 +145,8 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
             springs, finest = stiffened.springs, (stiffened.product, stiffened.diagonal_blocks())
         grid = vertex_grid(body.space, body.linear, body.free, springs)
         solver = linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
-        solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
+        if not PETSc.Options(PREFIX).hasName("mg_coarse_pc_type"):
+            solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
     whole = None if stiffened is None else stiffened.assembled()
     solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)

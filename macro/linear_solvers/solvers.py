@@ -53,6 +53,12 @@ class LinearSolver(PETSc.KSP):
 
     modes: NDArray[np.float64] | None = None
     _balanced: Any = None
+    _inner: PETSc.PC | None = None
+
+    @property
+    def method(self) -> str:
+        """PETSc's name of the preconditioner, that beside slow modes included."""
+        return str((self._inner or self.pc).getType())
 
     def solve_slow_modes(
         self,
@@ -75,6 +81,7 @@ class LinearSolver(PETSc.KSP):
         if not self.modes.shape[1]:
             return
         self._balanced = Balanced(matrix, inner, self.modes)
+        self._inner = inner if grid is self else None
         outer = PETSc.PC().create(self.comm)
         outer.setOperators(*grid.getOperators())
         outer.setType("python")
