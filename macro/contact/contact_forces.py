@@ -167,7 +167,9 @@ class ContactForces:
         missing -= levers.loads(weight * pressure(closure))
         unit = levers.unit[free]
         resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
-        scaled = np.linalg.lstsq(resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED)
+        scaled = np.linalg.lstsq(
+            resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED
+        )
         self.plane = self.plane.copy()
         self.plane[free] += unit * scaled[0]
         return levers.matrix @ self.plane - self._gap - displacement

@@ -40,8 +40,9 @@ class LawContactProblem:
 
     Each load step prescribes the plane's approach or force, and its tilt or zero moment. All take
     the same Newton's method in the displacements, and about as many linear solves. The tangent is
-    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the body
-    alone, which is made once. The initial guess is the best combination of earlier solutions.
+    the exact derivative, and conjugate gradients are preconditioned by the body's multigrid. The
+    initial guess is the best combination of earlier solutions; far from the equilibrium
+    `FirstSteps` come before Newton's method.
 
     Args:
         face: Patches on the contact face of an elastic body.
@@ -199,13 +200,13 @@ _MOVED = 0.5
 
 
 class ContactPreconditioner:
-    """The preconditioner of a body's tangents: with the stiffness of the laws where that matters.
+    """The preconditioner of a body's tangents, with the stiffness of laws at points.
 
-    The preconditioner of the body alone serves every tangent as long as the laws are softer than
-    the elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of:
-    iterations grow to ten times as many and more. Laws at points couple no other nodes than the
-    elements do, so that their stiffness fits into the matrix, and multigrid is set up with it. On
-    quadratic elements that takes no second matrix: only the coarser grid has the sum's entries.
+    Laws hold the nodes of the face, which the preconditioner of the body alone knows nothing of:
+    iterations grow with the root of the laws' stiffness over the elements'. Laws at points couple
+    no other nodes than the elements do, so that their stiffness fits into the matrix, and multigrid
+    is set up with it. On quadratic elements that takes no second matrix: only the coarser grid has
+    the sum's entries.
 
     Args:
         equilibrium: The equations.
@@ -228,7 +229,7 @@ class ContactPreconditioner:
         self._slope: Array | None = None
 
     def update(self) -> None:
-        """Follow the tangent, where the laws are stiff."""
+        """Follow the tangent."""
         body, slope = self._body, self._equilibrium.forces.slope
         if body is None:
             return
@@ -251,14 +252,3 @@ class ContactPreconditioner:
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x; PETSc calls this."""
         (self._with_laws or self._alone).pc.apply(x, y)
-
-    def _largest(self, slope: Array) -> float:
-        """Return the largest ratio of the laws' to the body's stiffness at an unknown."""
-        own = self._equilibrium.body.stiffness.getDiagonal()
-        starts, columns, entries = self._face.points_by_dofs.getValuesCSR()
-        springs = own.duplicate()
-        springs.set(0.0)
-        springs.setValues(columns, np.repeat(slope, np.diff(starts)) * entries**2, addv=True)
-        springs.assemble()
-        springs.pointwiseDivide(springs, own)
-        return float(springs.max()[1])

@@ -47,7 +47,8 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
         Collective.
     """
     residual, step = matrix.createVecs()
-    residual.array[:] = np.random.default_rng(matrix.comm.rank).standard_normal(residual.local_size)
+    rng = np.random.default_rng(matrix.comm.rank)
+    residual.array[:] = rng.standard_normal(residual.local_size)
     corrected, product = residual.duplicate(), residual.duplicate()
     preconditioner.apply(residual, corrected)
     corrected.copy(step)

@@ -1,10 +1,10 @@
 """Newton steps and linear iterations of bodies under laws: parts, laws, controls.
 
-Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]`, also under
-mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as those of
-rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face (mixed).
-Every line is one load: in a single step, and along a path of four steps. ``K`` counts the iterations
-to 1e-8 of the body without laws.
+Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]`, also
+under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as those
+of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
+(mixed). Every line is one load: in a single step, and along a path of four steps. ``K`` counts the
+iterations to 1e-8 of the body without laws.
 """
 
 import os
@@ -77,7 +77,11 @@ def rows(face):
         if state is not None:
             at = state.approach
             loads = [Control(approach=at * k / 4) for k in (1, 2, 3, 4)]
-            yield f"{name}, approach", pressed(face, laws, loads[3:])[0], pressed(face, laws, loads)[0]
+            yield (
+                f"{name}, approach",
+                pressed(face, laws, loads[3:])[0],
+                pressed(face, laws, loads)[0],
+            )
 
 
 def main():
