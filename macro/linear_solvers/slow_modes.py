@@ -30,7 +30,7 @@ _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
 _SAME = 1e-8
-"""Share of a mode's energy below which it is another mode's copy, by rounding in Lanczos' method."""
+"""Share of a mode's energy below which it is a copy of another one, by rounding."""
 
 
 def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
