@@ -224,12 +224,9 @@ class RepresentativeCoupling(LawCoupling):
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
-        from macro import FacePair, LawContactProblem
+        from macro import LawContactProblem
 
-        problem = LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
-        if not isinstance(face, FacePair):  # such laws are steep: 3 steps of Newton instead of 11
-            problem.start_from(np.ones(face.patches.count))
-        return problem
+        return LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""

@@ -131,8 +131,7 @@ class EmbeddedLaws(LawSolver):
         """
         if state is not None:
             approach, tilt, pressure = state
-            if isinstance(self.table.patches, PatchGrid) or not hasattr(self.face.body, "counter"):
-                self._problem.start_from(pressure)
+            self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
