@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import BivariateSpline
 
 Array = NDArray[np.float64]
 
@@ -29,9 +31,9 @@ class BlockedSpline:
         blocks: Parts of the spline that were needed so far, by their numbers along x and y.
     """
 
-    def __init__(self, spline: BivariateSpline) -> None:
+    def __init__(self, spline: Any) -> None:
         self._spline = spline
-        self.blocks: dict[tuple[int, int], BivariateSpline] = {}
+        self.blocks: dict[tuple[int, int], Any] = {}
 
     def __call__(self, x: ArrayLike, y: ArrayLike, *, grid: bool = True) -> Array:
         """Evaluate the spline, see `scipy.interpolate.BivariateSpline`.
@@ -57,7 +59,7 @@ class BlockedSpline:
             values[members] = block(px.ravel()[members], py.ravel()[members], grid=False)
         return values.reshape(px.shape)
 
-    def _block(self, i: int, j: int) -> BivariateSpline:
+    def _block(self, i: int, j: int) -> Any:
         """Return the part of the spline on one block, made once."""
         if (i, j) not in self.blocks:
             knots, parts, counts = [], [], []
@@ -69,7 +71,7 @@ class BlockedSpline:
                 knots.append(t[first : last + k + 1])
                 parts.append(slice(first, last))
             coefficients = self._spline.get_coeffs().reshape(counts)[tuple(parts)].ravel()
-            self.blocks[i, j] = BivariateSpline._from_tck(
+            self.blocks[i, j] = scipy.interpolate.BivariateSpline._from_tck(
                 (*knots, coefficients, *self._spline.degrees)
             )
         return self.blocks[i, j]

@@ -6,9 +6,8 @@ import copy
 from typing import Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RectBivariateSpline
-from scipy.optimize import minimize
 
 from geometry.blocked_spline import BlockedSpline
 from support.errors import InputError
@@ -54,7 +53,7 @@ class Interpolant:
             places.append((np.arange(-padding, count + padding) + 0.5) * step)
             if not periodic:
                 places[-1][[0, -1]] = 0.0, length
-        self._spline = RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
+        self._spline = scipy.interpolate.RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
         self._derivatives: dict[tuple[int, int], BlockedSpline] = {}
 
     def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
@@ -195,7 +194,7 @@ class Interpolant:
         low, high = np.transpose([self._box(axis) for axis in range(2)])
         limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
         options = {"ftol": 1e-16, "gtol": 1e-12}
-        top = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
+        top = scipy.optimize.minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + top.x * (dx, dy), low, high)
         return float(px), float(py), float(value(px, py, grid=False))
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import Akima1DInterpolator, RectBivariateSpline
 
 from geometry.interpolant import bordered
 from geometry.surface import Surface
@@ -129,14 +129,14 @@ def _error_of_top(surface: Surface) -> float:
         (rows, columns), (u, v), (x, y) = zip(*axes, strict=True)
         window = samples[np.ix_(rows, columns)] - surface.highest
         degrees = {"kx": min(5, len(u) - 1), "ky": min(5, len(v) - 1)}
-        quintic = RectBivariateSpline(u, v, window, s=0, **degrees)(x, y)
+        quintic = scipy.interpolate.RectBivariateSpline(u, v, window, s=0, **degrees)(x, y)
         if not surface.periodic:
             (ins, u, x), (within, v, y) = (
                 _without_border(surface, axis, one) for axis, one in enumerate(axes)
             )
             window = window[np.ix_(ins, within)]
-        lines = Akima1DInterpolator(u, window)(x)
-        local = Akima1DInterpolator(v, lines, axis=1)(y)
+        lines = scipy.interpolate.Akima1DInterpolator(u, window)(x)
+        local = scipy.interpolate.Akima1DInterpolator(v, lines, axis=1)(y)
         tops.append((float(quintic.max()), float(local.max())))
     quintic, akima = np.max(tops, axis=0)
     return float(max(_HIGHER_ORDER * abs(quintic), abs(akima)))

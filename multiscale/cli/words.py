@@ -175,8 +175,8 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     tabulate.add_argument("--export", action="append", help=forms, **choices)
     surface = "Describe and draw the surface of a scene."
     _add_scene(command("surface", "describe.describe_surface", surface))
-    command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
-    keys = command("help", "describe.explain_keys", "Explain the sections and keys of a scene.")
+    command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")
+    keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
     topic = "a section or a key, such as load or load.force; all sections by default"
     keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."

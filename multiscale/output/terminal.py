@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
 from multiscale.machine import cores_statement, peak_memory
 from multiscale.readable import Caution, Observer, duration, quantity
-from multiscale.results.history import History
 from support.errors import PatchlawError
+
+if TYPE_CHECKING:
+    from multiscale.couplings.coupling import Coupling
+    from multiscale.loading.load_history import LoadHistory
+    from multiscale.loading.load_step import LoadStep
+    from multiscale.results.history import History
 
 MOST_ROWS = 60
 """Load steps that are printed; the files hold all of them."""
