@@ -16,7 +16,9 @@ from micro.boundary_elements.finite_slopes import coarse_grid as coarse_grid
 from micro.boundary_elements.free_sides import FreeSides as FreeSides
 from micro.boundary_elements.rectangle_fields import RectangleFields as RectangleFields
 from micro.boundary_elements.rectangle_modes import half_space_modes as half_space_modes
-from micro.boundary_elements.rectangle_modes import half_space_stress_modes as half_space_stress_modes
+from micro.boundary_elements.rectangle_modes import (
+    half_space_stress_modes as half_space_stress_modes,
+)
 from micro.boundary_elements.rectangle_modes import side_modes as side_modes
 from micro.boundary_elements.rectangle_modes import side_stress_modes as side_stress_modes
 from micro.boundary_elements.side_cells import SideStresses as SideStresses

@@ -12,8 +12,9 @@ from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
+from multiscale.figures.files import Drawing, file_kinds, pictures_of, write_pictures
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures, write_records
+from multiscale.output.results import write_records
 from multiscale.restart.results_folder import locked
 from multiscale.studies.cases import Case, sweep_cases, values_from_text
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
@@ -57,7 +58,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
                     ended(f"case {case.number}: {result.failure}")
 
             done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = on_root(comm, lambda: _write(folder, done, figures=bool(scene.output.figures)))
+        files = on_root(comm, lambda: _write(folder, done, scene.output.figures))
     for text in _summary(done):
         terminal.say(comm, text)
     terminal.show_files(comm, files)
@@ -88,7 +89,7 @@ def _remove_results(folder: Path) -> None:
         remove(path)
 
 
-def _write(folder: Path, done: SweepResults, *, figures: bool) -> list[Path]:
+def _write(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
     """Write the tables and the figure of the cases that are done."""
     statistics = done.statistics_records() if _statistics(done) else []
     files = [
@@ -100,7 +101,8 @@ def _write(folder: Path, done: SweepResults, *, figures: bool) -> list[Path]:
         )
     ]
     if figures and statistics:
-        pictures = pictures_of("sweep", done.plot)
+        drawing = Drawing("sweep", "studies.figures.sweep_figure", (done,), file_kinds(figures))
+        pictures = pictures_of(drawing)
         if pictures.problem:
             terminal.say(None, pictures.problem)
         files += write_pictures(folder, pictures.files)

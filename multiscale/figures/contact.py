@@ -15,12 +15,11 @@ from geometry.surface import Surface
 from multiscale.figures.maps import coarsened, colour_bar, draw_face, draw_pressures, map_axes
 from multiscale.figures.style import (
     BLUE,
-    FULL_WIDTH,
     GAPS,
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
-    new_figure,
+    panels,
     styled,
 )
 from multiscale.figures.surface import draw_surface
@@ -54,14 +53,17 @@ def contact_figure(record: Any) -> Figure:
         record: A `multiscale.results.contact_record.ContactRecord`.
     """
     fields = record.pressure_MPa is not None
-    figure = new_figure(FULL_WIDTH, 5.4 if fields else 2.9)
-    panels = figure.subplots(2 if fields else 1, 2).ravel()
-    draw_contact(panels[0], record)
-    if fields:
-        _draw_gaps(panels[1], record)
-        _draw_shares(panels[3], record)
-    _draw_sizes(panels[2 if fields else 1], record)
-    figure.suptitle(record_text(record))
+    if not fields:
+        figure, (spots, sizes) = panels(1, 2, 2.9, bars=[0], title=record_text(record))
+        draw_contact(spots, record)
+    else:
+        figure, (pressures, gaps, sizes, shares) = panels(
+            2, 2, 5.4, bars=[0, 1], title=record_text(record)
+        )
+        draw_contact(pressures, record)
+        _draw_gaps(gaps, record)
+        _draw_shares(shares, record)
+    _draw_sizes(sizes, record)
     return figure
 
 
@@ -176,8 +178,7 @@ def pressure_figure(history: Any) -> Figure:
     Args:
         history: A `multiscale.results.history.History`.
     """
-    figure = new_figure(ONE_COLUMN, 2.9)
-    axes = figure.add_subplot()
+    figure, (axes,) = panels(1, 1, 2.9, width=ONE_COLUMN, bars=[0])
     last = history.steps[-1]
     draw_pressures(axes, history.patches, last.patches.pressure_MPa)
     bar = f" ({history.reference.label})" if history.reference else ""
@@ -197,8 +198,7 @@ def overview_figure(
         history: A `multiscale.results.history.History`.
         face: Pressures on a face with laws of samples, see `face_figure`; None without.
     """
-    figure = new_figure(FULL_WIDTH, 2.8)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = panels(1, 2, 2.8, bars=[0, 1])
     draw_surface(left, surface, None)
     left.set_title("surface" + " of a sample" * is_sample)
     record, last = history.contact, history.steps[-1]
@@ -223,8 +223,7 @@ def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
         step: The load step.
     """
-    figure = new_figure(FULL_WIDTH, 4.2)
-    axes = figure.add_subplot()
+    figure, (axes,) = panels(1, 1, 4.2, bars=[0])
     draw_face(axes, points)
     mean = quantity(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")

@@ -18,12 +18,11 @@ from geometry.synthesis import random_waves
 from multiscale.figures.maps import coarsened, colour_bar, draw_patch_borders, map_axes
 from multiscale.figures.style import (
     BLUE,
-    FULL_WIDTH,
     GREY,
     HEIGHTS,
     INK,
     VERMILLION,
-    new_figure,
+    panels,
     styled,
 )
 from multiscale.readable import quantity, usual_unit
@@ -55,8 +54,7 @@ def surface_figure(
         patches: The partition of the interface.
         target: The spectrum that the surface was synthesised from; None for another surface.
     """
-    figure = new_figure(FULL_WIDTH, 5.4)
-    (map_, heights), (spectrum, bearing) = figure.subplots(2, 2)
+    figure, (map_, heights, spectrum, bearing) = panels(2, 2, 5.4, bars=[0], below=0.6)
     draw_surface(map_, surface, asperities, patches)
     draw_heights(heights, surface)
     draw_spectrum(spectrum, surface, target)
@@ -104,7 +102,10 @@ def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
             place = scale * x[chosen], scale * y[chosen]
             axes.plot(*place, ls="none", label=label, clip_on=False, **look)
     if highest.size or edge.size:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncol=2, handletextpad=0.2)
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=3.8, ncol=2,
+            handletextpad=0.2,
+        )  # fmt: skip
     if len(highest) < len(asperities):
         return f"the {len(highest)} highest of {len(asperities):,} summits".replace(",", " ")
     return f"{len(asperities)} summits"
@@ -120,7 +121,8 @@ def draw_heights(axes: Any, surface: Surface) -> None:
     unit, centred = _centred(surface)
     heights, rough = centred.ravel(), roughness(surface)
     sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
-    axes.hist(heights, bins, density=True, color=BLUE, alpha=0.55, label="heights")
+    shares, edges = np.histogram(heights, bins, density=True)
+    axes.stairs(shares, edges, fill=True, color=BLUE, alpha=0.55, label="heights")
     if sq > 0.0:
         h = np.linspace(float(heights.min()), float(heights.max()), 200)
         normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)

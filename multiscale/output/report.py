@@ -39,7 +39,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
 
     Args:
         run: The run, finished or stopped.
-        pictures: Files of the figures by name, see `multiscale.output.results.pictures_of`.
+        pictures: Files of the figures by name, see `multiscale.figures.files.pictures_of`.
         options: PETSc options given by the user.
     """
     history, coupling = run.history(), run.coupling

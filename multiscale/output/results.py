@@ -3,35 +3,28 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from importlib import import_module
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.laws.law_file import hdf5_bytes, write_laws
+from multiscale.figures.files import write_pictures
+from multiscale.laws.law_file import write_laws
+from multiscale.output.pictures import NAMES, RunFigures
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from support.collective import on_root, shared
-from support.errors import NotInstalled
-from support.packages import optional_packages
+from support.checked_store import hdf5_bytes
+from support.collective import on_root
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "fields.xdmf", "fields.h5", "fields.bp",
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
-    *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")),
+    *(f"{name}.{kind}" for name in NAMES for kind in ("png", "svg")),
 )  # fmt: skip
 """All files that a run may write."""
 
@@ -39,13 +32,16 @@ _COMPRESSION = 1
 """Level of gzip for maps: most of a map of pressures is zero."""
 
 
-def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
+def write_results(
+    folder: Path, run: Run, *, options: list[str], figures: RunFigures | None = None
+) -> list[Path]:
     """Write the files of a run, finished or stopped.
 
     Args:
         folder: Folder of the results; made when missing.
         run: The run.
         options: PETSc options given by the user, for the provenance.
+        figures: The figures of the run, where some were begun before; the caller ends them.
 
     Returns:
         The files written.
@@ -53,11 +49,8 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawn: list[Pictures] = []
-    if run.scene.output.figures and run.steps:
-        figures = list(_figures(run).items())
-        with run.phase("output"):
-            drawn = shared(run.comm, len(figures), lambda index: pictures_of(*figures[index]))
+    with run.phase("output"):
+        drawn = (figures or RunFigures(run)).drawn()
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = {name: content for one in drawn for name, content in one.files.items()}
     with run.phase("writing"):
@@ -146,93 +139,3 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
     if contacts[0].pressure_MPa is not None:
         files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
-
-
-class Pictures(NamedTuple):
-    """The files of figures.
-
-    Attributes:
-        files: Their contents by name.
-        problem: Why there are none; empty where there are.
-    """
-
-    files: dict[str, bytes]
-    problem: str = ""
-
-
-def pictures_of(name: str, draw: Callable[[], Figure]) -> Pictures:
-    """Return the files of a figure: PNG, and SVG beside it.
-
-    Results do not depend on figures: without matplotlib, or with one that fails, there are none.
-
-    Args:
-        name: Name of the files without an ending.
-        draw: Draws the figure.
-    """
-    try:
-        with optional_packages():
-            from multiscale.figures.style import encoded  # loads matplotlib
-
-            found = encoded(draw())
-    except NotInstalled as error:
-        return Pictures({}, f"no figures are drawn: {error}")
-    return Pictures({f"{name}.{kind}": content for kind, content in found.items()})
-
-
-def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
-    """Write pictures by the names of their files.
-
-    Args:
-        folder: Folder of the results; made when missing.
-        pictures: The content of each file, see `pictures_of`.
-
-    Returns:
-        The files written.
-    """
-    return [write_bytes(folder / name, content) for name, content in pictures.items()]
-
-
-def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
-    """Return the functions that draw the figures of a run, by their names.
-
-    Note:
-        Collective; drawing is not.
-    """
-    coupling, history, face = run.coupling, run.history(), run.coupling.face_pressures()
-    surface, of_samples = coupling.surface, coupling.regions is not None
-    figures: dict[str, Callable[[], Figure]] = {
-        "overview": _from("contact", "overview_figure", surface, of_samples, history, face),
-        "surface": partial(surface_picture, coupling),
-        "curves": partial(history.plot, run.scene.kind),
-    }
-    if not of_samples:
-        figures["pressures"] = _from("contact", "pressure_figure", history)
-    if face is not None:
-        figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
-    if run.contacts:
-        contact = run.contacts[-1]
-        figures["contact"] = contact.plot
-        of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
-        if run.scene.output.figures == "all" and of_cells:
-            ratio = coupling.materials.first.poisson_ratio
-            figures["block"] = _from("block", "contact_block", surface, contact, ratio)
-    if coupling.table is not None:
-        figures["laws"] = _from("curves", "law_figure", run.laws)
-    return figures
-
-
-def surface_picture(coupling: Coupling) -> Figure:
-    """Draw the surface of a scene, with its summits where the micro model uses them.
-
-    Args:
-        coupling: What was made of the scene.
-    """
-    from multiscale.figures.surface import surface_figure  # loads matplotlib
-
-    target = coupling.scene.surface.spectrum
-    return surface_figure(coupling.surface, coupling.summits, coupling.patches, target)
-
-
-def _from(module: str, function: str, *arguments: Any) -> Callable[[], Figure]:
-    """Return what draws a figure; matplotlib is loaded only when it is called."""
-    return lambda: getattr(import_module(f"multiscale.figures.{module}"), function)(*arguments)

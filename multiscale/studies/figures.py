@@ -18,6 +18,7 @@ from multiscale.figures.style import (
     PALETTE,
     add_legend,
     new_figure,
+    panels,
     panels_above_legend,
     styled,
 )
@@ -65,8 +66,7 @@ def sweep_figure(sweep: Any) -> Figure:
     Args:
         sweep: A `multiscale.studies.sweep.SweepResults`, of which `MOST_ENSEMBLES` are drawn.
     """
-    figure = new_figure(FULL_WIDTH, 3.0)
-    force, area = figure.subplots(1, 2)
+    figure, (force, area) = panels(1, 2, 3.0)
     ensembles = sweep.ensembles()[:MOST_ENSEMBLES]
     for colour, (values, part), (_, statistics) in zip(
         cycle(PALETTE), ensembles, sweep.statistics, strict=False

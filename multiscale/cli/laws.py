@@ -1,57 +1,28 @@
-"""The commands that describe a scene without running it: plan, laws, surface."""
+"""The commands that make a part of a run: laws, surface."""
 
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.plan import planned
 from multiscale.couplings import describe
-from multiscale.couplings.cost import cost_statements
 from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from multiscale.couplings.dispatch import coupling_class
 from multiscale.exports.export import export_texts, remove_exports
-from multiscale.inputs.memory import shortage_warnings
+from multiscale.figures.files import Drawing, file_kinds, pictures_of, write_pictures
 from multiscale.laws.law_file import write_laws
-from multiscale.machine import cluster_nodes, peak_memory
+from multiscale.observers.conductance import conducts_of
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, surface_picture, write_pictures
+from multiscale.output.pictures import surface_drawing
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
-from multiscale.scene.scene import Scene
-from multiscale.setup import make_setup
-from support.collective import on_root, on_root_alone
+from support.collective import on_root
 from support.whole_files import write_text
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-
-def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Say what a run would do, and why, and count its work; run nothing expensive.
-
-    Args:
-        choice: Parsed words of the command line.
-        options: PETSc options given by the user.
-        comm: MPI communicator; None for a process on its own.
-    """
-    scene, _ = scene_and_folder(choice, comm)
-    memory, ranks = peak_memory(), 1 if comm is None else comm.size
-    load_finite_elements(scene, comm)
-    coupling = _coupling(scene, comm)
-    cost = on_root_alone(comm, lambda: list(cost_statements(coupling, memory, ranks)))
-    shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
-    terminal.show_plan(comm, coupling, cost, shortages)
-
-
-def _coupling(scene: Scene, comm: Any) -> Coupling:
-    """Make the coupling of a scene, as if these nodes had any memory that it may take."""
-    return make_setup(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
 
 
 def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -77,20 +48,14 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         table = run.laws
         assert table is not None
 
-        def draw() -> Figure:
-            from multiscale.figures.curves import law_figure
-
-            return law_figure(table)
-
         def write() -> list[Path]:
-            from multiscale.observers.conductance import conducts_of
-
             conducts = conducts_of(run.coupling)
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
             laws = write_laws(folder / "laws.h5", table)
-            pictures = pictures_of("laws", draw)
+            kinds = file_kinds(run.scene.output.figures)
+            pictures = pictures_of(Drawing("laws", "figures.curves.law_figure", (table,), kinds))
             run.remark(filter(None, [pictures.problem]))
             files = [laws, *write_pictures(folder, pictures.files)]
             remove_exports(folder)
@@ -115,11 +80,11 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     with locked(folder, comm):
         if not choice.overwrite:
             on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
-        coupling = _coupling(scene, comm)
+        coupling = planned(scene, comm)
         terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
 
         def write() -> list[Path]:
-            pictures = pictures_of("surface", partial(surface_picture, coupling))
+            pictures = pictures_of(surface_drawing(coupling))
             if pictures.problem:
                 terminal.say(None, pictures.problem)
             return write_pictures(folder, pictures.files)
