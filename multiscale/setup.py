@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from multiscale.auto.keys import (
     auto_keys,
@@ -15,8 +15,6 @@ from multiscale.auto.keys import (
     with_resolved,
     with_value,
 )
-from multiscale.auto.mesh_search import MeshError, measured_mesh_error
-from multiscale.auto.search import coupling_by_accuracy
 from multiscale.bodies.reader import read_bodies
 from multiscale.couplings.coupling import Coupling, Facts
 from multiscale.couplings.dispatch import coupling_class
@@ -24,6 +22,9 @@ from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone
+
+if TYPE_CHECKING:
+    from multiscale.auto.mesh_search import MeshError
 
 
 def make_setup(
@@ -33,7 +34,7 @@ def make_setup(
     resolved: Mapping[str, Any] | None = None,
     nodes: ClusterNodes | None = None,
     like: Coupling | None = None,
-    mesh_error: MeshError = measured_mesh_error,
+    mesh_error: MeshError | None = None,
 ) -> Coupling:
     """Make the coupling of a scene: read its bodies, make all else on rank 0, and check the fit.
 
@@ -43,7 +44,8 @@ def make_setup(
         resolved: What auto values became when the run began; see `resolved_sections`.
         nodes: The nodes of the run; None for this process alone.
         like: A coupling with the same surface, which is taken from it.
-        mesh_error: Measures the relative error of a reference's meshes at the largest load.
+        mesh_error: Measures the relative error of a reference's meshes at the largest load, by
+            default `measured_mesh_error`.
 
     Raises:
         InputError: When something cannot be made or does not fit; names file, key and value.
@@ -69,7 +71,7 @@ def _made(
     nodes: ClusterNodes,
     facts: Facts,
     like: Coupling | None,
-    mesh_error: MeshError,
+    mesh_error: MeshError | None,
 ) -> Coupling:
     """Return the coupling of a scene, with its auto values as they were or as they are chosen."""
     began = time.perf_counter()
@@ -80,7 +82,10 @@ def _made(
         return coupling_class(stated).from_scene(stated, facts, nodes)
 
     if not known and is_measured(scene):
-        chosen = coupling_by_accuracy(scene, start, build, mesh_error)
+        from multiscale.auto.mesh_search import measured_mesh_error  # most scenes do without
+        from multiscale.auto.search import coupling_by_accuracy
+
+        chosen = coupling_by_accuracy(scene, start, build, mesh_error or measured_mesh_error)
         return replace(chosen, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
     if "patches.grid" in auto:
         start = with_value(start, "patches.grid", map_grid(start, make_surface(start)))

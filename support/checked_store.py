@@ -25,7 +25,6 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass
-from io import BytesIO
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -199,35 +198,6 @@ def fingerprint(value: Any) -> str:
         TypeError: When a part of it is of a kind that is not stored.
     """
     return sealed([value])[1].checksum
-
-
-def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
-    """Return the bytes of an HDF5 file with a checksum before its content.
-
-    Args:
-        fill: Writes the content into the open `h5py.File` that it is given.
-    """
-    import h5py
-
-    image = BytesIO()  # HDF5 itself may not survive a full disk
-    with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
-        fill(file)
-    return checksum_hdf5(image.getvalue())
-
-
-def opened_hdf5(content: bytes) -> Any:
-    """Return an open `h5py.File` of bytes that fit the checksum before them.
-
-    Args:
-        content: The file.
-
-    Raises:
-        InputError: When it has no checksum, or its bytes do not fit it.
-    """
-    import h5py
-
-    check_hdf5(content)
-    return h5py.File(BytesIO(content), "r")
 
 
 def checksum_hdf5(content: bytes) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING
-from multiscale.figures.files import Drawing, file_kinds, pictures_of, write_pictures
+from multiscale.figures.files import Drawing, Pictures, file_kinds, pictures_of, write_pictures
 from multiscale.output import terminal
 from multiscale.output.results import write_records
 from multiscale.readable import duration, percent
@@ -82,15 +82,14 @@ def write_comparison(
         The files written.
     """
     files = [write_records(folder / "compare.csv", iter(comparison.records()))]
-    pictures: Mapping[str, bytes] = {}
+    drawn = Pictures({})
     if comparison.measure is not None:
         what = "studies.figures.comparison_figure"
         drawn = pictures_of(Drawing("pareto", what, (comparison,), file_kinds(figures)))
-        pictures = drawn.files
-        if drawn.problem:
-            terminal.say(None, drawn.problem)
-    files += write_pictures(folder, pictures)
-    page = write_text(folder / "report.html", comparison_html(comparison, pictures))
+    if drawn.problem:
+        terminal.say(None, drawn.problem)
+    files += write_pictures(folder, drawn)
+    page = write_text(folder / "report.html", comparison_html(comparison, drawn.files))
     return [path for path in (*files, page) if path is not None]
 
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +16,15 @@ from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.exports.export import export_texts, remove_exports
-from multiscale.figures.files import Drawing, file_kinds, pictures_of, write_pictures
+from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.laws.law_file import write_laws
 from multiscale.observers.conductance import conducts_of
 from multiscale.output import terminal
-from multiscale.output.pictures import surface_drawing
+from multiscale.output.results import surface_drawing
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
+from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.whole_files import write_text
 
@@ -35,10 +39,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    scene, folder = scene_and_folder(choice, comm)
-    with locked(folder, comm):
-        if not choice.overwrite:
-            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
+    with _own_folder(choice, comm) as (scene, folder):
         coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.coupling)
@@ -53,11 +54,10 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             exports: dict[str, str] = {}
             for name in choice.export:
                 exports |= export_texts(table, name, conducts=conducts)
-            laws = write_laws(folder / "laws.h5", table)
+            files = [write_laws(folder / "laws.h5", table)]
             kinds = file_kinds(run.scene.output.figures)
-            pictures = pictures_of(Drawing("laws", "figures.curves.law_figure", (table,), kinds))
-            run.remark(filter(None, [pictures.problem]))
-            files = [laws, *write_pictures(folder, pictures.files)]
+            drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)
+            files += write_figure(folder, drawing, lambda problem: run.remark([problem]))
             remove_exports(folder)
             for name, text in exports.items():
                 write_text(folder / name, text)
@@ -76,20 +76,22 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
+    with _own_folder(choice, comm) as (scene, folder):
+        coupling = planned(scene, comm)
+        terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
+        drawing, tell = surface_drawing(coupling), partial(terminal.say, None)
+        files = on_root(comm, lambda: write_figure(folder, drawing, tell))
+        terminal.show_files(comm, files)
+
+
+@contextmanager
+def _own_folder(choice: argparse.Namespace, comm: Any) -> Iterator[tuple[Scene, Path]]:
+    """Yield the scene and the locked folder of its results, which holds none of another scene."""
     scene, folder = scene_and_folder(choice, comm)
     with locked(folder, comm):
         if not choice.overwrite:
             on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
-        coupling = planned(scene, comm)
-        terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
-
-        def write() -> list[Path]:
-            pictures = pictures_of(surface_drawing(coupling))
-            if pictures.problem:
-                terminal.say(None, pictures.problem)
-            return write_pictures(folder, pictures.files)
-
-        terminal.show_files(comm, on_root(comm, write))
+        yield scene, folder
 
 
 def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:

@@ -9,8 +9,7 @@ from typing import Any
 from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
-from multiscale.output.pictures import RunFigures
-from multiscale.output.results import write_results
+from multiscale.output.results import RunFigures, write_results
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (

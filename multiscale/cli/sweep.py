@@ -7,12 +7,13 @@ import math
 import os
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
-from multiscale.figures.files import Drawing, file_kinds, pictures_of, write_pictures
+from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.output import terminal
 from multiscale.output.results import write_records
 from multiscale.restart.results_folder import locked
@@ -102,10 +103,7 @@ def _write(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
     ]
     if figures and statistics:
         drawing = Drawing("sweep", "studies.figures.sweep_figure", (done,), file_kinds(figures))
-        pictures = pictures_of(drawing)
-        if pictures.problem:
-            terminal.say(None, pictures.problem)
-        files += write_pictures(folder, pictures.files)
+        files += write_figure(folder, drawing, partial(terminal.say, None))
     return [path for path in files if path is not None]
 
 

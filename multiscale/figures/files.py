@@ -6,7 +6,7 @@ import os
 import subprocess
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from importlib import import_module
 from multiprocessing import Pipe
@@ -72,17 +72,34 @@ def pictures_of(drawing: Drawing) -> Pictures:
     return Pictures({f"{drawing.name}.{kind}": content for kind, content in contents.items()})
 
 
-def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
-    """Write pictures by the names of their files.
+def write_pictures(folder: Path, drawn: Pictures) -> list[Path]:
+    """Write the files of figures.
 
     Args:
         folder: Folder of the results; made when missing.
-        pictures: The content of each file, see `pictures_of`.
+        drawn: The figures.
 
     Returns:
         The files written.
     """
-    return [write_bytes(folder / name, content) for name, content in pictures.items()]
+    return [write_bytes(folder / name, content) for name, content in drawn.files.items()]
+
+
+def write_figure(folder: Path, drawing: Drawing, tell: Callable[[str], None]) -> list[Path]:
+    """Draw a figure and write its files, or tell why there are none.
+
+    Args:
+        folder: Folder of the results; made when missing.
+        drawing: The figure.
+        tell: Takes a sentence.
+
+    Returns:
+        The files written.
+    """
+    drawn = pictures_of(drawing)
+    if drawn.problem:
+        tell(drawn.problem)
+    return write_pictures(folder, drawn)
 
 
 class FigureProcess:

@@ -4,32 +4,45 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from multiscale.figures.files import write_pictures
-from multiscale.laws.law_file import write_laws
-from multiscale.output.pictures import NAMES, RunFigures
+from multiscale.couplings.coupling import Coupling
+from multiscale.figures.files import (
+    Drawing,
+    FigureProcess,
+    Pictures,
+    file_kinds,
+    pictures_of,
+    write_pictures,
+)
+from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
-from support.checked_store import hdf5_bytes
-from support.collective import on_root
+from support.collective import on_root, shared
+from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
+
+_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
     "contacts.csv", "contact.h5", "fields.xdmf", "fields.h5", "fields.bp",
     "counter_fields.xdmf", "counter_fields.h5", "counter_fields.bp",
-    *(f"{name}.{kind}" for name in NAMES for kind in ("png", "svg")),
+    *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")),
 )  # fmt: skip
 """All files that a run may write."""
 
 _COMPRESSION = 1
 """Level of gzip for maps: most of a map of pressures is zero."""
+
+_MOST_CELLS = 2**20
+"""Heights that are sent to another process, 8 MB; larger runs take minutes beside their figures."""
 
 
 def write_results(
@@ -52,12 +65,12 @@ def write_results(
     with run.phase("output"):
         drawn = (figures or RunFigures(run)).drawn()
     run.remark(filter(None, (one.problem for one in drawn)))
-    pictures = {name: content for one in drawn for name, content in one.files.items()}
+    pictures = Pictures(dict(chain.from_iterable(one.files.items() for one in drawn)))
     with run.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
-def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str]) -> list[Path]:
+def _write(folder: Path, run: Run, pictures: Pictures, options: list[str]) -> list[Path]:
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
@@ -66,12 +79,10 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     if table is not None:
         files.append(write_laws(folder / "laws.h5", table))
     files += write_pictures(folder, pictures)
-    content = json.dumps(provenance(run, options=options), indent=2)
-    files.append(write_text(folder / "provenance.json", content + "\n"))
+    facts = provenance(run, options=options)
+    files.append(write_text(folder / "provenance.json", json.dumps(facts, indent=2) + "\n"))
     if run.scene.output.report:
-        files.append(
-            write_text(folder / "report.html", report_html(run, pictures, options=options))
-        )
+        files.append(write_text(folder / "report.html", report_html(run, pictures.files, facts)))
     return files
 
 
@@ -139,3 +150,96 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
     if contacts[0].pressure_MPa is not None:
         files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
+
+
+def surface_drawing(coupling: Coupling) -> Drawing:
+    """Return the figure of a scene's surface, with its summits where the micro model uses them.
+
+    Args:
+        coupling: What was made of the scene.
+    """
+    output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
+    about = coupling.surface, coupling.summits, coupling.patches, spectrum
+    return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
+
+
+class RunFigures:
+    """The figures of a run.
+
+    Ranks share them at its end. Of a process on its own with a further core, another process draws
+    them: surface and laws while load steps are made.
+
+    Args:
+        run: The run.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run, self._figures = run, run.scene.output.figures
+        self._process: FigureProcess | None = None
+        self._begun: dict[str, Future[Pictures]] = {}
+
+    def __enter__(self) -> RunFigures:
+        """Return the figures."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End the process that draws."""
+        if self._process is not None:
+            self._process.close()
+
+    def begin(self) -> None:
+        """Have those drawn beside the load steps that do not depend on them."""
+        few = self._run.coupling.surface.heights.size <= _MOST_CELLS
+        if self._figures and self._run.comm is None and cores() > 1 and few:
+            self._process = FigureProcess()
+            for drawing in self._before_load_steps():
+                self._begun[drawing.name] = self._process.draw(drawing)
+
+    def drawn(self) -> list[Pictures]:
+        """Return the files of all figures; none of a run without load steps, or that wants none.
+
+        Note:
+            Collective.
+        """
+        if not self._figures or not self._run.steps:
+            return []
+        drawings = [*self._after_load_steps(), *self._before_load_steps()]
+        if self._process is None:
+            comm = self._run.comm
+            return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
+        for drawing in drawings:
+            self._begun[drawing.name] = self._begun.get(drawing.name) or self._process.draw(drawing)
+        return [self._begun[drawing.name].result() for drawing in drawings]
+
+    def _before_load_steps(self) -> Iterator[Drawing]:
+        yield surface_drawing(self._run.coupling)
+        if (laws := self._run.laws) is not None:
+            kinds = file_kinds(self._figures)
+            yield Drawing("laws", "figures.curves.law_figure", (laws,), kinds)
+
+    def _after_load_steps(self) -> Iterator[Drawing]:
+        """Yield the figures of what was found.
+
+        Note:
+            Collective.
+        """
+        run, coupling, history = self._run, self._run.coupling, self._run.history()
+        surface, of_samples = coupling.surface, coupling.regions is not None
+        face = coupling.face_pressures()
+        figures: dict[str, tuple[str, Any]] = {
+            "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
+            "curves": ("curves.history_figure", (history, run.scene.kind)),
+        }
+        if not of_samples:
+            figures["pressures"] = "contact.pressure_figure", (history,)
+        if face is not None:
+            figures["face"] = "contact.face_figure", (face, history.steps[-1])
+        if run.contacts:
+            contact = run.contacts[-1]
+            figures["contact"] = "contact.contact_figure", (contact,)
+            of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
+            if self._figures in ("all", "svg") and of_cells:
+                ratio = coupling.materials.first.poisson_ratio
+                figures["block"] = "block.contact_block", (surface, contact, ratio)
+        for name, (function, arguments) in figures.items():
+            yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))

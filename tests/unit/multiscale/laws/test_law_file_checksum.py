@@ -7,7 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
-from support.checked_store import check_hdf5, checksum_hdf5, hdf5_bytes
+from multiscale.laws.law_file import hdf5_bytes
+from support.checked_store import check_hdf5, checksum_hdf5
 from support.errors import InputError
 
 
@@ -49,8 +50,7 @@ def test_damage_costs_no_memory(tmp_path):
     code = (
         "import resource, sys; from pathlib import Path\n"
         "from support.errors import InputError\n"
-        "from multiscale.laws.law_file import read_laws\n"
-        "from support.checked_store import hdf5_bytes\n"
+        "from multiscale.laws.law_file import hdf5_bytes, read_laws\n"
         "def fill(file): file.attrs['format'] = 'patchlaw laws 2'\n"
         "path = Path(sys.argv[1])\n"
         "path.write_bytes(hdf5_bytes(fill))\n"

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
-from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
-from support.checked_store import checksum_hdf5, hdf5_bytes
+from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
 SCALARS = (

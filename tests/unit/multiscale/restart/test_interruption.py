@@ -170,7 +170,7 @@ def test_what_is_told_to_end_clears_away(number):
 
 HUNG_UP = """
 import os, signal, sys
-from multiscale.cli import command_line, describe
+from multiscale.cli import command_line, keys
 
 def hung_up(choice, options, comm):
     import macro
@@ -192,7 +192,7 @@ def test_petsc_does_not_take_the_signals(root):
 
 TOLD_WHILE_IMPORTING = """
 import os, signal, sys
-from multiscale.cli import command_line, describe
+from multiscale.cli import command_line, keys
 
 def importing(choice, options, comm):
     def told(event, arguments):
