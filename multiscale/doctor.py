@@ -34,11 +34,6 @@ _OLDEST = {
 }  # fmt: skip
 """The oldest release of every package that patchlaw is tested with."""
 
-_SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
-_LEAST_MEMORY = 1e9  # per rank, below which a warning is given [B]
-_LARGEST_ERROR = 1e-8
-"""Relative error of the force in the test solve; residuals are driven to 1e-9 of the load."""
-
 
 @dataclass(frozen=True, slots=True)
 class CheckResult:
@@ -82,7 +77,7 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> Iterator[tuple[str, Check
             text = f"{type(failure).__name__}: {failure}"
             result = CheckResult("fail", text, "please report this with the lines above")
         everywhere = [result] if comm is None else comm.allgather(result)
-        yield topic, max(everywhere, key=lambda each: _SEVERITY[each.state])
+        yield topic, max(everywhere, key=lambda each: ("ok", "warning", "fail").index(each.state))
 
 
 def packages(comm: Any, load: Callable[[str], Any] = import_module) -> CheckResult:
@@ -161,7 +156,7 @@ def ranks(comm: Any) -> CheckResult:
     places = ", ".join(f"{count} on {host}" for host, count in hosts.items())
     nodes = cluster_nodes(comm)
     each = nodes.memory / max(nodes.ranks)
-    remedy = "take fewer ranks per node or a larger node" if each < _LEAST_MEMORY else ""
+    remedy = "take fewer ranks per node or a larger node" if each < 1e9 else ""
     text = f"{hosts.total()}: {places}, {each / 1e9:.1f} GB of memory for each"
     return CheckResult("warning" if remedy else "ok", text, remedy)
 
@@ -212,7 +207,7 @@ def known_solve(comm: Any) -> CheckResult:
     confined = modulus * (1.0 - ratio) / ((1.0 + ratio) * (1.0 - 2.0 * ratio))
     error = abs(step.force_N / (confined * approach) - 1.0)
     text = f"{step.linear_iterations} iterations, force off by {error:.0e}, {step.wall_s:.1f} s"
-    if error > _LARGEST_ERROR:
+    if error > 1e-8:  # residuals are driven to 1e-9 of the load
         return CheckResult("fail", text, "please report this: numbers are wrong")
     return CheckResult("ok", text)
 

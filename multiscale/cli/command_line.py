@@ -14,8 +14,6 @@ from multiscale.cli.words import UsageError, command_parser
 from multiscale.output.streams import sturdy_streams
 from multiscale.restart.interruption import ended_if_told, signals_raise
 
-_INTERRUPTED = 130  # exit code after SIGINT, as shells have it
-
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command. Works the same under ``mpirun``, where rank 0 prints and writes.
@@ -41,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except SystemExit:  # of --help and --version
             code = 0
         except KeyboardInterrupt as error:
-            code = getattr(error, "exit_code", _INTERRUPTED)
+            code = getattr(error, "exit_code", 130)  # of SIGINT, as shells have it
         output.flush()
         failure = output.failure or errors.failure
         if failure is None or isinstance(failure, BrokenPipeError) or code == 1 or code > 128:

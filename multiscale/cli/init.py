@@ -28,8 +28,6 @@ from support.whole_files import write_text
 CONTACT_AREA = 0.02
 """Contact area fraction that the default force makes, roughly."""
 
-_WIDTH = 96
-
 START: Mapping[str, Any] = {
     "surface": {},
     "block": {"young_modulus": "210 GPa", "poisson_ratio": 0.3, "sides": "free"},
@@ -228,7 +226,7 @@ def scene_text(data: Mapping[str, Mapping[str, Any]], remarks: Iterable[str]) ->
 
 
 def _comment(text: str) -> str:
-    lines = textwrap.wrap(text, _WIDTH, break_on_hyphens=False)
+    lines = textwrap.wrap(text, 96, break_on_hyphens=False)
     return "\n".join(f"# {line}" for line in lines)
 
 

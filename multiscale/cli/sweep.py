@@ -24,9 +24,6 @@ from support.collective import on_root
 from support.errors import InputError, NotConverged
 from support.whole_files import remove
 
-MOST_LINES = 20
-"""Ensembles that are told in the terminal; the files hold all of them."""
-
 FILES = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 """Files of the results of a sweep."""
 
@@ -110,7 +107,7 @@ def _write(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
 def _summary(done: SweepResults) -> Iterator[str]:
     """Yield a line on the last load step of each ensemble."""
     yield f"{len(done) - done.unfinished} of {len(done)} cases are done"
-    for values, part in _statistics(done)[:MOST_LINES]:
+    for values, part in _statistics(done)[:20]:  # the files hold all of them
         said = "".join(f"{key} = {value}, " for key, value in values.items())
         force, approach = _spread(part, "force_N"), _spread(part, "approach_mm", 1e3)
         yield f"{said}at last: force {force} N, approach {approach} µm"

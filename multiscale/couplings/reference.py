@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,6 +70,8 @@ class ReferenceCoupling(PressedSurface):
     Attributes:
         rough_meshes: The meshes, from coarse to fine.
     """
+
+    meshes_roughness: ClassVar[bool] = True
 
     rough_meshes: ReferenceMeshes
     _last: tuple[FaceContactState, ...] = field(default=(), init=False)

@@ -88,6 +88,8 @@ class SceneParts:
     """Whether the surface is on a body instead of a half-space."""
     has_laws: ClassVar[bool] = False
     """Whether load steps use laws."""
+    meshes_roughness: ClassVar[bool] = False
+    """Whether the roughness is meshed, so that there is no micro model."""
 
     scene: Scene
     surface: Surface

@@ -25,13 +25,6 @@ from multiscale.figures.style import (
 from multiscale.figures.surface import draw_surface
 from multiscale.readable import quantity, usual_unit
 
-_SHOWN = 0.99
-"""Part of the pressures within the colour scale; few cells carry the largest ones."""
-_PER_DECADE = 8
-"""Bars of the histogram per factor of ten in the area."""
-_MOST_OUTLINED = 500
-"""Spots that have outlines; those of more would hide their colours."""
-
 
 def load_text(step: Any) -> str:
     """Return approach and force of a load step, as titles say them."""
@@ -79,7 +72,8 @@ def draw_contact(axes: Any, record: Any) -> None:
         return
     unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
     shown = np.ma.masked_less_equal(pressure, 0.0)
-    top = float(np.quantile(shown.compressed(), _SHOWN)) if shown.count() else 1.0
+    # few cells carry the largest pressures
+    top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
     image = _draw_field(axes, record, shown, PRESSURES, Normalize(0.0, top), largest=True)
     colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
     peak = quantity(float(np.max(record.pressure_MPa)), "MPa", 3)
@@ -125,7 +119,7 @@ def _draw_field(
 def _draw_spots(axes: Any, record: Any) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
-    many = len(diameter) > _MOST_OUTLINED
+    many = len(diameter) > 500  # whose outlines would hide their colours
     spots = EllipseCollection(
         diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=unit * record.place_mm,
         offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
@@ -146,7 +140,7 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     if not exponent.size:
         return
     low, high = np.floor(exponent.min()), np.floor(exponent.max()) + 1.0
-    bins = np.logspace(low, high, int(_PER_DECADE * (high - low)) + 1)
+    bins = np.logspace(low, high, int(8 * (high - low)) + 1)
     axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.minorticks_off()

@@ -21,12 +21,6 @@ from multiscale.figures.style import (
     styled,
 )
 
-MOST_MARKED = 500
-"""Load steps that have a symbol each; more of them are drawn as lines alone."""
-
-MOST_MARKED_LAWS = 36
-"""Laws whose rows are marked; the dots of more would hide the curves."""
-
 
 @styled()
 def history_figure(history: Any, kind: str) -> Figure:
@@ -39,7 +33,7 @@ def history_figure(history: Any, kind: str) -> Figure:
     figure, (force, area, gap) = panels(1, 3, 2.4)
     colour = COLOURS.get(kind, BLUE)
     look: dict[str, Any] = {"color": colour, "label": kind}
-    if len(history) <= MOST_MARKED:
+    if len(history) <= 500:
         look |= {"marker": "o", "ms": 3.0}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at that of the middle.
@@ -101,7 +95,7 @@ def law_figure(table: Any) -> Figure:
     on_grid = isinstance(table.patches, PatchGrid) and table.patches.count > 1
     colours, names = _law_colours(table)
     closing = [index for index, law in enumerate(table.laws) if not law.is_open]
-    few = len(closing) <= MOST_MARKED_LAWS
+    few = len(closing) <= 36  # the dots of more would hide the curves
     what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
     rows = "; dots are their rows" if few else ""
     title = f"laws of {len(closing)} of {table.patches.count} {what}{rows}"

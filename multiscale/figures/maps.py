@@ -15,15 +15,6 @@ from multiscale.readable import number, usual_unit
 
 Array = NDArray[np.float64]
 
-MOST_NUMBERED_PATCHES = 36
-"""A map of more patches shows colours alone; the numbers would cover each other."""
-
-MOST_CELLS = 420
-"""Cells a side of a map that is drawn; of more, blocks of cells are shown."""
-
-MOST_POINTS = 40_000
-"""Points of a face that are drawn at most."""
-
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
     """Return the number of units in a mm and the unit of x and y on maps, µm below 1 mm.
@@ -113,9 +104,10 @@ def draw_pressures(
     axes.set_facecolor(NO_CONTACT)
     borders = scale * patches.borders_x, scale * patches.borders_y
     image = axes.pcolormesh(*borders, shown.T, cmap=PRESSURES, norm=norm)
-    image.set_rasterized(patches.count > MOST_NUMBERED_PATCHES)
+    few = patches.count <= 36  # the numbers of more would cover each other
+    image.set_rasterized(not few)
     draw_patch_borders(axes, patches)
-    if patches.count <= MOST_NUMBERED_PATCHES:
+    if few:
         for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
             colour = "white" if value > 0.6 * norm.vmax else "black"
             axes.text(x, y, _number(value), ha="center", va="center", color=colour, fontsize=7)
@@ -140,7 +132,7 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
         axes: Axes to draw into.
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
     """
-    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
+    x, y, pressure = points[:: -(-len(points) // 40_000)].T
     lengths = float(np.ptp(x)), float(np.ptp(y))
     scale = map_axes(axes, lengths)
     axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
@@ -172,7 +164,7 @@ def place_colours(shares: Array) -> Array:
     return found
 
 
-def coarsened(values: Any, *, largest: bool, most: int = MOST_CELLS) -> Any:
+def coarsened(values: Any, *, largest: bool, most: int = 420) -> Any:
     """Return a field on few enough cells to draw; what lies beyond whole blocks is left out.
 
     Args:

@@ -32,12 +32,6 @@ Array = NDArray[np.float64]
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""
 
-MOST_PATCHES = 1024
-"""Patches whose borders are drawn; more would hide the heights."""
-
-_LEAST_POWER = 1e-8
-"""Spectral densities below this share of the largest are rounding, or none, and not drawn."""
-
 
 @styled()
 def surface_figure(
@@ -79,7 +73,7 @@ def draw_surface(
     extent = (0.0, scale * surface.lengths[0], 0.0, scale * surface.lengths[1])
     image = axes.imshow(heights.T, origin="lower", extent=extent, cmap=HEIGHTS)
     colour_bar(image, axes, f"height over the mean plane [{unit}]")
-    if patches is not None and 1 < patches.count <= MOST_PATCHES:
+    if patches is not None and 1 < patches.count <= 1024:
         draw_patch_borders(axes, patches, colour="white")
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if asperities is not None:
@@ -144,7 +138,7 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
         target: The spectrum that the surface was synthesised from; None draws none.
     """
     found = power_spectrum(surface)
-    kept = found.density > _LEAST_POWER * found.density.max()
+    kept = found.density > 1e-8 * found.density.max()  # the rest is rounding
     few = dict(marker="o", ms=2.5) if kept.sum() <= 40 else {}
     axes.loglog(found.wavenumber[kept], found.density[kept], color=BLUE, label="surface", **few)
     if target is not None:

@@ -38,12 +38,6 @@ FILES = (
 )  # fmt: skip
 """All files that a run may write."""
 
-_COMPRESSION = 1
-"""Level of gzip for maps: most of a map of pressures is zero."""
-
-_MOST_CELLS = 2**20
-"""Heights that are sent to another process, 8 MB; larger runs take minutes beside their figures."""
-
 
 def write_results(
     folder: Path, run: Run, *, options: list[str], figures: RunFigures | None = None
@@ -145,7 +139,8 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
             group.attrs.update(approach_mm=record.approach_mm, force_N=record.force_N)
             for name in FIELDS:
                 if (data := getattr(record, name)) is not None:
-                    group.create_dataset(name, data=data, compression=_COMPRESSION)
+                    # most of a map of pressures is zero
+                    group.create_dataset(name, data=data, compression=1)
 
     if contacts[0].pressure_MPa is not None:
         files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
@@ -189,7 +184,8 @@ class RunFigures:
 
     def begin(self) -> None:
         """Have those drawn beside the load steps that do not depend on them."""
-        few = self._run.coupling.surface.heights.size <= _MOST_CELLS
+        # larger ones take minutes beside their figures, and long to send
+        few = self._run.coupling.surface.heights.size <= 2**20
         if self._figures and self._run.comm is None and cores() > 1 and few:
             self._process = FigureProcess()
             for drawing in self._before_load_steps():

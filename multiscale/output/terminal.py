@@ -21,9 +21,6 @@ if TYPE_CHECKING:
     from multiscale.loading.load_step import LoadStep
     from multiscale.results.history import History
 
-MOST_ROWS = 60
-"""Load steps that are printed; the files hold all of them."""
-
 TABLE_WIDTH = 100
 """Characters of a line that tables take at least, in a log file too."""
 
@@ -230,7 +227,7 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    header, rows = history.table(most=MOST_ROWS)
+    header, rows = history.table(most=60)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")

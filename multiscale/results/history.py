@@ -25,8 +25,6 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "stiffness_MPa_per_mm"
 """Column of the derivative dp/dc of a patch's law."""
-MOST_SHOWN = 1000
-"""Load steps in the table of a report or notebook; ``history.csv`` has all."""
 
 
 @dataclass(eq=False)
@@ -263,7 +261,7 @@ class History:
         """
         return data_frame(self.records())
 
-    def table(self, *names: str, most: int = MOST_SHOWN) -> Table:
+    def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
         Units have the prefixes that suit the largest value of their column. A reference has one

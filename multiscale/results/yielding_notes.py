@@ -11,9 +11,6 @@ from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, number, percent, quantity
 
-HARDNESS_OVER_YIELD = (2.8, 3.0)
-"""Hardness over yield strength of metals: Tabor 1951, The Hardness of Metals, ch. 3."""
-
 
 def yielding_notes(steps: Sequence[LoadStep], hardness: float | None) -> Iterator[str]:
     """Yield what has yielded or, of elastic contacts, what would bear their pressures.
@@ -52,7 +49,7 @@ def _strength_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     step = max(known, key=lambda each: each.peak_pressure_MPa or 0.0)
     peak = step.peak_pressure_MPa or 0.0
     mean = step.mean_pressure_MPa / step.contact_area_fraction
-    least, most = HARDNESS_OVER_YIELD
+    least, most = 2.8, 3.0  # hardness over yield strength of metals, Tabor 1951, ch. 3
     yield (
         f"elastic contacts: pressures up to {quantity(peak, 'MPa', 3)}, in the mean of the real "
         f"contact area {quantity(mean, 'MPa', 3)}, at load step {step.step}. A hardness above the "

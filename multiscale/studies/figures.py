@@ -25,12 +25,6 @@ from multiscale.figures.style import (
 from multiscale.studies.comparison import Comparison
 from multiscale.studies.errors import Row
 
-MOST_CURVES = 200
-"""Cases of a sweep that are drawn as curves; bands show those beyond."""
-
-MOST_ENSEMBLES = 8
-"""Ensembles that are drawn; more of them cannot be told apart."""
-
 PALE = 0.4
 """Opacity of single cases, and of configurations that another one beats in time and error."""
 
@@ -42,9 +36,6 @@ LEAST_SHARE = 0.2
 
 NUMBER_SIZE = (10.0, 8.0)
 """Width and height that a number takes [pt]."""
-
-_SHARED = 1e-9
-"""Spread of values of all cases, relative to their mean, that is rounding."""
 
 _POINTS: dict[str, Any] = {"marker": "o", "ms": 4.0}  # curves of one load step
 _PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
@@ -64,14 +55,14 @@ def sweep_figure(sweep: Any) -> Figure:
     to the same approaches, of approaches where all were pressed by the same forces.
 
     Args:
-        sweep: A `multiscale.studies.sweep.SweepResults`, of which `MOST_ENSEMBLES` are drawn.
+        sweep: A `multiscale.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
     figure, (force, area) = panels(1, 2, 3.0)
-    ensembles = sweep.ensembles()[:MOST_ENSEMBLES]
+    ensembles = sweep.ensembles()[:8]  # more cannot be told apart
     for colour, (values, part), (_, statistics) in zip(
         cycle(PALETTE), ensembles, sweep.statistics, strict=False
     ):
-        few = slice(MOST_CURVES // len(ensembles))
+        few = slice(200 // len(ensembles))  # the band shows those beyond
         approach, pressure = 1e3 * part.approach_mm[few], part.mean_pressure_MPa[few]
         look = {"color": colour} | (_POINTS if approach.shape[1] == 1 else {})
         thin = look | {"lw": 0.5, "alpha": PALE}
@@ -111,7 +102,7 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
         _read_off(statistics, name)
         for name in ("mean", "median", "low", "high", "smallest", "largest")
     )
-    shared = [bool((most[k] - least[k]).max() <= _SHARED * np.abs(mean[k]).max()) for k in (0, 1)]
+    shared = [bool((most[k] - least[k]).max() <= 1e-9 * np.abs(mean[k]).max()) for k in (0, 1)]
     if shared[0] == shared[1]:
         return
     x, y = (mean[0], median[1]) if shared[0] else (median[0], mean[1])
