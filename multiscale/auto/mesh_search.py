@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from multiscale.auto.keys import accuracy_of, with_value
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.results.accuracy_verdict import relative_error
+from multiscale.results.notes import relative_error
 from multiscale.scene.scene import Scene
 
 Build = Callable[[Scene], Coupling]

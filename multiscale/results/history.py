@@ -13,9 +13,9 @@ from geometry.patches import PatchGrid, Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
-from multiscale.results.accuracy_verdict import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
+from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
 from support.packages import optional_packages
 
