@@ -38,7 +38,7 @@ def block_figure(
     view = BlockView(surface, pressure, poisson_ratio)
     figure = new_figure(FULL_WIDTH, 4.65)
     figure.set_layout_engine("none")  # axes are placed by hand
-    axes = figure.add_axes((0.01, 0.0, 0.83, 0.93))
+    axes = figure.add_axes((0.04, 0.0, 0.81, 0.93))
     view.draw(axes)
     for at, scale, colours, label in (
         (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),

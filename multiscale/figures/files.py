@@ -120,6 +120,7 @@ class FigureProcess:
         )  # fmt: skip
         there.close()
         self._line = ThreadPoolExecutor(1)  # the process takes half a second to listen
+        self._ended = False
 
     def draw(self, drawing: Drawing) -> Future[Pictures]:
         """Let the process draw a figure after those before it.
@@ -130,7 +131,8 @@ class FigureProcess:
         return self._line.submit(self._drawn, drawing)
 
     def close(self) -> None:
-        """End the process."""
+        """End the process; figures that are not drawn are wanted no longer."""
+        self._ended = True
         self._process.kill()
         self._line.shutdown(cancel_futures=True)
         self._process.wait()
@@ -141,7 +143,7 @@ class FigureProcess:
             self._connection.send(drawing)
             answer = self._connection.recv()
         except (OSError, EOFError):
-            answer = pictures_of(drawing)
+            answer = Pictures({}) if self._ended else pictures_of(drawing)
         if isinstance(answer, str):
             raise RuntimeError(answer)
         return answer

@@ -55,7 +55,9 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     Returns:
         The colour bar.
     """
-    beside = axes.inset_axes((1.04, 0.0, 0.05, 1.0))
+    inches = axes.get_position().width * axes.figure.get_figwidth()
+    wide = 0.05 * min(1.0, 2.2 / inches)
+    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     bar.set_label(label)
