@@ -43,7 +43,8 @@ _TOGETHER = ("numpy", "scipy.special", "h5py")
 class LazyPackage(ModuleType):
     """A package whose public names stand in its stub; a module is imported with their first use.
 
-    A name that is also that of a module, such as ``multiscale.run``, is what the module defines.
+    Those of a module without a stub stand in what it imports for type checkers alone. A name that
+    is also that of a module, such as ``multiscale.run``, is what the module defines.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -66,9 +67,13 @@ class LazyPackage(ModuleType):
 
 @cache
 def _homes(package: str) -> dict[str, str]:
-    """Return the module of every public name of a package, as the stub beside its file says."""
-    stub = ast.parse(Path(package).with_suffix(".pyi").read_text(encoding="utf-8"))
-    imports = [node for node in stub.body if isinstance(node, ast.ImportFrom)]
+    """Return the module of every public name of a package, as its stub or its source says."""
+    stub = Path(package).with_suffix(".pyi")
+    source = stub if stub.exists() else Path(package)
+    body = ast.parse(source.read_text(encoding="utf-8")).body
+    if source != stub:
+        body = [node for block in body if isinstance(block, ast.If) for node in block.body]
+    imports = [node for node in body if isinstance(node, ast.ImportFrom)]
     return {alias.name: str(node.module) for node in imports for alias in node.names}
 
 

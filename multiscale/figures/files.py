@@ -14,8 +14,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from multiscale.figures import by_matplotlib
 from support.errors import NotInstalled
-from support.packages import optional_packages
 from support.whole_files import write_bytes
 
 
@@ -60,13 +60,9 @@ def pictures_of(drawing: Drawing) -> Pictures:
     Args:
         drawing: The figure.
     """
-    module, _, name = drawing.function.rpartition(".")
     try:
-        with optional_packages():
-            from multiscale.figures.style import encoded  # loads matplotlib
-
-            figure = getattr(import_module(f"multiscale.{module}"), name)(*drawing.arguments)
-            contents = encoded(figure, drawing.kinds)
+        figure = by_matplotlib(drawing.function, *drawing.arguments)
+        contents = by_matplotlib("figures.style.encoded", figure, drawing.kinds)
     except NotInstalled as error:
         return Pictures({}, f"no figures are drawn: {error}")
     return Pictures({f"{drawing.name}.{kind}": content for kind, content in contents.items()})

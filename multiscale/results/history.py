@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid, Regions
+from multiscale.figures import by_matplotlib
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
@@ -17,7 +18,6 @@ from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
-from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 
@@ -303,10 +303,7 @@ class History:
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        with optional_packages():
-            from multiscale.figures.curves import history_figure  # loads matplotlib
-
-        return history_figure(self, label)
+        return by_matplotlib("figures.curves.history_figure", self, label)
 
     def _repr_html_(self) -> str:
         """Return the table as HTML, which notebooks show for a history."""
