@@ -15,7 +15,7 @@ from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.output import terminal
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
-from support.collective import on_root_alone
+from support.collective import on_root_alone, place_in
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -27,7 +27,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
         comm: MPI communicator; None for a process on its own.
     """
     scene, _ = scene_and_folder(choice, comm)
-    memory, ranks = peak_memory(), 1 if comm is None else comm.size
+    memory, (_, ranks) = peak_memory(), place_in(comm)
     load_finite_elements(scene, comm)
     coupling = planned(scene, comm)
     cost = on_root_alone(comm, lambda: list(cost_statements(coupling, memory, ranks)))

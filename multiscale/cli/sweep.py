@@ -20,7 +20,7 @@ from multiscale.restart.results_folder import locked
 from multiscale.studies.cases import Case, sweep_cases, values_from_text
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
-from support.collective import on_root
+from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
 from support.whole_files import remove
 
@@ -43,7 +43,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
-        ranks = parts * (1 if comm is None else comm.size)
+        ranks = parts * place_in(comm)[1]
         terminal.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
         pace, last = terminal.Pace(math.ceil(cases / ranks)), time.monotonic()
         with terminal.following(comm) as (begun, ended):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -56,8 +57,7 @@ def write_results(
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    with run.phase("output"):
-        drawn = (figures or RunFigures(run)).drawn()
+    drawn = (figures or RunFigures(run)).drawn()
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = Pictures(dict(chain.from_iterable(one.files.items() for one in drawn)))
     with run.phase("writing"):
@@ -154,7 +154,8 @@ def surface_drawing(coupling: Coupling) -> Drawing:
         coupling: What was made of the scene.
     """
     output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
-    about = coupling.surface, coupling.summits, coupling.patches, spectrum
+    surface = replace(coupling.surface)  # without its interpolant, which is not drawn
+    about = surface, coupling.summits, coupling.patches, spectrum
     return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
 
 
@@ -199,13 +200,14 @@ class RunFigures:
         """
         if not self._figures or not self._run.steps:
             return []
-        drawings = [*self._after_load_steps(), *self._before_load_steps()]
-        if self._process is None:
-            comm = self._run.comm
-            return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
-        for drawing in drawings:
-            self._begun[drawing.name] = self._begun.get(drawing.name) or self._process.draw(drawing)
-        return [self._begun[drawing.name].result() for drawing in drawings]
+        with self._run.phase("output"):
+            drawings = [*self._after_load_steps(), *self._before_load_steps()]
+            if self._process is None:
+                comm = self._run.comm
+                return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
+            draw, begun = self._process.draw, self._begun
+            ahead = [begun.get(drawing.name) or draw(drawing) for drawing in drawings]
+            return [one.result() for one in ahead]
 
     def _before_load_steps(self) -> Iterator[Drawing]:
         yield surface_drawing(self._run.coupling)
@@ -220,7 +222,7 @@ class RunFigures:
             Collective.
         """
         run, coupling, history = self._run, self._run.coupling, self._run.history()
-        surface, of_samples = coupling.surface, coupling.regions is not None
+        surface, of_samples = replace(coupling.surface), coupling.regions is not None
         face = coupling.face_pressures()
         figures: dict[str, tuple[str, Any]] = {
             "overview": ("contact.overview_figure", (surface, of_samples, history, face)),

@@ -32,8 +32,8 @@ from multiscale.studies.errors import (
     uncertainty,
 )
 from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult, Journal, place_in, run_cases
-from support.collective import on_root
+from multiscale.studies.running import CaseResult, Journal, run_cases
+from support.collective import on_root, place_in
 from support.errors import InputError
 
 

@@ -20,8 +20,8 @@ from multiscale.results.history import COLUMNS, data_frame
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases
-from multiscale.studies.running import CaseResult, Journal, place_in, run_case, run_cases
-from support.collective import on_root, together
+from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from support.collective import on_root, place_in, together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
