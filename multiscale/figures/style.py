@@ -216,17 +216,3 @@ def add_legend(figure: Figure) -> None:
     first = figure.axes[0]
     if len(first.get_legend_handles_labels()[0]) > 1:
         first.legend()
-
-
-def panels_above_legend(figure: Figure, panels: int, share: float) -> tuple[list[Any], Any]:
-    """Return panels side by side, and empty axes below them for a common legend.
-
-    Args:
-        figure: The figure.
-        panels: Number of panels.
-        share: Height of the legend relative to that of the panels.
-    """
-    grid = figure.add_gridspec(2, panels, height_ratios=(1.0, share))
-    below = figure.add_subplot(grid[1, :])
-    below.axis("off")
-    return [figure.add_subplot(grid[0, index]) for index in range(panels)], below

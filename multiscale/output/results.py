@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
+from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
 from pathlib import Path
@@ -188,9 +189,10 @@ class RunFigures:
         # larger ones take minutes beside their figures, and long to send
         few = self._run.coupling.surface.heights.size <= 2**20
         if self._figures and self._run.comm is None and cores() > 1 and few:
-            self._process = FigureProcess()
-            for drawing in self._before_load_steps():
-                self._begun[drawing.name] = self._process.draw(drawing)
+            with suppress(OSError):  # no process can be started, and figures are drawn here
+                self._process = FigureProcess()
+                for drawing in self._before_load_steps():
+                    self._begun[drawing.name] = self._process.draw(drawing)
 
     def drawn(self) -> list[Pictures]:
         """Return the files of all figures; none of a run without load steps, or that wants none.

@@ -176,17 +176,18 @@ class Journal:
         try:
             for value, mark in unsealed(path.read_bytes()):
                 if mark.records > 1:
-                    yield _result(value)
+                    yield CaseResult(**value)
                 elif differing := list(changes(self._identity, value)):
                     raise InputError(
                         f"holds the cases of another scene, where {told(differing)}", key="--out",
                         value=str(path.parents[2]), allowed="another folder, or --overwrite",
                     )  # fmt: skip
-        except InputError as error:
-            if error.key:
+        except (InputError, TypeError) as error:
+            if getattr(error, "key", None):
                 raise
+            problem = getattr(error, "problem", "was written by another patchlaw")
             raise InputError(
-                f"{error.problem}; remove it, and its cases are computed again", file=str(path)
+                f"{problem}; remove it, and its cases are computed again", file=str(path)
             ) from None
 
     def writer(self, part: tuple[int, int], rank: int) -> Callable[[CaseResult], None]:
@@ -281,14 +282,6 @@ def _read(
     before = {number for numbers in held[:rank] for number in numbers}
     first = {number: one for number, one in mine.items() if number not in before}
     return first, set().union(*held)
-
-
-def _result(value: dict[str, Any]) -> CaseResult:
-    """Return the result that a record holds."""
-    try:
-        return CaseResult(**value)
-    except TypeError:
-        raise InputError("was written by another patchlaw") from None
 
 
 def part_name(part: tuple[int, int]) -> str:
