@@ -208,8 +208,12 @@ class RunFigures:
                 comm = self._run.comm
                 return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
             draw, begun = self._process.draw, self._begun
+            starts = not all(one.done() for one in begun.values())  # then this one helps
             ahead = [begun.get(drawing.name) or draw(drawing) for drawing in drawings]
-            return [one.result() for one in ahead]
+            return [
+                pictures_of(drawing) if starts and one.cancel() else one.result()
+                for drawing, one in zip(drawings, ahead, strict=True)
+            ]
 
     def _before_load_steps(self) -> Iterator[Drawing]:
         yield surface_drawing(self._run.coupling)
