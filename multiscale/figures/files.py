@@ -8,6 +8,7 @@ import sys
 import traceback
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
@@ -152,17 +153,13 @@ def serve(handle: int) -> None:
         handle: Number of the file that is this end.
     """
     connection = Connection(handle)
-    try:
+    with suppress(Exception):  # it is told with the first figure
         for module in ("contact", "curves", "surface"):
             import_module(f"multiscale.figures.{module}")
-    except Exception:
-        pass  # it is told with the first figure
-    try:
+    with suppress(OSError, EOFError):
         while True:
             drawing = connection.recv()
             try:
                 connection.send(pictures_of(drawing))
             except Exception:
                 connection.send(traceback.format_exc())
-    except (OSError, EOFError):
-        return
