@@ -18,11 +18,7 @@ from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
-from multiscale.studies.configurations import (
-    Configuration,
-    configurations,
-    pressure_grid,
-)
+from multiscale.studies.configurations import Configuration, configurations, pressure_grid
 from multiscale.studies.errors import (
     ERRORS,
     NO_ERRORS,
