@@ -28,10 +28,9 @@ from multiscale.observers.step_observers import (
     StiffnessObserver,
     WorkObserver,
 )
-from multiscale.results.accuracy_verdict import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.yielding_notes import energy_notes, yielding_notes
+from multiscale.results.notes import energy_notes, verdict, yielding_notes
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup

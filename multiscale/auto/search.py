@@ -35,7 +35,7 @@ from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.measured_errors import ZERO, ErrorProbe
-from multiscale.results.accuracy_verdict import relative_error
+from multiscale.results.notes import relative_error
 from multiscale.scene.scene import Scene
 from support.errors import InputError, NotConverged
 

@@ -63,7 +63,7 @@ FLOORS = {
         "setup",
         "run",
         "doctor output restart",
-        "compiled_forms studies",
+        "studies",
         "cli",
         "__main__",
     ],

@@ -133,7 +133,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
         assert "most of it by laws" in said
     recorded = provenance(run, options=[])["accuracy"]
     assert recorded["kept"] is False and recorded["error"] == verdict.error
-    assert f'<p class="warning">{said}</p>' in report_html(run, {}, options=[])
+    assert f'<p class="warning">{said}</p>' in report_html(run, {}, provenance(run, options=[]))
     terminal.show_history(None, history)
     assert "caution: the accuracy of 0.001 % is not kept" in " ".join(
         capsys.readouterr().out.split()

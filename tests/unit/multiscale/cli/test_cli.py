@@ -51,7 +51,6 @@ def test_run_writes_everything(capsys, tmp_path):
     assert names == {
         "history.csv", "patches.csv", "laws.h5", "provenance.json", "report.html",
         "overview.png", "surface.png", "curves.png", "pressures.png", "laws.png",
-        "overview.svg", "surface.svg", "curves.svg", "pressures.svg", "laws.svg",
     }  # fmt: skip
     with (out / "history.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

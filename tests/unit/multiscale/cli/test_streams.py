@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from multiscale.output.streams import SturdyStream, sturdy_streams
+from multiscale.cli.command_line import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
