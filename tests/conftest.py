@@ -1,4 +1,4 @@
-"""What several folders of tests share: starting a command under MPI, counting iterations."""
+"""What folders of tests share: bodies solved for once, commands under MPI, counted iterations."""
 
 import os
 import subprocess
@@ -13,8 +13,22 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import numpy as np
 from helpers.mpi_environment import MPI_ENVIRONMENT
 
-# a test computes what it tests, and leaves nothing in the home of who runs it
+# nothing is left in the home of who runs the tests
 os.environ["PATCHLAW_CACHE"] = "off"
+SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
+"""Where the compliance of a body is itself what is tested."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def shared_bodies(request, tmp_path_factory):
+    """Let the other tests of a session read the compliance of a block that one has solved for."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.nodeid.startswith(SOLVED_ANEW):
+            folder = tmp_path_factory.getbasetemp()
+            if "PYTEST_XDIST_WORKER" in os.environ:  # beside the folders of all workers
+                folder = folder.parent
+            patch.setenv("PATCHLAW_CACHE", str(folder / "bodies"))
+        yield
 
 
 @pytest.fixture(scope="session")
