@@ -12,6 +12,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 from helpers.mpi_environment import MPI_ENVIRONMENT
+from helpers.waiting_ranks import WaitingRanks
 
 # nothing is left in the home of who runs the tests
 os.environ["PATCHLAW_CACHE"] = "off"
@@ -54,6 +55,22 @@ def mpirun(root):
         )
 
     return start
+
+
+@pytest.fixture(scope="session")
+def waiting_ranks(root, tmp_path_factory):
+    """Return what `mpirun` returns, but from ranks that wait for the next command."""
+    started = {}
+
+    def run(ranks, *words, timeout=240):
+        if ranks not in started or not started[ranks].are_waiting:
+            folder = tmp_path_factory.mktemp(f"{ranks}_ranks")
+            started[ranks] = WaitingRanks(ranks, root, folder)
+        return started[ranks].run(list(map(str, words)), timeout)
+
+    yield run
+    for each in started.values():
+        each.end()
 
 
 @pytest.fixture(scope="session")

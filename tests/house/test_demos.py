@@ -63,7 +63,7 @@ def test_demo_is_a_narrative_that_asserts_a_number(demo):
 
 
 @pytest.mark.long
-def test_demo_runs_under_mpi(mpirun, tmp_path):
-    done = mpirun(2, "demos/rough_block.py", "--quick", "--out", tmp_path)
+def test_demo_runs_under_mpi(waiting_ranks, tmp_path):
+    done = waiting_ranks(2, "demos/rough_block.py", "--quick", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("rough block  approach") == 1

@@ -9,11 +9,11 @@ SCRIPT = Path(__file__).with_name("body_ranks_script.py")
 
 
 @pytest.mark.long
-def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_path):
+def test_compliance_in_modes_is_the_same_on_any_ranks(waiting_ranks, monkeypatch, tmp_path):
     results = {}
     for ranks in (1, 2, 3):
         monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / str(ranks)))
-        done = mpirun(ranks, SCRIPT)
+        done = waiting_ranks(ranks, SCRIPT)
         assert done.returncode == 0, done.stdout + done.stderr
         found = json.loads(done.stdout.splitlines()[-1])
         assert found["errors"] == ["no room"] * ranks

@@ -7,9 +7,9 @@ pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what was found on every number of ranks."""
-    return OnRanks(mpirun, "multigrid_ranks_script.py")
+    return OnRanks(waiting_ranks, "multigrid_ranks_script.py")
 
 
 KINDS = {

@@ -6,8 +6,8 @@ from helpers.on_ranks import OnRanks
 
 
 @pytest.mark.long
-def test_contact_of_a_foot_does_not_depend_on_the_ranks(mpirun):
-    found = OnRanks(mpirun, "rough_face_script.py")
+def test_contact_of_a_foot_does_not_depend_on_the_ranks(waiting_ranks):
+    found = OnRanks(waiting_ranks, "rough_face_script.py")
     for ranks in (2, 3):
         assert found[ranks]["nodes"] == found[1]["nodes"]
         assert min(found[1]["nodes"]) > 0

@@ -8,9 +8,9 @@ pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what was found on every number of ranks."""
-    return OnRanks(mpirun, "rough_ranks_script.py")
+    return OnRanks(waiting_ranks, "rough_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)
