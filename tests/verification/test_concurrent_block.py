@@ -88,7 +88,7 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     ("block", "way", "tilt", "patches"),
     [
         ("pancake", "decomposed", "tilted", 4),
-        ("cube", "decomposed", "level", 1),
+        pytest.param("cube", "decomposed", "level", 1, marks=pytest.mark.long),
         ("cube", "decomposed", "tilted", 16),
         ("column", "decomposed", "tilted", 2),
         ("cube", "finite-element", "tilted", 1),

@@ -56,6 +56,7 @@ def test_rubber_under_a_plane():
 def test_blocks_that_do_not_bulge(nu):
     # hard: cells couple differently; the witness is the half-space in closed form and its rest
     laws = {"coupling__kind": "isolated", "block__poisson_ratio": nu, "patches__grid": [2, 2]}
+    laws |= coarse_tables("isolated")
     mesh = history(coupling__newton="full", block__element="Q2", **laws).force_N[-1]
     split = history(coupling__compliance="decomposed", **laws).force_N[-1]
     assert mesh == pytest.approx(split, rel=5e-3)
@@ -146,7 +147,8 @@ def test_a_slender_column_adds_its_own_length():
 @pytest.mark.parametrize(("height", "bound"), [("0.02 mm", 8), ("50 mm", 8)])
 def test_flat_and_slender_blocks_on_the_mesh(height, bound):
     # hard: cells of 50 : 1; geometric multigrid coarsens where planes are close
-    found = history(coupling__kind="isolated", coupling__newton="full", block__height=height)
+    block = {"coupling__newton": "full", "block__height": height}
+    found = history(coupling__kind="isolated", **block, **coarse_tables("isolated"))
     assert found.linear_iterations.sum() <= bound * max(found.newton_iterations.sum(), 1)
     assert abs(found.steps[-1].imbalance) < 1e-9  # the residual is 1e-10 of the load
 
@@ -157,7 +159,7 @@ def test_love_on_a_patch_as_large_as_the_block():
     told = list(make_setup(scene(coupling__kind="isolated", **large)).warnings())
     assert any("not small against the block" in one for one in told)
     right = history(coupling__kind="concurrent", **large).force_N[-1]
-    wrong = history(coupling__kind="isolated", **large).force_N[-1]
+    wrong = history(coupling__kind="isolated", **large, **coarse_tables("isolated")).force_N[-1]
     assert 0.02 < abs(wrong / right - 1.0) < 0.5
 
 
