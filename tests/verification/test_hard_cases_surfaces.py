@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.hard_cases import centred, from_file, history, scene
+from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
 
 from geometry.files.reading import read_surface
 from geometry.filters import filled
@@ -29,7 +29,9 @@ def test_couplings_agree_on_surfaces_that_are_not_smooth(name, tmp_path):
     # hard: whole flat regions touch at once, or a single cell carries all
     surface = from_file(tmp_path, SURFACES[name])
     found = {
-        kind: history(coupling__kind=kind, micro__finite_slopes=False, **surface)
+        kind: history(
+            coupling__kind=kind, micro__finite_slopes=False, **surface, **coarse_tables(kind)
+        )
         for kind in ("isolated", "consistent", "concurrent")
     }
     force = found["concurrent"].force_N[-1]

@@ -50,7 +50,7 @@ def curve(case, name, approaches):
 @both_shapes
 @every_case
 def test_force_grows_without_a_jump(case, name):
-    approaches = np.linspace(0.0, 0.1, 201)
+    approaches = np.linspace(0.0, 0.1, 101)
     response = curve(case, name, approaches)
     assert response.overlapping_contacts[-1] > 0 and response.residual.max() <= 1e-10
     increments = np.diff(response.force)
