@@ -42,10 +42,7 @@ def half_space():
 )
 def test_one_patch_on_a_large_block_is_the_half_space(half_space, interface):
     more = [f"coupling.interface={interface}"] * (interface != "patchwise")  # the default
-    errors = [
-        np.abs(force(*block_of(ratio), *more) / half_space - 1)
-        for ratio in (2, 8)
-    ]
+    errors = [np.abs(force(*block_of(ratio), *more) / half_space - 1) for ratio in (2, 8)]
     # a clamped bottom at distance H takes ~ 1/H off the displacement
     assert np.all(np.diff(errors, axis=0) < 0)
     # what is left at 8 times: the block's size and eight linear cells across the patch

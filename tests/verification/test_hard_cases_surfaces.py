@@ -63,9 +63,7 @@ def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
     assert not any("not full" in note for note in asked.notes)
 
 
-@pytest.mark.parametrize(
-    "kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.long)]
-)
+@pytest.mark.parametrize("kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.long)])
 def test_full_contact_is_as_stiff_as_a_flat_surface(kind, tmp_path):
     # hard: the law saturates; beyond full contact only the block is compressed
     flat = from_file(tmp_path, np.zeros((16, 16)))

@@ -11,7 +11,8 @@ SEEDS = (3, 12, 42, 56, 74, 126)
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=[pytest.mark.long] * (seed in (12, 74, 126))) for seed in SEEDS]
+    "seed",
+    [pytest.param(seed, marks=[pytest.mark.long] * (seed in (12, 74, 126))) for seed in SEEDS],
 )
 def test_what_must_hold_of_any_scene(seed, tmp_path):
     # tables of few rows: what holds of any scene holds whatever their error
