@@ -1,4 +1,4 @@
-"""A block's compliance in modes on 1, 2 and 3 ranks, solved for or from the cache, or failing."""
+"""A block's compliance in modes on 1 and 3 ranks, solved for or from the cache, or failing."""
 
 import json
 from pathlib import Path
@@ -11,7 +11,7 @@ SCRIPT = Path(__file__).with_name("body_ranks_script.py")
 @pytest.mark.long
 def test_compliance_in_modes_is_the_same_on_any_ranks(waiting_ranks, monkeypatch, tmp_path):
     results = {}
-    for ranks in (1, 2, 3):
+    for ranks in (1, 3):
         monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / str(ranks)))
         done = waiting_ranks(ranks, SCRIPT)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -21,4 +21,4 @@ def test_compliance_in_modes_is_the_same_on_any_ranks(waiting_ranks, monkeypatch
         assert len(list((tmp_path / str(ranks)).iterdir())) == 1
         assert results[ranks]["kept, first"] == results[ranks]["kept, again"]
     # whole families are solved by one rank each: to the last bit
-    assert results[1] == results[2] == results[3]
+    assert results[1] == results[3]

@@ -124,9 +124,12 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize(
-    "scene", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in SCENES]
+    ("scene", "ranks"),
+    [
+        *((name, 2) for name in sorted(SCENES.keys() - LONG)),
+        *(pytest.param(name, 3, marks=pytest.mark.long) for name in SCENES),
+    ],
 )
 def test_same_numbers_on_any_number_of_ranks(waiting_ranks, alone, tmp_path, scene, ranks):
     words = ("-m", "patchlaw", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
