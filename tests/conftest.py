@@ -11,7 +11,7 @@ import pytest
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from helpers.mpi_environment import MPI_ENVIRONMENT
+from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.waiting_ranks import WaitingRanks
 
 # nothing is left in the home of who runs the tests
@@ -47,7 +47,7 @@ def mpirun(root):
         return subprocess.run(
             command,
             cwd=root,
-            env=os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(root)},
+            env=os.environ | BESIDE_OTHERS | {"PYTHONPATH": str(root)},
             capture_output=True,
             text=True,
             timeout=timeout,  # a hang is a failure, not a wait

@@ -8,5 +8,6 @@ MPI_ENVIRONMENT = {
     "OMPI_MCA_rmaps_base_oversubscribe": "1",
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_btl": "^tcp",
-    "OMPI_MCA_mpi_yield_when_idle": "1",  # beside the ranks of other tests
 }
+BESIDE_OTHERS = MPI_ENVIRONMENT | {"OMPI_MCA_mpi_yield_when_idle": "1"}
+"""The same where other ranks share the cores: those that wait leave them to who works."""

@@ -17,7 +17,7 @@ import traceback
 from contextlib import contextmanager
 from pathlib import Path
 
-from .mpi_environment import MPI_ENVIRONMENT
+from .mpi_environment import BESIDE_OTHERS
 
 
 class WaitingRanks:
@@ -37,7 +37,7 @@ class WaitingRanks:
         self._orders = [os.open(folder / str(rank), os.O_RDWR) for rank in range(ranks)]
         self._ended = os.open(folder / "ended", os.O_RDWR | os.O_NONBLOCK)
         command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "helpers.waiting_ranks"]
-        environment = os.environ | MPI_ENVIRONMENT
+        environment = os.environ | BESIDE_OTHERS
         environment["PYTHONPATH"] = os.pathsep.join(map(str, (root, root / "tests")))
         with (folder / "log").open("wb") as log:
             self._process = subprocess.Popen(
