@@ -31,11 +31,11 @@ class WaitingRanks:
 
     def __init__(self, ranks, root, folder):
         self._ranks, self._folder, self._jobs = ranks, folder, 0
-        for name in (*map(str, range(ranks)), "ended"):
+        names = *map(str, range(ranks)), "ended"
+        for name in names:
             os.mkfifo(folder / name)
         # open for both ways, so that nobody waits for the other side to open
-        self._orders = [os.open(folder / str(rank), os.O_RDWR) for rank in range(ranks)]
-        self._ended = os.open(folder / "ended", os.O_RDWR | os.O_NONBLOCK)
+        self._pipes = [os.open(folder / name, os.O_RDWR | os.O_NONBLOCK) for name in names]
         command = ["mpirun", "-n", str(ranks), sys.executable, "-m", "helpers.waiting_ranks"]
         environment = os.environ | BESIDE_OTHERS
         environment["PYTHONPATH"] = os.pathsep.join(map(str, (root, root / "tests")))
@@ -54,7 +54,7 @@ class WaitingRanks:
         """Return what a command printed, rank after rank, and the code that all ended with."""
         self._jobs += 1
         order = {"words": words, "job": self._jobs, "cache": os.environ["PATCHLAW_CACHE"]}
-        for pipe in self._orders:
+        for pipe in self._pipes[:-1]:
             os.write(pipe, json.dumps(order).encode() + b"\n")
         codes = self._codes(timeout)
         printed = [
@@ -65,9 +65,10 @@ class WaitingRanks:
             for name in ("stdout", "stderr")
         ]
         if len(codes) < self._ranks or len(set(codes)) > 1:
-            self.end(kill=True)
             printed[1] += f"\nof {self._ranks} ranks some ended alone, with codes {codes}\n"
             codes = [1]
+        if codes[0] == 1:  # a bug may leave anything behind
+            self.end(kill=True)
         return subprocess.CompletedProcess(words, codes[0], *printed)
 
     def _printed(self, rank, name):
@@ -77,23 +78,23 @@ class WaitingRanks:
         """Return the codes of the ranks that end in time; when one has failed, others soon must."""
         until, text = time.monotonic() + timeout, b""
         with selectors.DefaultSelector() as selector:
-            selector.register(self._ended, selectors.EVENT_READ)
+            selector.register(self._pipes[-1], selectors.EVENT_READ)
             while text.count(b"\n") < self._ranks and self.are_waiting:
                 if time.monotonic() > until:
                     break
                 if selector.select(timeout=0.2):
-                    text += os.read(self._ended, 4096)
+                    text += os.read(self._pipes[-1], 4096)
                     if set(text.split()) != {b"0"}:
                         until = min(until, time.monotonic() + 20.0)
         return [int(code) for code in text.split()]
 
     def end(self, kill=False):
-        """End the ranks."""
-        if self.are_waiting and kill:
+        """End the ranks, if they have not ended."""
+        if kill and self.are_waiting:
             os.killpg(self._process.pid, signal.SIGTERM)
-        for pipe in (*self._orders, self._ended):
+        for pipe in self._pipes:
             os.close(pipe)
-        self._orders = []
+        self._pipes = []
         self._process.wait(timeout=60)
 
 
