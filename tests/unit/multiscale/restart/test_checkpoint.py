@@ -39,7 +39,7 @@ COUPLINGS = {
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
     | {"surface": {"grid": [32, 32]}, "micro": {"model": "half-space"}}
-    | {"coupling": {"kind": "consistent", "table_tolerance": 0.01}},
+    | {"coupling": {"kind": "consistent", "table_tolerance": 0.05}},
     "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
