@@ -1,7 +1,8 @@
 """Ranks that wait for commands: Python, dolfinx and MPI are started once for many tests.
 
 What a fresh process decides (signals, options of PETSc, threads, ends by a bug) is tested by
-``mpirun``; all else gives the same here, 1.5 s of each rank cheaper.
+``mpirun``; all else gives the same here, 1.5 s of each rank cheaper. What a command changes in
+modules or PETSc's options it has to change back.
 """
 
 import gc
