@@ -91,7 +91,7 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
         pytest.param("cube", "decomposed", "level", 1, marks=pytest.mark.long),
         ("cube", "decomposed", "tilted", 8),
         ("column", "decomposed", "tilted", 2),
-        ("cube", "finite-element", "tilted", 1),
+        pytest.param("cube", "finite-element", "tilted", 1, marks=pytest.mark.long),
         pytest.param("cube", "finite-element", "level", 4, marks=pytest.mark.long),
     ],
 )

@@ -52,7 +52,7 @@ def test_rubber_under_a_plane():
     assert state.linear_iterations <= 15 * state.iterations  # 41 in 4 sets were counted
 
 
-@pytest.mark.parametrize("nu", [0.0, -0.5])
+@pytest.mark.parametrize("nu", [pytest.param(0.0, marks=pytest.mark.long), -0.5])
 def test_blocks_that_do_not_bulge(nu):
     # hard: cells couple differently; the witness is the half-space in closed form and its rest
     laws = {"coupling__kind": "isolated", "block__poisson_ratio": nu, "patches__grid": [2, 2]}
@@ -112,7 +112,10 @@ WAYS = {
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way",
+    [pytest.param(way, marks=[pytest.mark.long] * (way == "isolated on the mesh")) for way in WAYS],
+)
 def test_metres_and_micrometres(way):
     # hard: lengths that no power of two scales, so that every rounding is another one
     def measured(unit, size):

@@ -20,6 +20,10 @@ from multiscale.run import Run
 from support.errors import NotConverged
 
 every_kind = pytest.mark.parametrize("kind", KINDS)
+# isolated laws are tables as consistent ones are
+isolated_later = pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=[pytest.mark.long] * (kind == "isolated")) for kind in KINDS]
+)
 
 
 @every_kind
@@ -40,7 +44,7 @@ def test_first_touch_of_one_asperity(kind, tmp_path):
     assert found.newton_iterations.max() <= 8
 
 
-@every_kind
+@isolated_later
 def test_smallest_forces_first(kind):
     # hard: the plane has to be placed to far below the rounding of what closures start at
     forces = [1e-9, 1e-6, 1e-3, 1.0, 0.0]
@@ -96,7 +100,7 @@ def test_tilt_that_leaves_half_the_patches_open(kind):
     assert found.newton_iterations.max() <= (60 if kind in ("analytic", "concurrent") else 8)
 
 
-@every_kind
+@isolated_later
 def test_a_gap_shifted_by_a_ten_thousandth(kind):
     # hard: a table of laws must not turn a small change of the gap into noise
     small = {"coupling__kind": kind, "surface__grid": [16, 16], **coarse_tables(kind)}

@@ -24,7 +24,10 @@ SURFACES = {
 }
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.long] * (n in ("step", "plateau"))) for n in SURFACES],
+)
 def test_couplings_agree_on_surfaces_that_are_not_smooth(name, tmp_path):
     # hard: whole flat regions touch at once, or a single cell carries all
     surface = from_file(tmp_path, SURFACES[name])

@@ -43,6 +43,8 @@ def pressed(folder, heights, kind, model, turned=False):
 LONG = [
     ("consistent", "half-space"),
     ("consistent", "elliptic"),
+    ("isolated", "half-space"),  # isolated laws of ellipses, and ellipses alone, stay
+    ("concurrent", "elliptic"),
 ]
 
 
