@@ -40,7 +40,7 @@ def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
     lines = [f"{name} = {_toml(section)}" for name, section in given.items()]
     scene = tmp_path / "scene.toml"
     scene.write_text("\n".join(lines))
-    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command == "run" else [])]
+    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command != "plan" else [])]
     code = (
         "import json, sys\nfrom multiscale.cli.command_line import main\n"
         f"code = main({words!r})\n"
@@ -68,7 +68,7 @@ def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(tmp_path,
 
 def test_figures_load_the_pictures_that_others_do_without(tmp_path):
     """The witness of the test above can fail."""
-    assert "matplotlib" in loaded(tmp_path, "run", data(output={"report": False}))
+    assert "matplotlib" in loaded(tmp_path, "surface", data())
 
 
 def never(*given, **options):

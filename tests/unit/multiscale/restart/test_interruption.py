@@ -208,7 +208,13 @@ sys.exit(command_line.main(["schema"]))
 """
 
 
-@pytest.mark.parametrize("module", ["dolfinx.cpp", "basix._basixcpp", "petsc4py.PETSc", "cffi.api"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "dolfinx.cpp", "petsc4py.PETSc",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("basix._basixcpp", "cffi.api")),
+    ],
+)  # fmt: skip
 def test_a_signal_while_finite_elements_are_imported_ends_with_its_code(root, module):
     """Compiled modules turn what interrupts their import into an ImportError of their own."""
     done = subprocess.run(

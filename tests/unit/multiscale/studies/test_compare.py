@@ -23,6 +23,7 @@ from support.errors import InputError, NotConverged
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 TINY = [
     "surface.grid=[64, 64]", "load.steps=2", "patches.grid=[2, 2]", "block.cells=[8, 8, 4]",
+    "output.check=none",
 ]  # fmt: skip
 OWN_NAME = "the scene as it is: isolated, 2 × 2 patches, circular, 8 × 8 × 4 elements"
 PICKED = (
