@@ -64,6 +64,7 @@ class FirstSteps:
         if residuals[0] <= NEAR or self._forces.control.force == 0.0:
             return [], 0
         best, step, spent = displacement.copy(), displacement.duplicate(), 0
+        own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
             self._forces.linearise(lines.stiffness)
@@ -81,6 +82,7 @@ class FirstSteps:
             if residuals[-1] <= min(residuals):
                 displacement.copy(best)
         best.copy(displacement)
+        solver.setTolerances(rtol=own)
         return residuals[:-1], spent
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:

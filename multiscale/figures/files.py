@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import traceback
@@ -116,7 +117,11 @@ class FigureProcess:
             stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True,
         )  # fmt: skip
         there.close()
-        self._line = ThreadPoolExecutor(1)  # the process takes half a second to listen
+        # PETSc ends this process when another one has closed its end, unless the signal is blocked
+        block = signal.pthread_sigmask
+        self._line = ThreadPoolExecutor(
+            1, initializer=block, initargs=(signal.SIG_BLOCK, [signal.SIGPIPE])
+        )
         self._ended = False
 
     def draw(self, drawing: Drawing) -> Future[Pictures]:

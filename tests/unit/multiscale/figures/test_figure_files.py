@@ -1,7 +1,6 @@
 """Figures are drawn once, by another process where one can, with room for every label."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
@@ -52,9 +51,24 @@ def test_an_error_while_drawing_is_told(process):
     assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
 
 
-def test_figures_are_drawn_here_where_the_process_has_ended(process):
-    os.kill(process._process.pid, signal.SIGKILL)
-    assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
+@pytest.mark.parametrize("before", ["", "from petsc4py import PETSc"])  # it handles signals
+def test_figures_are_drawn_here_where_the_process_has_ended(before):
+    script = (
+        f"{before}\n"
+        "import os, signal\n"
+        "from multiscale.figures.files import FigureProcess\n"
+        "from helpers_here import surface_drawing\n"
+        "process = FigureProcess()\n"
+        "os.kill(process._process.pid, signal.SIGKILL)\n"
+        "print(*process.draw(surface_drawing()).result().files)\n"
+        "process.close()\n"
+    ).replace("helpers_here", Path(__file__).stem)
+    paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+    ended = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60,
+        env=os.environ | {"PYTHONPATH": paths},
+    )  # fmt: skip
+    assert (ended.returncode, ended.stdout) == (0, "s.png\n"), ended.stderr
 
 
 def test_a_process_that_is_closed_draws_no_more(process):
