@@ -18,6 +18,7 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
@@ -37,6 +38,8 @@ _FEW_CELLS = 2**14
 _half_space = cached_where_small(
     lambda grid, spacing, *, periodic: grid[0] * grid[1] <= _FEW_CELLS, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
+_MOST_MATRICES = 4
+"""Matrices of few cells that are cached."""
 _DIFFERENCE = 1e-6
 """Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
 slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
@@ -47,6 +50,10 @@ class ComplianceTerm(Protocol):
 
     def displacement(self, pressure: Array, /) -> Array:
         """Return the displacements by pressures / E* on all these cells, shape (r, c) [mm]."""
+        ...
+
+    def between(self, row: Indices, column: Indices, /) -> Array:
+        """Return the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
         ...
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
@@ -104,6 +111,19 @@ class GridCompliance:
         """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
         return self._half_space.inverse.on_cells(cells, displacement)
 
+    def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
+        """Return the compliance of some cells alone as a matrix.
+
+        Args:
+            flat: Their flat indices, shape (n,).
+            columns: Number of columns of the grid.
+        """
+        row, column = np.divmod(flat, columns)
+        total = self._half_space.between(row, column)
+        for term in self._terms:
+            total += term.between(row, column)
+        return ComplianceMatrix(total)
+
     def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
         if self._last is None or self._last[0] is not cells:
@@ -138,7 +158,7 @@ class Compliance:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "_last"}
+        caches = {"half_space", "_terms_on", "_matrices", "_last"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -155,6 +175,25 @@ class Compliance:
         """
         terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
         return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+
+    def matrix_on(self, cells: Indices, grid: Grid, spacing: Pair) -> ComplianceMatrix:
+        """Return the compliance of few cells of the surface as a matrix; the last few are cached.
+
+        Args:
+            cells: Their flat indices, ascending, shape (n,).
+            grid: Numbers of cells of the surface.
+            spacing: Sides of a cell [mm].
+        """
+        key = cells.tobytes()
+        found = self._matrices.pop(key, None) or self.on_grid(grid, spacing).matrix(cells, grid[1])
+        self._matrices[key] = found
+        while len(self._matrices) > _MOST_MATRICES:
+            del self._matrices[next(iter(self._matrices))]
+        return found
+
+    @cached_property
+    def _matrices(self) -> dict[bytes, ComplianceMatrix]:
+        return {}
 
     @cached_property
     def _terms_on(self) -> Callable[[tuple[int, int], Pair, Pair, bool], list[ComplianceTerm]]:

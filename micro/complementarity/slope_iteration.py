@@ -91,7 +91,9 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
     accuracy, iterations, left = max(tolerance, _FIRST), 0, np.inf
     last = max(_CONVERGED, 10.0 * tolerance)
     for _ in range(_MOST_SOLUTIONS):
-        lowered = replace(problem, interference=interference - displaced, tolerance=accuracy)
+        lowered = replace(
+            problem, interference=interference - displaced, lowered=displaced, tolerance=accuracy
+        )
         solution = start = solve_on_surface(lowered, start)
         iterations += solution.iterations
         touching = solution.pressure > 0.0
