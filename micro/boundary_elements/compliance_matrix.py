@@ -31,6 +31,11 @@ class ComplianceMatrix:
         self._last: tuple[Cells, Array, tuple[Array, bool]] | None = None
         self.products = 0
 
+    @property
+    def nbytes(self) -> int:
+        """Size of the matrix [B]."""
+        return self._matrix.nbytes
+
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
 

@@ -38,8 +38,8 @@ _FEW_CELLS = 2**14
 _half_space = cached_where_small(
     lambda grid, spacing, *, periodic: grid[0] * grid[1] <= _FEW_CELLS, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
-_MOST_MATRICES = 4
-"""Matrices of few cells that are cached."""
+_MOST_BYTES = 1e8
+"""Size of the matrices of few cells that are cached [B]."""
 _DIFFERENCE = 1e-6
 """Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
 slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
@@ -187,7 +187,7 @@ class Compliance:
         key = cells.tobytes()
         found = self._matrices.pop(key, None) or self.on_grid(grid, spacing).matrix(cells, grid[1])
         self._matrices[key] = found
-        while len(self._matrices) > _MOST_MATRICES:
+        while sum(one.nbytes for one in self._matrices.values()) > _MOST_BYTES:
             del self._matrices[next(iter(self._matrices))]
         return found
 

@@ -41,12 +41,15 @@ class ContactPressures(NamedTuple):
         motion: Free motions of the body, counted from where the interference was, (k,) [mm].
         residual: Largest violation of the contact conditions over the largest interference.
         iterations: Products of the compliance with pressures.
+        by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None where that
+            is not known.
     """
 
     pressure: Array
     motion: Array = np.zeros(0)
     residual: float = 0.0
     iterations: int = 0
+    by_slopes: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

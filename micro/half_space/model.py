@@ -207,7 +207,7 @@ class HalfSpaceModel:
         yielding, pressure = solved.pressure >= self._bound, solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
-        displacement = self._displacement(pressure)
+        displacement = self._displacement(pressure, solved.by_slopes)
         state = ContactState(
             plane=plane,
             patches=patches,
@@ -221,6 +221,7 @@ class HalfSpaceModel:
             displacement=displacement,
             yielding=yielding,
             earlier_depth=depth,
+            by_slopes=solved.by_slopes,
         )
         depths = self.reference_height - means
         return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
@@ -302,19 +303,18 @@ class HalfSpaceModel:
         problem, first = self._problem(interference, control.free, control.loads), None
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
-            first = ContactPressures(known, np.array([start.plane.approach]))
+            motion_there = np.array([start.plane.approach])
+            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
 
-    def _displacement(self, pressure: Array) -> Array:
+    def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
-        compliance, pressure = self.compliance, np.divide(pressure, self.contact_modulus)
-        moved = compliance.on_grid(pressure.shape, self.surface.spacing).displacement(pressure)
-        if self.slopes:
-            moved += compliance.slope_displacement(pressure)
-        return moved
+        grid = self.compliance.on_grid(pressure.shape, self.surface.spacing)
+        moved = grid.displacement(np.divide(pressure, self.contact_modulus))
+        return moved if by_slopes is None else moved + by_slopes
 
     def _elastic_stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
         """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from micro import ContactState, MicroModel, Start, influence_matrix, stacked
+from micro import ContactState, MicroModel, Start, influence_matrix, press_along, stacked
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -153,6 +153,7 @@ class WholeSurface:
     comm: Any = None
     observe: Callable[[int], None] | None = None
     _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
+    _starts: dict[float, Start] = field(default_factory=dict, init=False)
     _seconds: dict[float, float] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
@@ -227,18 +228,14 @@ class WholeSurface:
 
     def _solve(self, approaches: Array) -> list[ContactState]:
         """Solve the contact problem at all approaches, shared by the ranks."""
-        count = _ROWS_TOGETHER
+        count = len(approaches)
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
         def solve(part: int) -> list[tuple[ContactState, float]]:
-            rows, start = [], None
-            for approach in parts[part]:
-                began = time.process_time()
-                control = Control(approach=float(approach), tilt=self.tilt)
-                state = self._press(control, start)
-                start = state.guess
-                rows.append((state.summary(), time.process_time() - began))
-            return rows
+            began = time.process_time()
+            states = press_along(self.model, parts[part], patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt, known=self._starts)
+            for a,s in zip(parts[part].tolist(),states): self._starts[a]=s.guess
+            return [(state.summary(), time.process_time() - began) for state in states]
 
         def solved(done: int) -> None:
             if self.observe is not None:
