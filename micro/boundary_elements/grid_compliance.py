@@ -158,7 +158,7 @@ class Compliance:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "_matrices", "_last"}
+        caches = {"half_space", "_terms_on", "body_on", "_matrices", "_last"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -211,11 +211,15 @@ class Compliance:
             )
             terms.append(side_cells(self.sides, spacing).among(rows, columns))
         if self.body is not None:
-            terms.append(self.body_on(grid, spacing, corner))
+            terms.append(self.body_on((grid[0], grid[1]), spacing, corner))
         return terms
 
-    def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
-        """Return what the finite body, which must be given, adds on cells; see `on_grid`."""
+    @cached_property
+    def body_on(self) -> Callable[..., ModesOnCells]:
+        """Function from cells to what the finite body adds on them, cached; see `on_grid`."""
+        return lru_cache(maxsize=_MOST_GRIDS)(self._make_body)
+
+    def _make_body(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
         assert self.body is not None
         x, y = (
             start + step * np.arange(n + 1)

@@ -26,6 +26,8 @@ _AHEAD = 2e-2
 """Residual of a solution over the last change by finite slopes: about what the next change is."""
 _CAUTION = 4.0
 """Factor on the rate at which changes by finite slopes fell last, for the next one."""
+_BY_SLOPES = 0.1
+"""Largest part of the displacements that finite slopes add."""
 _CONVERGED = 3e-9
 """Change by finite slopes at which the iteration ends, over the largest interference."""
 _MEMORY = 2
@@ -87,11 +89,12 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
     tolerance = problem.tolerance
     if not compliance.slopes:
         return solve_on_surface(problem, start)
-    mixing, displaced = AndersonMixing(), np.zeros(interference.shape)
+    mixing, displaced, first = AndersonMixing(), np.zeros(interference.shape), _FIRST
     if start is not None and start.pressure.any():
         known = start.by_slopes
         displaced = compliance.slope_displacement(start.pressure) if known is None else known
-    accuracy, iterations, left, ahead = max(tolerance, _FIRST), 0, np.inf, np.inf
+        first = _FIRST**2
+    accuracy, iterations, left, ahead = max(tolerance, first), 0, np.inf, np.inf
     last = max(_CONVERGED, 10.0 * tolerance)
     for _ in range(_MOST_SOLUTIONS):
         lowered = replace(
@@ -120,7 +123,8 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
             left = float(np.abs(change[touching]).max()) / largest
         if exact and left <= last:
             return found._replace(residual=max(solution.residual, left))
-        ahead = left * (_CAUTION * left / before if before < np.inf else _AHEAD)
+        rate = min(1.0, _CAUTION * left / before) if 0.0 < before < np.inf else _AHEAD
+        ahead = rate * left + _BY_SLOPES * solution.residual
         displaced = mixing.next(displaced, change)
         accuracy = tolerance if ahead <= last else min(_FIRST, ahead)
     raise NotConverged(
