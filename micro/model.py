@@ -81,6 +81,13 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
+    def is_quick(self, control: Control) -> bool:
+        """Return whether a solution takes milliseconds, from one nearby, up to a load.
+
+        Args:
+            control: The load.
+        """
+
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
@@ -113,7 +120,7 @@ def press_along(
     tilt: tuple[float, float] | None = (0.0, 0.0),
     known: Mapping[float, Start] | None = None,
 ) -> list[ContactState]:
-    """Press to approaches, from the largest down, each from the solutions next to it.
+    """Press to approaches, one after the other, each from the solutions next to it.
 
     Args:
         model: The micro model.
@@ -135,7 +142,7 @@ def press_along(
     if wanted.ndim != 1:
         raise InputError("the approaches are no list", value=wanted.shape, allowed="numbers in mm")
     starts, states = dict(known or {}), {}
-    for approach in sorted(set(wanted.tolist()), reverse=True):
+    for approach in sorted(set(wanted.tolist())):
         states[approach] = model.press(
             Control(approach=approach, tilt=tilt),
             patches=patches,

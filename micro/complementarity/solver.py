@@ -86,6 +86,16 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
         first, most = solution.pressure, _MARGIN * approach
 
 
+def touches_few_cells(problem: CellProblem) -> bool:
+    """Return whether a body that does not move freely is solved for on few cells by a matrix.
+
+    Args:
+        problem: The contact problem.
+    """
+    touchable = problem.interference > 0.0
+    return not touchable.any() or not isinstance(_place(problem, touchable)[0], slice)
+
+
 def _place(problem: CellProblem, touchable: Flags) -> Place:
     """Return where to solve: the rows and columns of few cells, or a box around many.
 

@@ -23,6 +23,7 @@ from micro.boundary_elements.grid_compliance import Compliance
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
+from micro.complementarity.solver import touches_few_cells
 from micro.complementarity.tangent import approach_stiffness
 from micro.half_space.cell_sums import summed
 from micro.model import Stiffness, checked_patches
@@ -225,6 +226,13 @@ class HalfSpaceModel:
         )
         depths = self.reference_height - means
         return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
+
+    def is_quick(self, control: Control) -> bool:
+        """Return whether the cells that a plane can touch are few; see `MicroModel.is_quick`."""
+        if self.periodic or control.approach is None or control.tilt is None:
+            return False
+        interference = self.interference(RigidPlane.moved(self.surface, control.prescribed(np.zeros(3))))
+        return touches_few_cells(self._problem(interference, control.free, control.loads))
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.

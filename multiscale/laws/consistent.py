@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -102,6 +102,7 @@ def consistent_laws(
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
+    whole = replace(whole, quick=model.is_quick(Control(approach=end, tilt=largest.tilt)))
     laws, error = refined(
         whole.rows,
         whole.laws,
@@ -143,6 +144,7 @@ class WholeSurface:
         tilt: Slopes of the plane; None lets it turn.
         comm: MPI communicator, whose ranks share the rows; None for this process alone.
         observe: Called with the number of rows that are solved.
+        quick: Whether a row takes so little that one rank solves them all.
     """
 
     model: MicroModel
@@ -152,6 +154,7 @@ class WholeSurface:
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
     observe: Callable[[int], None] | None = None
+    quick: bool = False
     _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
     _starts: dict[float, Start] = field(default_factory=dict, init=False)
     _seconds: dict[float, float] = field(default_factory=dict, init=False)
@@ -227,15 +230,28 @@ class WholeSurface:
         )
 
     def _solve(self, approaches: Array) -> list[ContactState]:
-        """Solve the contact problem at all approaches, shared by the ranks."""
-        count = len(approaches)
+        """Solve the contact problem at all approaches.
+
+        Quick solutions follow each other on one rank, each from those next to it. Others are shared
+        by the ranks, a few in sequence.
+        """
+        count = len(approaches) if self.quick else _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
         def solve(part: int) -> list[tuple[ContactState, float]]:
             began = time.process_time()
-            states = press_along(self.model, parts[part], patches=self.patches, mean_heights=self.mean_heights, tilt=self.tilt, known=self._starts)
-            for a,s in zip(parts[part].tolist(),states): self._starts[a]=s.guess
-            return [(state.summary(), time.process_time() - began) for state in states]
+            states = press_along(
+                self.model,
+                parts[part],
+                patches=self.patches,
+                mean_heights=self.mean_heights,
+                tilt=self.tilt,
+                known=self._starts,
+            )
+            if self.quick:
+                self._starts.update((state.approach, state.guess) for state in states)
+            seconds = (time.process_time() - began) / len(states)
+            return [(state.summary(), seconds) for state in states]
 
         def solved(done: int) -> None:
             if self.observe is not None:
