@@ -87,7 +87,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
     return memory["arrays"]
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=8)
 def _memory(comm: int, words: str) -> dict[str, Arrays]:
     """Return where the ranks of a communicator keep arrays for the rest of a run."""
     return {}

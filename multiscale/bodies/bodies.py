@@ -146,13 +146,47 @@ class Bodies:
         Note:
             Collective.
         """
-        if dense or self.patches.count <= solutions:
-            compliance = self.patch_compliance() if dense else self._of_first()
+        if dense:
+            compliance = self.patch_compliance()
             return lambda pressures: np.asarray(pressures @ compliance.T)
-        from macro import displacements_under
+        return self._by_loaded_patches(solutions)
 
-        face = self.contact_face()
-        return lambda pressures: displacements_under(face, pressures)
+    def _by_loaded_patches(self, solutions: int) -> Displacements:
+        """Return what gives displacements of the mesh, from those by patches that carry a load.
+
+        Args:
+            solutions: Patches that are loaded one by one, at most.
+        """
+        from mpi4py import MPI
+
+        from macro import displacements_under
+        from macro.compliance.cache import cached
+        from macro.linear_solvers.options import users_options
+
+        key, faces = (*self._as_text(), self.patches, users_options()), []
+        columns: dict[int, Array] = {}
+
+        def under(pressures: Array) -> Array:
+            if not faces:
+                faces.append(self.contact_face())
+            return displacements_under(faces[0], pressures)
+
+        def by_unit_load(patch: int) -> Array:
+            one = np.eye(1, self.patches.count, patch)
+            comm = self.comm or MPI.COMM_SELF
+            return cached("column", (*key, patch), lambda: {"column": under(one)}, comm)["column"]
+
+        def displacements(pressures: Array) -> Array:
+            loaded = np.flatnonzero(pressures.any(axis=0)).tolist()
+            if len(loaded) > solutions:
+                return under(pressures)
+            columns.update((patch, by_unit_load(patch)) for patch in loaded if patch not in columns)
+            total = np.zeros(pressures.shape)
+            for patch in loaded:
+                total += pressures[:, [patch]] * columns[patch]
+            return total
+
+        return displacements
 
     def patch_compliance(self) -> Array:
         """Return the compliance of both sides under the patches, shape (N, N) [mm/MPa].
