@@ -95,7 +95,7 @@ def test_is_the_proved_solution_on_all_cells(seed, given, hardness, few):
     found = state.pressures.ravel() / E_STAR
     # the oracle's cells lie within 1e-11 of the largest gap of their conditions
     assert found == pytest.approx(proved.pressure, abs=1e-8 * proved.pressure.max())
-    if hardness is not None:
+    if hardness is not None and control.force is None:
         assert np.any(state.yielding)
 
 
