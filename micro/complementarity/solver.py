@@ -34,8 +34,11 @@ _ROUGH = 2e-2
 """Residual on the coarse grids; their discretisation errs by more."""
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the box of cells that it overlaps holds the contact."""
-_MATRIX_WORK = 7e4
-"""Cube of the number of cells that are solved by a matrix, over those of the box, at most."""
+_MATRIX_WORK, _MATRIX_CELLS = 2e5, 2500
+"""Cube of the number of cells that are solved by a matrix, over those of the box, and their number,
+at most. On 32² to 256² cells between free sides a solution from one nearby takes 2 to 26 ms by the
+matrix there and 5 to 53 by transforms; at ten times that work they take equally long. Before that
+the matrix is made, which takes as long as a solution from nothing."""
 _DEPTHS = 1.5
 """Ratio of the depths below the highest cell that such cells lie within."""
 _ESTIMATE = 1e-2
@@ -111,7 +114,8 @@ def _place(problem: CellProblem, touchable: Flags) -> Place:
     depth = problem.undeformed.max() - problem.undeformed
     deepest = max(float(depth[touchable].max()), np.finfo(float).tiny)
     within = touchable | (depth <= _DEPTHS ** np.ceil(np.log(deepest) / np.log(_DEPTHS)))
-    if np.count_nonzero(within) ** 3 > _MATRIX_WORK * touchable[box].size:
+    count = np.count_nonzero(within)
+    if count > _MATRIX_CELLS or count**3 > _MATRIX_WORK * touchable[box].size:
         return box
     row, column = np.nonzero(within)
     return row[:, None], column[:, None]
