@@ -93,9 +93,7 @@ def _memory(comm: int, words: str) -> dict[str, Arrays]:
     return {}
 
 
-def _from_disk_or_made(
-    kind: str, words: str, compute: Callable[[], Arrays], comm: Any
-) -> Arrays:
+def _from_disk_or_made(kind: str, words: str, compute: Callable[[], Arrays], comm: Any) -> Arrays:
     """Return arrays from the cache on disk, or compute and cache them there; collective."""
     path = _file(kind, words) if comm.rank == 0 else None
     large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have

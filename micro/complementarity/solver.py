@@ -14,6 +14,7 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -112,8 +113,8 @@ def _place(problem: CellProblem, touchable: Flags) -> Place:
         return _whole(touchable)
     box = box_around(touchable)
     depth = problem.undeformed.max() - problem.undeformed
-    deepest = max(float(depth[touchable].max()), np.finfo(float).tiny)
-    within = touchable | (depth <= _DEPTHS ** np.ceil(np.log(deepest) / np.log(_DEPTHS)))
+    deepest = float(depth[touchable].max()) or 1.0
+    within = touchable | (depth <= _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS)))
     count = np.count_nonzero(within)
     if count > _MATRIX_CELLS or count**3 > _MATRIX_WORK * touchable[box].size:
         return box
@@ -201,7 +202,7 @@ def refined(field: Array, factors: Sequence[int]) -> Array:
     return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
 
 
-def _whole(field: Array) -> Box:
+def _whole(field: Array | Flags) -> Box:
     """Return the box of all cells."""
     return slice(0, field.shape[0]), slice(0, field.shape[1])
 

@@ -235,7 +235,9 @@ class HalfSpaceModel:
             return self.surface.heights.size <= _QUICK_CELLS
         if control.approach is None or control.tilt is None:
             return False
-        interference = self.interference(RigidPlane.moved(self.surface, control.prescribed(np.zeros(3))))
+        interference = self.interference(
+            RigidPlane.moved(self.surface, control.prescribed(np.zeros(3)))
+        )
         return touches_few_cells(self._problem(interference, control.free, control.loads))
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:

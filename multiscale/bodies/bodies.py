@@ -163,7 +163,8 @@ class Bodies:
         from macro.compliance.cache import cached
         from macro.linear_solvers.options import users_options
 
-        key, faces = (*self._as_text(), self.patches, users_options()), []
+        key = (*self._as_text(), self.patches, users_options())
+        faces: list[Any] = []  # meshed when a column is missing
         columns: dict[int, Array] = {}
 
         def under(pressures: Array) -> Array:

@@ -5,7 +5,6 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -157,7 +156,6 @@ class WholeSurface:
     quick: bool = False
     _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
     _starts: dict[float, Start] = field(default_factory=dict, init=False)
-    _seconds: dict[float, float] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
         """Return the approaches at first touch and at the largest load [mm], and the tilt there.
@@ -238,8 +236,7 @@ class WholeSurface:
         count = len(approaches) if self.quick else _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
-        def solve(part: int) -> list[tuple[ContactState, float]]:
-            began = time.process_time()
+        def solve(part: int) -> list[ContactState]:
             states = press_along(
                 self.model,
                 parts[part],
@@ -250,25 +247,16 @@ class WholeSurface:
             )
             if self.quick:
                 self._starts.update((state.approach, state.guess) for state in states)
-            seconds = (time.process_time() - began) / len(states)
-            return [(state.summary(), seconds) for state in states]
+            return [state.summary() for state in states]
 
         def solved(done: int) -> None:
             if self.observe is not None:
                 self.observe(len(self._solved) + min(count * done, len(approaches)))
 
-        costs = [float(self._costs(part).sum()) for part in parts]
+        first = min(float(approaches[0]), 0.0)
+        costs = [float(np.sum(part - first)) for part in parts]  # the nearer, the dearer
         solutions = shared(self.comm, len(parts), solve, costs=costs, observe=solved)
-        rows = [row for part in solutions for row in part]
-        self._seconds.update((float(a), row[1]) for a, row in zip(approaches, rows, strict=True))
-        return [row[0] for row in rows]
-
-    def _costs(self, approaches: Array) -> Array:
-        """Return what rows cost, relative to each other: as long as those next to them took."""
-        if not self._seconds:
-            return approaches - min(float(approaches.min()), 0.0)
-        known = sorted(self._seconds)
-        return np.interp(approaches, known, [self._seconds[approach] for approach in known])
+        return [row for part in solutions for row in part]
 
     def _press(self, control: Control, start: Start | None) -> ContactState:
         """Press once; rows are those of rising loads, in whatever order: without plastic depth."""

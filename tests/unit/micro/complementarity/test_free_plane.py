@@ -11,8 +11,8 @@ from geometry import Control, InputError, NotConverged, Spectrum, Surface, synth
 from micro import HalfSpaceModel
 from micro.boundary_elements.grid_compliance import Compliance
 from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity.active_set import solve
 from micro.complementarity import solver
+from micro.complementarity.active_set import solve
 from micro.complementarity.conjugate_gradients import ContactCells
 
 CASES = {
