@@ -18,7 +18,10 @@ from geometry.rigid_plane import RigidPlane
 from support.arrays import Array, Counts, Flags
 from support.errors import InputError
 
-_LARGE = "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes".split()
+_LARGE = (
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
+    "by_slopes"
+).split()
 _ROUNDING = 1e-12
 """Of the sides of the patches: a place that is no further beyond their border lies on it."""
 

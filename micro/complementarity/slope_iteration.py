@@ -28,7 +28,7 @@ _CAUTION = 4.0
 """Factor on the rate at which changes by finite slopes fell last, for the next one."""
 _BY_SLOPES = 0.1
 """Largest part of the displacements that finite slopes add."""
-_CONVERGED = 3e-9
+_CONVERGED = 1e-9
 """Change by finite slopes at which the iteration ends, over the largest interference."""
 _MEMORY = 2
 """Steps that the mixing remembers."""

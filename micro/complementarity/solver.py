@@ -113,8 +113,9 @@ def _place(problem: CellProblem, touchable: Flags) -> Place:
         return _whole(touchable)
     box = box_around(touchable)
     depth = problem.undeformed.max() - problem.undeformed
-    deepest = float(depth[touchable].max()) or 1.0
-    within = touchable | (depth <= _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS)))
+    if deepest := float(depth[touchable].max()):
+        deepest = _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS))
+    within = touchable | (depth <= deepest)
     count = np.count_nonzero(within)
     if count > _MATRIX_CELLS or count**3 > _MATRIX_WORK * touchable[box].size:
         return box
