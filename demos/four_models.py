@@ -44,7 +44,7 @@ choice.out.mkdir(parents=True, exist_ok=True)
 # %%
 spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)
 surface = synthesise(spectrum, grid=(256, 256), lengths=(1.0, 1.0))
-asperities = find_asperities(surface, periodic=False)
+asperities = find_asperities(surface)
 whole = PatchGrid(grid=(1, 1), lengths=surface.lengths)
 
 # %% [markdown]

@@ -113,7 +113,7 @@ spectral, heights = figure.subplots(1, 2)
 spectral.loglog(q, S, "o", color=BLUE, label="this surface, by rings")
 spectral.loglog(q, np.exp(start) * q**slope, "--", color=RED, label=f"slope {slope:.2f}")
 spectral.set(xlabel="angular wavenumber [rad/mm]", ylabel="spectral density [mm⁴]")
-summits = find_asperities(surface, periodic=False)
+summits = find_asperities(surface)
 draw_surface(heights, surface, summits)
 spectral.legend()
 height = 1e3 * density.variance**0.5

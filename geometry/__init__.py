@@ -10,23 +10,19 @@ from geometry.facing import facing, laid_on, mirrored, turned_over
 from geometry.files.reading import read_surface
 from geometry.materials import Material, MaterialPair
 from geometry.meshes.block import BlockShape, misalignment
-from geometry.meshes.expected_contact import places_in_reach
-from geometry.meshes.families import characteristic_size, reference_shapes, suggested_fine
-from geometry.meshes.refined_block import RefinedShape
-from geometry.patches import (
-    Partition,
-    PatchGrid,
-    Regions,
-    UnevenPartition,
-    overlaps,
-    patch_means,
+from geometry.meshes.families import (
+    characteristic_size,
+    places_in_reach,
+    reference_shapes,
+    suggested_fine,
 )
+from geometry.meshes.refined_block import RefinedShape
+from geometry.patches import PatchGrid, Regions, overlaps, patch_means
 from geometry.preparation import Crop, Filter, Preparation
 from geometry.rigid_plane import Control, RigidPlane
-from geometry.spectrum import Spectrum
+from geometry.spectrum import Spectrum, synthesise
 from geometry.statistics import PowerSpectrum, Roughness, power_spectrum, roughness
 from geometry.surface import Surface
-from geometry.synthesis import synthesise
 from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 
 __all__ = [
@@ -40,7 +36,6 @@ __all__ = [
     "MaterialPair",
     "NotConverged",
     "NotInstalled",
-    "Partition",
     "PatchGrid",
     "PatchlawError",
     "PowerSpectrum",
@@ -51,7 +46,6 @@ __all__ = [
     "Roughness",
     "Spectrum",
     "Surface",
-    "UnevenPartition",
     "characteristic_size",
     "facing",
     "find_asperities",

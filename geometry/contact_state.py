@@ -13,17 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.patches import Partition
+from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
-from support.arrays import Array, Counts, Flags
+from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
-    "by_slopes"
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes"
 ).split()
-_ROUNDING = 1e-12
-"""Of the sides of the patches: a place that is no further beyond their border lies on it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,20 +42,21 @@ class Spots:
     def __len__(self) -> int:
         return len(self.force)
 
-    def per_patch(self, patches: Partition) -> Counts:
+    def per_patch(self, patches: PatchGrid) -> Counts:
         """Return how many spots have their largest pressure in each patch, shape (N,).
 
         Args:
-            patches: The N patches; places that rounding alone puts beyond them count as within.
+            patches: The N patches; places that rounding alone puts beyond them, by 1e-12 of their
+                sides, count as within.
         """
         x, y = patches.borders_x, patches.borders_y
         nearest = np.clip(self.place, (x[0], y[0]), (x[-1], y[-1]))
-        beyond = np.abs(self.place - nearest) > _ROUNDING * np.array(patches.sides)
+        beyond = np.abs(self.place - nearest) > 1e-12 * np.array(patches.lengths)
         owner = patches.index_of(*np.where(beyond, self.place, nearest).T)
         return np.bincount(owner, minlength=patches.count)
 
 
-def peaks_of(group: NDArray[np.integer], values: Array, count: int) -> NDArray[np.intp]:
+def peaks_of(group: NDArray[np.integer], values: Array, count: int) -> Indices:
     """Return the index of the largest value in each of some groups, shape (count,).
 
     Args:
@@ -103,10 +101,6 @@ class Start:
         if self.by_slopes is not None and other.by_slopes is not None:
             by_slopes = self.by_slopes + share * (other.by_slopes - self.by_slopes)
         return Start(plane=self.plane, values=values, by_slopes=by_slopes)
-
-
-def _nothing() -> Array:
-    return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -155,7 +149,7 @@ class ContactState:
     """
 
     plane: RigidPlane
-    patches: Partition
+    patches: PatchGrid
     force: float
     moment: tuple[float, float] = (0.0, 0.0)
     contact_area: float = np.nan
@@ -168,11 +162,11 @@ class ContactState:
     residual: float = 0.0
     overlapping_contacts: int = 0
     warning: str = ""
-    patch_force: Array = field(default_factory=_nothing)
-    patch_area: Array = field(default_factory=_nothing)
+    patch_force: Array = field(default_factory=lambda: np.zeros(0))
+    patch_area: Array = field(default_factory=lambda: np.zeros(0))
     patch_contacts: Counts = field(default_factory=lambda: np.zeros(0, np.int64))
-    patch_displacement: Array = field(default_factory=_nothing)
-    patch_separation: Array = field(default_factory=_nothing)
+    patch_displacement: Array = field(default_factory=lambda: np.zeros(0))
+    patch_separation: Array = field(default_factory=lambda: np.zeros(0))
     spots: Spots | None = None
     x: Array | None = None
     y: Array | None = None
@@ -200,7 +194,7 @@ class ContactState:
     @property
     def nominal_area(self) -> float:
         """Area of all patches [mm²]."""
-        return float(np.prod(self.patches.sides))
+        return float(np.prod(self.patches.lengths))
 
     @property
     def mean_pressure(self) -> float:

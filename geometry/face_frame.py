@@ -6,18 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from support.arrays import Array
 from support.checks import frozen_array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_ROUNDING = 1e-12
-"""Component of a unit normal that is taken as zero: a face across an axis is exactly across it."""
-
-_NEAR_X = np.cos(np.pi / 6.0) + 1e-9
-"""Cosine beyond which a normal lies along x; 30° sharp does not, whatever its rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -76,9 +69,10 @@ class FaceFrame:
             )
         n = n / np.abs(n).max()
         n = n / np.linalg.norm(n)
-        n = np.where(np.abs(n) < _ROUNDING, 0.0, n)
+        n = np.where(np.abs(n) < 1e-12, 0.0, n)  # exactly across an axis but for rounding
         n /= np.linalg.norm(n)
-        along = np.array([0.0, 1.0, 0.0] if abs(n[0]) > _NEAR_X else [1.0, 0.0, 0.0])
+        near_x = abs(n[0]) > np.cos(np.pi / 6.0) + 1e-9  # 30° sharp is not, whatever its rounding
+        along = np.array([0.0, 1.0, 0.0] if near_x else [1.0, 0.0, 0.0])
         e1 = along - (along @ n) * n
         e1 /= np.linalg.norm(e1)
         axes = np.stack([e1, np.cross(n, e1), n]) + 0.0  # no negative zeros
@@ -130,7 +124,12 @@ class FaceFrame:
         return self.origin + np.asarray(places, dtype=float) @ self.axes[:2] + lifted
 
     def moved(self, x: float, y: float) -> FaceFrame:
-        """Return the same frame with its origin at a point of the plane [mm]."""
+        """Return the same frame with its origin at a point of the plane.
+
+        Args:
+            x: Coordinate of the point along e1 [mm].
+            y: Coordinate along e2 [mm].
+        """
         return FaceFrame(origin=self.in_space([x, y]), axes=self.axes)
 
 

@@ -7,31 +7,18 @@ from functools import partial
 
 import numpy as np
 import scipy.fft
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import uniform_filter
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from geometry.interpolant import Interpolant
+from geometry.interpolant import Interpolant, cell_centres
+from support.arrays import Array, Flags
 from support.checks import is_level
 from support.errors import InputError
 
-Array = NDArray[np.float64]
-
-_ALPHA = math.sqrt(math.log(2.0) / math.pi)
-"""Constant of the Gaussian weight: a wave as long as the cut-off keeps half of its amplitude."""
-
-_REACH = 1.0
-"""Distance at which the Gaussian weight is cut, over the cut-off; 6e-7 of its height is left."""
-
-_NEIGHBOURHOOD, _SPIKE = 5, 10.0
-"""Cells along a side of the neighbourhood whose median a height is compared with, and standard
-deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
-
-_AT_ONCE = 2**20
-"""Heights whose medians are taken at once; they take 120 bytes each."""
-_FEWEST_CODES = 3
-"""Heights of exactly the same value that make it a code."""
+_SPIKE = 10.0
+"""Standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
 
 
 def smoothed(
@@ -51,12 +38,14 @@ def smoothed(
 
     Source: ISO 16610-61.
     """
+    alpha = math.sqrt(math.log(2.0) / math.pi)
     for axis, step in enumerate(spacing):
         count = heights.shape[axis]
-        reach = 0 if periodic else math.ceil(_REACH * cut_off / step)
+        # at the distance of a cut-off 6e-7 of the weight are left
+        reach = 0 if periodic else math.ceil(cut_off / step)
         size = count if periodic else scipy.fft.next_fast_len(count + reach, real=True)
         waves = scipy.fft.rfftfreq(size, step)  # per mm
-        kept = np.exp(-math.pi * (_ALPHA * cut_off * waves) ** 2)
+        kept = np.exp(-math.pi * (alpha * cut_off * waves) ** 2)
 
         def passed(values: Array, size: int = size, kept: Array = kept) -> Array:
             return scipy.fft.irfft(scipy.fft.rfft(values, size) * kept, size)[
@@ -68,7 +57,7 @@ def smoothed(
     return np.ascontiguousarray(heights)
 
 
-def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+def spikes(heights: Array, spacing: tuple[float, float]) -> Flags:
     """Find heights that stand out of their neighbourhood: dust, errors of an instrument, codes.
 
     * A height that differs from the median around it by more than 10 robust standard deviations of
@@ -90,7 +79,7 @@ def spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
     return spiking
 
 
-def _local_spikes(heights: Array) -> NDArray[np.bool_]:
+def _local_spikes(heights: Array) -> Flags:
     """Find heights that differ much from the median of their neighbours."""
     difference = np.abs(heights - _median(_median(heights).T).T)  # not a number where missing
     some = difference[difference > 0.0]
@@ -105,7 +94,7 @@ def _median(rows: Array) -> Array:
     What is missing, or beyond the border, lies on the line through the two heights on the other
     side; where these are missing too the middle one stands for it.
     """
-    if rows.size > _AT_ONCE and rows.shape[1] > 1:
+    if rows.size > 2**20 and rows.shape[1] > 1:  # 120 bytes for each height at once
         half = rows.shape[1] // 2
         return np.hstack([_median(rows[:, :half]), _median(rows[:, half:])])
     padded = np.pad(rows, ((2, 2), (0, 0)), constant_values=np.nan)
@@ -123,11 +112,11 @@ def _median(rows: Array) -> Array:
     return np.where(np.isnan(rows), np.nan, np.partition(window, 2, axis=0)[2])
 
 
-def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.bool_]:
+def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> Flags:
     """Find heights among missing ones that are far from the membrane between all others."""
     known = np.isfinite(heights)
     near, cells = (
-        uniform_filter(part.astype(float), _NEIGHBOURHOOD, mode="constant")
+        uniform_filter(part.astype(float), 5, mode="constant")
         for part in (known, np.ones_like(known))
     )
     lonely = known & (near < 0.5 * cells)
@@ -138,14 +127,14 @@ def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> NDArray[np.b
     return np.asarray(lonely & (np.abs(heights - membrane) > _SPIKE * float(others.std())))
 
 
-def _codes(heights: Array) -> NDArray[np.bool_]:
+def _codes(heights: Array) -> Flags:
     """Find a lowest or highest value that means "no data"."""
     known = np.isfinite(heights)
     codes = np.zeros(heights.shape, dtype=np.bool_)
     for code in (heights[known].min(), heights[known].max()) if known.any() else ():
         same = heights == code
         others = heights[known & ~same]
-        if np.count_nonzero(same) < _FEWEST_CODES or not others.size or is_level(others):
+        if np.count_nonzero(same) < 3 or not others.size or is_level(others):
             continue
         if float(np.abs(others - code).min()) > float(np.ptp(others)):
             codes |= same
@@ -178,7 +167,7 @@ def filled(heights: ArrayLike, spacing: tuple[float, float]) -> tuple[Array, flo
     return whole, float(missing.mean())
 
 
-def _membrane(heights: Array, missing: NDArray[np.bool_], spacing: tuple[float, float]) -> Array:
+def _membrane(heights: Array, missing: Flags, spacing: tuple[float, float]) -> Array:
     """Return the heights at the gaps, in the order of the array."""
     number = np.full(heights.shape, -1)
     number[missing] = np.arange(np.count_nonzero(missing))
@@ -230,8 +219,8 @@ def regridded(
             heights = np.moveaxis(_averaged(np.moveaxis(heights, axis, 0), count), 0, axis)
     if heights.shape == tuple(grid):
         return np.ascontiguousarray(heights)
-    x, y = ((np.arange(n) + 0.5) * (side / n) for n, side in zip(grid, lengths, strict=True))
-    return Interpolant(heights, lengths, periodic=periodic)(x[:, None], y[None, :])
+    x, y = map(cell_centres, lengths, grid)
+    return Interpolant(heights, lengths, periodic=periodic)(x[:, None], y[None])
 
 
 def _averaged(rows: Array, count: int) -> Array:

@@ -6,24 +6,27 @@ import copy
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import RectBivariateSpline
+from numpy.typing import ArrayLike
+from scipy.interpolate import BivariateSpline, RectBivariateSpline
 from scipy.optimize import minimize
 
-from geometry.blocked_spline import BlockedSpline
+from support.arrays import Array, Indices
+from support.cores import blocks
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays
 by 2 − √3 per cell and is below 1e-16 there, so that a padded spline is periodic to rounding."""
 
-_HALF_CELL_BEYOND = np.array([35.0, -35.0, 21.0, -5.0]) / 16.0
-"""Weights of the first four samples in the value of their cubic half a cell before the first."""
 
-_MOST_SPANS, _MOST_STARTS = 20_000, 8
-"""Spans that are sampled for the highest point, and samples from which it is climbed to."""
+def cell_centres(length: float, count: int) -> Array:
+    """Return the centres of equal cells along a side, shape (count,) [mm].
+
+    Args:
+        length: The side [mm].
+        count: Number of cells.
+    """
+    return np.asarray((np.arange(count) + 0.5) * (length / count))
 
 
 class Interpolant:
@@ -55,7 +58,7 @@ class Interpolant:
             if not periodic:
                 places[-1][[0, -1]] = 0.0, length
         self._spline = RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
-        self._derivatives: dict[tuple[int, int], BlockedSpline] = {}
+        self._derivatives: dict[tuple[int, int], BivariateSpline] = {}
 
     def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
         """Return the same spline on a rectangle within, whose lower corner is its origin.
@@ -91,11 +94,8 @@ class Interpolant:
         Raises:
             InputError: When a point lies outside and the samples are not periodic.
         """
-        x, y = self._inside(x, 0), self._inside(y, 1)
-        if _is_lattice(x, y):
-            values = self._derivative(dx, dy)(x[:, 0], y[0])
-        else:
-            values = self._derivative(dx, dy)(*np.broadcast_arrays(x, y), grid=False)
+        x, y, spline = self._inside(x, 0), self._inside(y, 1), self._derivative(dx, dy)
+        values = spline(x[:, 0], y[0]) if _is_lattice(x, y) else at_points(spline, x, y)
         return np.asarray(values if dx or dy else values + self._lowest, dtype=np.float64)
 
     def maximum(self) -> tuple[float, float, float]:
@@ -112,11 +112,11 @@ class Interpolant:
         x_m, y_m, z_m = max(points, key=lambda point: point[2])
         return x_m - self._corner[0], y_m - self._corner[1], z_m + self._lowest
 
-    def _derivative(self, dx: int, dy: int) -> BlockedSpline:
+    def _derivative(self, dx: int, dy: int) -> BivariateSpline:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
         if (dx, dy) not in self._derivatives:
-            part = self._spline.partial_derivative(dx, dy) if dx or dy else self._spline
-            self._derivatives[dx, dy] = BlockedSpline(part)
+            whole = self._spline
+            self._derivatives[dx, dy] = whole.partial_derivative(dx, dy) if dx or dy else whole
         return self._derivatives[dx, dy]
 
     def _inside(self, coordinate: ArrayLike, axis: int) -> Array:
@@ -135,43 +135,38 @@ class Interpolant:
 
     def _starts(self) -> tuple[Array, Array, Array]:
         """Return the highest points of a fine sampling of the spans that can hold the maximum."""
-        x, y = (self._edges(axis) for axis in range(2))
+        (_, x), (_, y) = map(self._spans, range(2))
         bound = self._span_bounds()
         floor = float(self._spline(0.5 * (x[:, 0] + x[:, 1]), 0.5 * (y[:, 0] + y[:, 1])).max())
         spans = np.flatnonzero(bound >= floor)
-        if len(spans) > _MOST_SPANS:
-            spans = spans[np.argsort(bound.flat[spans])[-_MOST_SPANS:]]
+        most = 20_000  # spans that are sampled, those of the highest bounds
+        if len(spans) > most:
+            spans = spans[np.argsort(bound.flat[spans])[-most:]]
         ix, iy = np.unravel_index(spans, bound.shape)
         u, v = (part.ravel() for part in np.mgrid[0.0:1.0:5j, 0.0:1.0:5j])
         px = x[ix, :1] + u * np.diff(x[ix])
         py = y[iy, :1] + v * np.diff(y[iy])
-        z = self._derivative(0, 0)(px, py, grid=False)
+        z = at_points(self._spline, px, py)
         inner = np.argmax(z, axis=1)
-        rows = np.argsort(z.max(axis=1))[-_MOST_STARTS:]
+        rows = np.argsort(z.max(axis=1))[-8:]
         return px[rows, inner[rows]], py[rows, inner[rows]], z[rows, inner[rows]]
 
     def _box(self, axis: int) -> tuple[float, float]:
         """Return where the rectangle begins and ends in the spline's own coordinate [mm]."""
         return self._corner[axis], self._corner[axis] + self.lengths[axis]
 
-    def _spans(self, axis: int) -> slice:
-        """Return the spans of the spline that reach into the rectangle."""
+    def _spans(self, axis: int) -> tuple[slice, Array]:
+        """Return the spans that reach into the rectangle, and their ends within it, (n, 2) [mm]."""
         knots, (low, high) = self._spline.get_knots()[axis][3:-3], self._box(axis)
-        first = int(np.searchsorted(knots, low, side="right")) - 1
-        last = int(np.searchsorted(knots, high, side="left"))
-        return slice(max(first, 0), min(last, len(knots) - 1))
-
-    def _edges(self, axis: int) -> Array:
-        """Return the two ends of every span, cut to the rectangle, shape (n, 2) [mm]."""
-        spans = self._spans(axis)
-        knots = self._spline.get_knots()[axis][3:-3][spans.start : spans.stop + 1]
-        knots = np.clip(knots, *self._box(axis))
-        return np.stack([knots[:-1], knots[1:]], axis=1)
+        first = max(int(np.searchsorted(knots, low, side="right")) - 1, 0)
+        last = min(int(np.searchsorted(knots, high, side="left")), len(knots) - 1)
+        ends = np.clip(knots[first : last + 1], low, high)
+        return slice(first, last), np.stack([ends[:-1], ends[1:]], axis=1)
 
     def _coefficients(self) -> Array:
         """Return the B-spline coefficients that the rectangle's spans depend on [mm]."""
         shape = [len(knots) - 4 for knots in self._spline.get_knots()]
-        x, y = (slice(part.start, part.stop + 3) for part in map(self._spans, range(2)))
+        x, y = (slice(part.start, part.stop + 3) for part, _ in map(self._spans, range(2)))
         return np.asarray(self._spline.get_coeffs().reshape(shape)[x, y])
 
     def _span_bounds(self) -> Array:
@@ -189,15 +184,61 @@ class Interpolant:
 
         def depth(step: Array) -> tuple[float, Array]:
             px, py = origin + step * (dx, dy)
-            slope = [dx * along_x(px, py, grid=False), dy * along_y(px, py, grid=False)]
-            return -float(value(px, py, grid=False)) / height, -np.array(slope) / height
+            slope = [dx * at_points(along_x, px, py), dy * at_points(along_y, px, py)]
+            return -float(at_points(value, px, py)) / height, -np.array(slope) / height
 
         low, high = np.transpose([self._box(axis) for axis in range(2)])
         limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
         options = {"ftol": 1e-16, "gtol": 1e-12}
         top = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + top.x * (dx, dy), low, high)
-        return float(px), float(py), float(value(px, py, grid=False))
+        return float(px), float(py), float(at_points(value, px, py))
+
+
+def at_points(spline: BivariateSpline, x: ArrayLike, y: ArrayLike) -> Array:
+    """Evaluate a spline at scattered points.
+
+    FITPACK looks for the span of every point from the first knot on: 1000 points on 4 × 200 000
+    knots took 70 ms. Of so many knots the B-splines around a point are summed here, in 2 ms.
+
+    Args:
+        spline: The spline.
+        x: Abscissae [mm]; broadcast against ``y``.
+        y: Ordinates [mm].
+
+    Returns:
+        Values of the broadcast shape.
+    """
+    knots = spline.get_knots()
+    if max(map(len, knots)) <= 2000:
+        return np.asarray(spline(x, y, grid=False))
+    axes, (px, py) = list(zip(knots, spline.degrees, strict=True)), np.broadcast_arrays(x, y)
+    whole = spline.get_coeffs().reshape([len(ticks) - degree - 1 for ticks, degree in axes])
+    values = np.empty(px.size)
+    for some in blocks(px.size, 2**18):  # blocks bound the memory
+        (i, u), (j, v) = (
+            _b_splines(*axis, np.ravel(place)[some])
+            for axis, place in zip(axes, (px, py), strict=True)
+        )
+        values[some] = np.einsum("ni,nij,nj->n", u, whole[i[:, :, None], j[:, None]], v)
+    return values.reshape(px.shape)
+
+
+def _b_splines(knots: Array, degree: int, at: Array) -> tuple[Indices, Array]:
+    """Return the B-splines that are not zero at points, and their values, shape (n, degree + 1).
+
+    Source:
+        De Boor 1978, A Practical Guide to Splines, ch. X.
+    """
+    span = np.clip(np.searchsorted(knots, at, side="right") - 1, degree, len(knots) - degree - 2)
+    values = np.ones((len(at), 1))
+    for order in range(1, degree + 1):
+        above = span[:, None] + np.arange(1, order + 1)
+        high, low = knots[above], knots[above - order]
+        parts = values / (high - low)
+        values = np.pad(parts * (high - at[:, None]), ((0, 0), (0, 1)))
+        values[:, 1:] += parts * (at[:, None] - low)
+    return span[:, None] + np.arange(-degree, 1), values
 
 
 def bordered(samples: Array) -> Array:
@@ -224,7 +265,8 @@ def _on_border(rows: Array) -> Array:
     order. On plateau-honed surfaces of 8 heights per wave the cubics alone rise 0.2 to 0.3 µm above
     the plateau, and straight lines alone 0.5 µm.
     """
-    cubic = np.tensordot(_HALF_CELL_BEYOND, rows[:4], axes=1)[None]
+    weights = np.array([35.0, -35.0, 21.0, -5.0]) / 16.0  # of the cubic's value there
+    cubic = np.tensordot(weights, rows[:4], axes=1)[None]
     highest = np.maximum(rows[1:2], 1.5 * rows[:1] - 0.5 * rows[1:2])
     lowest = rows[:1] - np.ptp(rows[:4], axis=0)
     return np.clip(cubic, lowest, highest)

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 def mode_values(points: ArrayLike, length: float, count: int) -> Array:

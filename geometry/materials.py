@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.fields import Limits, PositivePressure, check_limits
 
 PoissonRatio = Annotated[float, Limits(gt=-1, lt=0.5)]
@@ -84,7 +84,7 @@ class MaterialPair:
         return 1.0 / compliance
 
 
-def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+def von_mises(stress: Array) -> Array:
     """Return von Mises' equivalent of stresses, shape (..., 3, 3) [MPa]."""
     trace = np.trace(stress, axis1=-2, axis2=-1)
     deviator = stress - trace[..., None, None] * np.eye(3) / 3.0

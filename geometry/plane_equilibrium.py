@@ -16,7 +16,6 @@ from typing import Generic, NamedTuple, TypeVar
 import numpy as np
 
 from geometry.rigid_plane import Control, motion_units, plane_failure
-from geometry.slope_search import slope_search
 from support.arrays import Array
 from support.errors import NotConverged
 
@@ -30,13 +29,6 @@ UNSUPPORTED = 1e-11
 
 _AIM = 1e-13
 """The same that is aimed at, as far as the rounding of displacements allows it."""
-_CLEAR = 1e-6
-"""Force, relative to the largest so far, below which the plane may be about to lift off."""
-_FIRST, _FARTHEST = 1e-6, 1e3
-"""First and farthest trial of a motion that no contact resists, in halves of the diagonal."""
-_ROUNDING = 64.0 * float(np.finfo(float).eps)
-"""Step that counts as rounding, relative to the motions of the plane."""
-_MOST_STEPS, _MOST_RETREATS = 100, 6
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -96,17 +88,19 @@ def find_equilibrium(
     motions = _FreeMotions(respond, control, half, final=first_touch is None)
     now = motions.begun(np.array(start, dtype=np.float64), first_touch)
     largest = 0.0
-    for _ in range(_MOST_STEPS):
+    for _ in range(100):
         measure = max(now.force, control.force or 0.0)
         if np.abs(now.residual).max(initial=0.0) <= aim * measure:
             return now.plane, now.response.state
         largest = max(largest, measure)
         stiffness = motions.stiffness(now)
-        step, resisted = _direction(stiffness, now.residual, aim * measure, _FIRST * half)
-        if resisted and np.abs(step).max() <= _ROUNDING * motions.size(now.plane):
+        # where nothing resists, a millionth of half the diagonal is tried first
+        step, resisted = _direction(stiffness, now.residual, aim * measure, 1e-6 * half)
+        rounding = 64.0 * float(np.finfo(float).eps) * motions.size(now.plane)
+        if resisted and np.abs(step).max() <= rounding:
             now = motions.trial(motions.moved(now, step))  # displacements allow no more
             return now.plane, now.response.state
-        if control.force is None and measure <= _CLEAR * largest:
+        if control.force is None and measure <= 1e-6 * largest:
             # Newton's steps alone come ever closer to a plane that is clear, and never there
             clear = motions.trial(motions.moved(now, 3.0 * step))
             if clear.force == 0.0:
@@ -154,7 +148,7 @@ class _FreeMotions(Generic[T]):
 
     def begun(self, plane: Array, first_touch: float | None) -> _Trial[T]:
         """Evaluate a start, or nearer to first touch where the contacts cannot bear so much."""
-        for _ in range(_MOST_RETREATS):
+        for _ in range(6):
             try:
                 return self.trial(plane)
             except NotConverged:
@@ -185,7 +179,7 @@ class _FreeMotions(Generic[T]):
         def slope_after(share: float) -> float:
             nonlocal trial
             plane = self.moved(now, share * step)
-            if np.abs(plane[self._free] / self.unit).max() > _FARTHEST * self._half:
+            if np.abs(plane[self._free] / self.unit).max() > 1e3 * self._half:
                 raise plane_failure(self._control, "NO_SUPPORT" if now.force else "NO_CONTACT")
             try:
                 trial = self.trial(plane)
@@ -214,3 +208,32 @@ def _direction(
         step = vectors @ np.where(falling, loads, 0.0)
         return first * step / np.abs(step).max(), False
     return vectors @ np.divide(loads, values, out=np.zeros_like(loads), where=~loose), True
+
+
+def slope_search(slope_after: Callable[[float], float], slope: float, share: float) -> float | None:
+    """Shorten or lengthen a step until the slope of a convex function along it has fallen.
+
+    Only slopes are looked at: near a minimum the values of a function differ by less than their
+    rounding, and their slopes do not.
+
+    Args:
+        slope_after: Returns the slope along the step after a share of it; infinite where the
+            share is to be shortened anyway. The share that is returned was evaluated last.
+        slope: Slope before the step, negative.
+        share: Share of the step to try first.
+
+    Returns:
+        A share after which the size of the slope is at most 0.9 times that before; None when
+        there is none to rounding.
+
+    Source:
+        Nocedal & Wright 2006, ch. 3, doi 10.1007/978-0-387-40065-5.
+    """
+    low, high = 0.0, np.inf
+    for _ in range(100):
+        left = slope_after(share)
+        if abs(left) <= 0.9 * abs(slope):
+            return share
+        low, high = (share, high) if left < 0.0 else (low, share)
+        share = 3.0 * share if high == np.inf else 0.5 * (low + high)
+    return None

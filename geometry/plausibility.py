@@ -14,15 +14,6 @@ STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 are taken into account on. Heights in µm that are taken for mm make a surface a thousand times as
 steep. At 0.8 the two orders of finite slopes change the force by as much as they err."""
 
-_SQUARE, _OBLONG = 0.02, 0.1
-"""Differences of the sides of a cell, over one of them, that are none and that are seen."""
-_ROUNDED = 1.0 + 1e-9
-_MUCH_TILT, _FLATTEST = 0.5, 3e-4
-_LONGEST, _SHORTEST = 200.0, 1e-4
-"""Share of the mean plane in the variance, rms gradient and sides [mm] that deserve a note.
-Coordinates in µm that are taken for mm make a map a thousand times as flat: 0.01 to 0.3 become 1e-5
-to 3e-4."""
-
 
 def reading_notes(grid: tuple[int, int], lengths: tuple[float, float]) -> list[str]:
     """Return a note where a map has square cells on its sides if x and y are swapped, and only so.
@@ -33,7 +24,7 @@ def reading_notes(grid: tuple[int, int], lengths: tuple[float, float]) -> list[s
     """
     (nx, ny), (x, y) = grid, lengths
     dx, dy, dx_swapped, dy_swapped = x / nx, y / ny, x / ny, y / nx
-    if abs(dx_swapped / dy_swapped - 1.0) > _SQUARE or abs(dx / dy - 1.0) < _OBLONG:
+    if abs(dx_swapped / dy_swapped - 1.0) > 0.02 or abs(dx / dy - 1.0) < 0.1:
         return []
     return [
         f"{nx} × {ny} heights make cells of {1e3 * dx:.3g} × {1e3 * dy:.3g} µm on these sides; "
@@ -64,7 +55,7 @@ def check_slopes(surface: Surface) -> None:
         InputError: Asks for the unit of the heights.
     """
     gradient = rms_gradient(surface)
-    if gradient > STEEPEST * _ROUNDED:
+    if gradient > STEEPEST * (1.0 + 1e-9):
         raise InputError(
             f"the rms gradient of the heights is {gradient:.3g}, no rough surface is so steep: are "
             "they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'",
@@ -82,7 +73,7 @@ def check_finite_slopes(surface: Surface) -> None:
         InputError: Says what else can be done, and what error that has.
     """
     gradient = rms_gradient(surface)
-    if gradient > STEEPEST_FINITE * _ROUNDED:
+    if gradient > STEEPEST_FINITE * (1.0 + 1e-9):
         raise InputError(
             "finite slopes are known to second order, which fails at the rms gradient of the "
             f"surface, {gradient:.3g}; without them (micro.finite_slopes = false) forces of such "
@@ -100,17 +91,18 @@ def surface_notes(surface: Surface) -> list[str]:
     """
     gradient, (least, most), notes = rms_gradient(surface), sorted(surface.lengths), []
     share = _plane_share(surface)
-    if share > _MUCH_TILT:
+    if share > 0.5:
         notes.append(
             f"the map is tilted: its mean plane makes {100 * share:.0f} % of the variance of its "
             "heights, and a level plane touches one edge first; detrend = 'plane' levels it"
         )
-    if most > _LONGEST or least < _SHORTEST:
+    if most > 200.0 or least < 1e-4:
         notes.append(
             f"the map is {surface.lengths[0]:g} × {surface.lengths[1]:g} mm large: are its lengths "
             "in mm? Quantities take units, as in '100 um'"
         )
-    if 0.0 < gradient < _FLATTEST:
+    # coordinates in µm that are taken for mm turn 0.01 to 0.3 into 1e-5 to 3e-4
+    if 0.0 < gradient < 3e-4:
         notes.append(
             f"the rms gradient of the map is {gradient:.2g}, far less than of machined "
             "surfaces: are lengths and heights in the units that they were taken in? x and y of an "

@@ -7,23 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.filters import filled, regridded, smoothed, spikes
 from geometry.plausibility import check_slopes
 from geometry.surface import Surface
-from support.checks import cell_counts, cells_between
+from support.arrays import Array, Flags
+from support.checks import cell_counts
 from support.errors import InputError
 from support.fields import Heights, Length, PositiveLength
 
-Array = NDArray[np.float64]
 Interval = tuple[Length, Length]
-
-_MUCH_MISSING = 0.3
-_RARE = 1e-3
-"""Share of the heights, at either end, that may be rare but right."""
-
-_ORDERS = {"mean": 0, "plane": 1, "quadratic": 2}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -98,7 +91,7 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
     """
     done = []
     if steps.detrend != "none":
-        surface = surface.detrended(_ORDERS[steps.detrend])
+        surface = surface.detrended(("mean", "plane", "quadratic").index(steps.detrend))
         done.append(f"its {steps.detrend} removed")
     short, long = steps.filter.short, steps.filter.long
     _check_cut_offs(surface, short, long)
@@ -144,13 +137,8 @@ def completed(
     if np.isinf(heights).any():  # refused as a surface
         return heights, lengths, done, notes
     gaps = np.isnan(heights)
-    if steps.missing == "refuse" and gaps.any():
-        first = np.argwhere(gaps)[0]
-        raise InputError(
-            f"{np.count_nonzero(gaps)} of {heights.size} heights are missing, the first at index "
-            f"({first[0]}, {first[1]})",
-            allowed="finite heights; missing = 'fill' closes gaps by a membrane",
-        )
+    if steps.missing == "refuse":
+        _refuse_gaps(gaps)
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
     outlying = spikes(heights, spacing)
     known = np.where(outlying, np.nan, heights)
@@ -164,7 +152,7 @@ def completed(
             done.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
         if removed and count:
             done.append(f"{count} spikes removed and filled")
-        if share > _MUCH_MISSING:
+        if share > 0.3:
             notes.append(
                 f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
                 "has no summits, and forces and contact areas are those of the rest"
@@ -172,6 +160,16 @@ def completed(
         notes += _on_filling(whole[np.isnan(known)], kept)
         heights = whole if removed else np.where(outlying, heights, whole)
     return heights, lengths, done, notes
+
+
+def _refuse_gaps(gaps: Flags) -> None:
+    if gaps.any():
+        i, j = np.argwhere(gaps)[0]
+        raise InputError(
+            f"{np.count_nonzero(gaps)} of {gaps.size} heights are missing, the first at index "
+            f"({i}, {j})",
+            allowed="finite heights; missing = 'fill' closes gaps by a membrane",
+        )
 
 
 def _on_spikes(spiking: Array, others: Array) -> list[str]:
@@ -192,12 +190,12 @@ def _on_spikes(spiking: Array, others: Array) -> list[str]:
 
 def _on_filling(inside: Array, others: Array) -> list[str]:
     """Return a note where what fills gaps is higher or lower than nearly all heights [mm]."""
-    low, high = np.quantile(others, (_RARE, 1.0 - _RARE))
+    low, high = np.quantile(others, (0.001, 0.999))  # beyond are heights that are rare but right
     beyond = max(float(inside.max() - high), float(low - inside.min()))
     if beyond <= float(others.std()):
         return []
     return [
-        f"what fills gaps reaches {1e3 * beyond:.3g} µm beyond {100 - 200 * _RARE:g} % of the "
+        f"what fills gaps reaches {1e3 * beyond:.3g} µm beyond 99.8 % of the "
         "heights, as those on the rims of gaps do: they may be errors of the instrument"
     ]
 
@@ -206,23 +204,31 @@ def _cropped(
     heights: Array, lengths: tuple[float, float], crop: Crop
 ) -> tuple[Array, tuple[float, float], str]:
     """Return what lies in a rectangle, its sides [mm], and a sentence on it."""
-    cells, corner, sides = [], [], []
-    for interval, length, count, axis in zip(
-        (crop.x, crop.y), lengths, heights.shape, "xy", strict=True
-    ):
-        try:
-            part = cells_between(interval, length, count, axis)
-        except InputError as error:
-            raise error.located(key=f"surface.crop.{axis}") from None
-        first, last, _ = part.indices(count)
-        cells.append(part)
-        corner.append(first * length / count)
-        sides.append((last - first) * length / count)
-    (x, y), (x0, y0) = sides, corner
+    (nx, ny), (lx, ly) = heights.shape, lengths
+    i, i_end = _cells_between(crop.x, lx, nx, "x")
+    j, j_end = _cells_between(crop.y, ly, ny, "y")
+    x, y, x0, y0 = (i_end - i) * lx / nx, (j_end - j) * ly / ny, i * lx / nx, j * ly / ny
     sentence = (
         f"cropped to {1e3 * x:g} × {1e3 * y:g} µm from x = {1e3 * x0:g} µm, y = {1e3 * y0:g} µm"
     )
-    return heights[cells[0], cells[1]], (x, y), sentence
+    return heights[i:i_end, j:j_end], (x, y), sentence
+
+
+def _cells_between(
+    interval: tuple[float, float] | None, length: float, count: int, axis: str
+) -> tuple[int, int]:
+    """Return the first cell between two coordinates [mm] of a side, and the first behind them."""
+    if interval is None:
+        return 0, count
+    lo, hi = (round(float(edge) / length * count) for edge in interval)
+    if not 0 <= lo < hi <= count:
+        raise InputError(
+            f"the crop along {axis} does not lie within the surface or keeps no cell",
+            key=f"surface.crop.{axis}",
+            value=tuple(interval),
+            allowed=f"0 ≤ lo < hi ≤ {length} mm",
+        )
+    return lo, hi
 
 
 def _check_cut_offs(surface: Surface, short: float | None, long: float | None) -> None:

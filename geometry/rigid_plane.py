@@ -12,13 +12,11 @@ from dataclasses import dataclass
 from typing import Any, Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from geometry.patches import Partition
+from geometry.patches import PatchGrid
+from support.arrays import Array, Flags
 from support.errors import InputError, NotConverged
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 
 class Rectangular(Protocol):
@@ -121,13 +119,24 @@ class RigidPlane:
     def above(
         cls, rough: Rectangular, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
     ) -> Self:
-        """Return the plane that turns about the centre of a surface's rectangle."""
+        """Return the plane that turns about the centre of a surface's rectangle.
+
+        Args:
+            rough: The surface.
+            approach: Approach at the centre [mm].
+            tilt: Slopes (tx, ty).
+        """
         lx, ly = rough.lengths
         return cls(approach=float(approach), tilt=tilt, centre=(0.5 * lx, 0.5 * ly))
 
     @classmethod
     def moved(cls, rough: Rectangular, motion: Array) -> Self:
-        """Return the plane above a surface whose approach and slopes are a vector, shape (3,)."""
+        """Return the plane above a surface whose approach and slopes are a vector.
+
+        Args:
+            rough: The surface.
+            motion: Approach [mm] and slopes, shape (3,).
+        """
         approach, tx, ty = map(float, motion)
         return cls.above(rough, approach, (tx, ty))
 
@@ -139,18 +148,27 @@ class RigidPlane:
     def at(self, x: Array, y: Array) -> Array:
         """Return the approach at points [mm].
 
+        Args:
+            x: Abscissae [mm].
+            y: Ordinates [mm].
+
         Raises:
             InputError: When the plane is tilted, and its centre is not known.
         """
         (tx, ty), (xc, yc) = self.tilt, self._known_centre if any(self.tilt) else (0.0, 0.0)
         return self.approach + tx * (x - xc) + ty * (y - yc)
 
-    def means(self, patches: Partition) -> Array:
+    def means(self, patches: PatchGrid) -> Array:
         """Return the mean approach over every patch, shape (N,) [mm]."""
         return self.at(*patches.centres.T)
 
     def moment(self, x: Array, y: Array, force: Array) -> tuple[float, float]:
         """Return the first moments of forces at points about the centre [N mm].
+
+        Args:
+            x: Abscissae [mm].
+            y: Ordinates [mm].
+            force: The forces [N].
 
         Raises:
             InputError: When the centre is not known.
@@ -275,7 +293,13 @@ def motion_units(half: float) -> Array:
 
 
 def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConverged:
-    """Return the error of a plane that finds no equilibrium."""
+    """Return the error of a plane that finds no equilibrium.
+
+    Args:
+        control: What is prescribed of it.
+        reason: The name of the reason.
+        iterations: Iterations spent.
+    """
     remedies = {
         "NO_CONTACT": "no patch can be touched",
         "NO_RELEASE": "the laws press however far the plane is",

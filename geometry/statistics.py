@@ -7,13 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from geometry.surface import Surface
+from support.arrays import Array, Indices
 from support.cores import cores
-from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,7 +73,7 @@ class PowerSpectrum:
 
     wavenumber: Array
     density: Array
-    waves: NDArray[np.intp]
+    waves: Indices
     cell: float
 
     @property
@@ -114,25 +111,19 @@ def roughness(surface: Surface) -> Roughness:
     )
 
 
-def power_spectrum(surface: Surface, *, window: str | None = None) -> PowerSpectrum:
+def power_spectrum(surface: Surface) -> PowerSpectrum:
     """Average the power spectral density over rings one wave wide.
 
-    Without a window the variance is that of the heights. Hann's window, scaled to unit mean
-    square, keeps it in the mean over many surfaces and suppresses the jump at the border.
+    Of a periodic surface the variance is that of the heights. On any other Hann's window, scaled to
+    unit mean square, suppresses the jump at the border; it keeps the variance in the mean over many
+    surfaces.
 
     Args:
         surface: The surface; its mean is subtracted.
-        window: ``none`` or ``hann``; when not given, ``none`` if the surface is periodic.
-
-    Raises:
-        InputError: For another window.
     """
-    window = window or ("none" if surface.periodic else "hann")
-    if window not in ("none", "hann"):
-        raise InputError("this window is unknown", value=window, allowed="none, hann")
     h, (qx, qy) = surface.heights, _wavenumbers(surface)
     weight = np.ones(surface.grid)
-    if window == "hann":
+    if not surface.periodic:
         wx, wy = (np.sin(np.pi * (np.arange(n) + 0.5) / n) ** 2 for n in surface.grid)
         weight = np.outer(wx, wy)
         weight /= math.sqrt(np.mean(weight**2))
@@ -167,16 +158,16 @@ def _power(h: Array) -> Array:
     return np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2
 
 
-def _spectral(surface: Surface) -> tuple[float, float, float, float, float]:
+def _spectral(surface: Surface) -> list[float]:
     """Return <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²> of the trigonometric interpolant."""
     power = _power(surface.heights - surface.mean_height)
     x, y = (wavenumber.ravel() ** 2 for wavenumber in _wavenumbers(surface))
     along_x, along_y = power.sum(axis=1), power.sum(axis=0)
     xx, yy, mixed = float(along_x @ x**2), float(along_y @ y**2), float(x @ power @ y)
-    return float(along_x @ x), float(along_y @ y), xx, yy, xx + 2.0 * mixed + yy
+    return [float(along_x @ x), float(along_y @ y), xx, yy, xx + 2.0 * mixed + yy]
 
 
-def _differences(surface: Surface) -> tuple[float, float, float, float, float]:
+def _differences(surface: Surface) -> list[float]:
     """Return the same means from central differences over the inner cells."""
     h, (dx, dy) = surface.heights, surface.spacing
     x = (h[2:, :] - h[:-2, :]) / (2.0 * dx)
@@ -184,6 +175,4 @@ def _differences(surface: Surface) -> tuple[float, float, float, float, float]:
     xx = (h[2:, :] - 2.0 * h[1:-1, :] + h[:-2, :]) / dx**2
     yy = (h[:, 2:] - 2.0 * h[:, 1:-1] + h[:, :-2]) / dy**2
     laplacian = xx[:, 1:-1] + yy[1:-1, :]
-    squares = (float(np.mean(part**2)) for part in (x, y, xx, yy, laplacian))
-    first, second, third, fourth, last = squares
-    return first, second, third, fourth, last
+    return [float(np.mean(part**2)) for part in (x, y, xx, yy, laplacian)]

@@ -5,25 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from geometry.surface import Surface
+from support.arrays import Array, Flags, Indices
 
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Indices = NDArray[np.intp]
-
-_MOST_STEPS = 200
-_SHORTEST = 1e-10
-"""Step that ends a climb [cells]."""
 _COINCIDENT = 1e-3
 """Distance of summits that are taken for one [cells]."""
-_ROUNDING = 4.0 * np.finfo(float).eps
-"""Gain of height that is only rounding, relative to the largest height."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,44 +30,43 @@ class GridMaxima:
 
     position: Array
     height: Array
-    on_border: NDArray[np.bool_]
+    on_border: Flags
 
 
-def grid_maxima(heights: Array, *, periodic: bool) -> GridMaxima:
+def grid_maxima(heights: Array) -> GridMaxima:
     """Find the cells, or plateaus of equal cells, that all neighbours stay below.
 
     Args:
         heights: Heights, shape (nx, ny) [mm].
-        periodic: Whether the neighbours are taken across the border.
     """
-    mode = "wrap" if periodic else "nearest"
-    candidate = heights == maximum_filter(heights, size=3, mode=mode)
+    candidate = heights == maximum_filter(heights, size=3, mode="nearest")
     cells = np.argwhere(candidate)
-    label = _plateaus(candidate, cells, periodic=periodic)
+    label = _plateaus(candidate, cells)
     # a plateau is no maximum where an equal cell beside it has a higher neighbour
-    others = maximum_filter(np.where(candidate, -np.inf, heights), size=3, mode=mode)
+    others = maximum_filter(np.where(candidate, -np.inf, heights), size=3, mode="nearest")
     shoulder = np.bincount(label, weights=(others == heights)[candidate]) > 0
     outer = np.any((cells == 0) | (cells == np.array(heights.shape) - 1), axis=1)
-    on_border = np.bincount(label, weights=outer & (not periodic)) > 0
+    on_border = np.bincount(label, weights=outer) > 0
     _, first = np.unique(label, return_index=True)
-    position = _centroids(cells, label, first, heights.shape)
-    height = heights[tuple(cells[first].T)]
+    start, size = cells[first], np.bincount(label)
+    offsets = (cells - start[label]).T
+    middle = start.astype(float)
+    middle += np.stack([np.bincount(label, part) / size for part in offsets], axis=1)
+    height = heights[tuple(start.T)]
     return GridMaxima(
-        position=position[~shoulder], height=height[~shoulder], on_border=on_border[~shoulder]
+        position=middle[~shoulder], height=height[~shoulder], on_border=on_border[~shoulder]
     )
 
 
-def _plateaus(
-    candidate: NDArray[np.bool_], cells: NDArray[np.intp], *, periodic: bool
-) -> NDArray[np.intp]:
+def _plateaus(candidate: Flags, cells: Indices) -> Indices:
     """Label connected candidates (8 neighbours), numbered by first cell; neighbours are equal."""
     number = np.full(candidate.shape, -1)
     number[candidate] = np.arange(len(cells))
     pairs = []
     for offset in ((0, 1), (1, -1), (1, 0), (1, 1)):
         neighbour = cells + offset
-        inside = np.all((neighbour >= 0) & (neighbour < candidate.shape), axis=1) | periodic
-        other = number[tuple((neighbour[inside] % candidate.shape).T)]
+        inside = np.all((neighbour >= 0) & (neighbour < candidate.shape), axis=1)
+        other = number[tuple(neighbour[inside].T)]
         pairs.append(np.stack([np.flatnonzero(inside)[other >= 0], other[other >= 0]]))
     row, column = np.concatenate(pairs, axis=1)
     graph = coo_array((np.ones(len(row)), (row, column)), shape=2 * (len(cells),))
@@ -85,18 +75,25 @@ def _plateaus(
     return np.argsort(np.argsort(first))[inverse]
 
 
-def _centroids(
-    cells: NDArray[np.intp], label: NDArray[np.intp], first: NDArray[np.intp], shape: tuple
-) -> Array:
-    """Return the mean index coordinates of every plateau, measured the short way from its first."""
-    half = np.array(shape) // 2
-    offset = (cells - cells[first][label] + half) % shape - half
-    size = np.bincount(label)
-    mean = np.stack([np.bincount(label, weights=part) / size for part in offset.T], axis=1)
-    return cells[first] + mean
+def slopes_and_curvatures(surface: Surface, point: Array) -> tuple[Array, Array]:
+    """Return the first and second derivatives of the interpolant.
+
+    Args:
+        surface: The surface.
+        point: Points, shape (n, 2) [mm].
+
+    Returns:
+        h_x and h_y, shape (2, n), and h_xx, h_xy and h_yy, shape (3, n) [1/mm].
+    """
+    first, second = ((1, 0), (0, 1)), ((2, 0), (1, 1), (0, 2))
+    slopes, curvatures = (
+        np.stack([surface.interpolant(*point.T, dx=dx, dy=dy) for dx, dy in orders])
+        for orders in (first, second)
+    )
+    return slopes, curvatures
 
 
-def constrained_summits(surface: Surface, start: Array, *, bounded: bool = True) -> Array:
+def constrained_summits(surface: Surface, start: Array) -> Array:
     """Return the summits of the closed rectangle that the surface rises to from given points.
 
     Newton's method climbs the smooth interpolant in steps of at most a cell, uphill also where the
@@ -109,28 +106,28 @@ def constrained_summits(surface: Surface, start: Array, *, bounded: bool = True)
     Args:
         surface: The surface; its border counts also when it is periodic.
         start: Points near the maxima, shape (n, 2) [mm].
-        bounded: Whether climbs end at the border; otherwise the surface continues periodically.
 
     Returns:
         The maxima, shape (n, 2) [mm].
     """
-    climb = _Climb(surface, bounded)
     point = np.array(start, float)
+    rounding = 4.0 * np.finfo(float).eps * float(np.abs(surface.heights).max())
     on, longest = np.arange(len(point)), np.ones(len(point))
-    for _ in range(_MOST_STEPS):
+    shortest = 1e-10  # step that ends a climb, in cells
+    for _ in range(200):
         if not on.size:
             break
         here = point[on]
-        moved = climb.moved(here, longest[on])
-        before, after = climb.height(here), climb.height(moved)
-        size = np.abs((moved - here) / climb.cell).max(axis=1)
-        gained = after - before > climb.rounding
+        moved = _moved_uphill(surface, here, longest[on])
+        before, after = surface.height_at(*here.T), surface.height_at(*moved.T)
+        size = np.abs((moved - here) / surface.spacing).max(axis=1)
+        gained = after - before > rounding
         # the last steps of Newton's method are right though the height does not show it
-        taken = gained | ((size < _COINCIDENT) & (before - after <= climb.rounding))
+        taken = gained | ((size < _COINCIDENT) & (before - after <= rounding))
         point[on[taken]] = moved[taken]
         longest[on] = np.where(taken, np.minimum(2.0 * longest[on], 1.0), 0.25 * size)
-        on = on[(size > _SHORTEST) & (longest[on] > _SHORTEST)]
-    gained = climb.height(point) - climb.height(start) > climb.rounding
+        on = on[(size > shortest) & (longest[on] > shortest)]
+    gained = surface.height_at(*point.T) - surface.height_at(*start.T) > rounding
     return np.where(gained[:, None], point, start)
 
 
@@ -146,35 +143,19 @@ def coincident(surface: Surface, point: Array) -> Indices:
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
 
 
-class _Climb:
-    """Steps uphill on a surface."""
-
-    def __init__(self, surface: Surface, bounded: bool) -> None:
-        self._surface, self._bounded = surface, bounded
-        self.cell, self._limit = np.array(surface.spacing), np.array(surface.lengths)
-        self.rounding = _ROUNDING * float(np.abs(surface.heights).max())
-
-    def height(self, point: Array, dx: int = 0, dy: int = 0) -> Array:
-        """Return heights, or a derivative of them."""
-        return self._surface.interpolant(*point.T, dx=dx, dy=dy)
-
-    def moved(self, point: Array, longest: Array) -> Array:
-        """Return points after a step of at most ``longest`` cells, shape (n,)."""
-        h = self.height
-        slope = np.stack([h(point, 1, 0), h(point, 0, 1)], axis=1) * self.cell
-        xx, xy, yy = h(point, 2, 0), h(point, 1, 1), h(point, 0, 2)
-        curvature = np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2)
-        curvature = curvature * np.multiply.outer(self.cell, self.cell)
-        if self._bounded:
-            low, high = point <= 0.0, point >= self._limit
-            fixed = (low & (slope < 0.0)) | (high & (slope > 0.0))
-            slope = np.where(fixed, 0.0, slope)
-            curvature = np.where(fixed[:, :, None] | fixed[:, None, :], 0.0, curvature)
-        step = _ascent(slope, curvature)
-        size = np.abs(step).max(axis=1, initial=0.0)
-        step *= np.divide(longest, size, out=np.ones_like(size), where=size > longest)[:, None]
-        moved = point + step * self.cell
-        return np.clip(moved, 0.0, self._limit) if self._bounded else moved
+def _moved_uphill(surface: Surface, point: Array, longest: Array) -> Array:
+    """Return points after a step of at most ``longest`` cells, shape (n,)."""
+    cell, border = np.array(surface.spacing), np.array(surface.lengths)
+    slopes, curvatures = slopes_and_curvatures(surface, point)
+    slope = slopes.T * cell
+    curvature = curvatures[[0, 1, 1, 2]].T.reshape(-1, 2, 2) * np.multiply.outer(cell, cell)
+    fixed = ((point <= 0.0) & (slope < 0.0)) | ((point >= border) & (slope > 0.0))
+    slope = np.where(fixed, 0.0, slope)
+    curvature = np.where(fixed[:, :, None] | fixed[:, None, :], 0.0, curvature)
+    step = _ascent(slope, curvature)
+    size = np.abs(step).max(axis=1, initial=0.0)
+    step *= np.divide(longest, size, out=np.ones_like(size), where=size > longest)[:, None]
+    return np.clip(point + step * cell, 0.0, border)
 
 
 def _ascent(slope: Array, curvature: Array) -> Array:

@@ -8,29 +8,12 @@ from functools import cached_property
 from math import ceil
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from geometry.interpolant import Interpolant
-from support.checks import (
-    LARGEST,
-    cells_between,
-    frozen_array,
-    is_level,
-    positive_lengths,
-)
+from geometry.interpolant import Interpolant, cell_centres
+from support.arrays import Array
+from support.checks import LARGEST, frozen_array, is_level, positive_lengths
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_FEWEST = 4
-"""Smallest number of heights along a side."""
-_KEPT_SPLINE = 2**20
-"""Heights up to which the interpolant that showed the highest point is kept for other uses: it
-takes three times the memory of the heights."""
-_WHOLE = 1e-6
-"""Share of a cell by which a rectangle may extend into it by rounding alone."""
-_SLACK = 1e-9
-"""Share of a side that coordinates may miss by rounding when computed from an origin."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -81,12 +64,12 @@ class Surface:
     @property
     def x(self) -> Array:
         """Cell centres along x, shape (nx,) [mm]."""
-        return np.multiply(np.arange(self.grid[0]) + 0.5, self.spacing[0])
+        return cell_centres(self.lengths[0], self.grid[0])
 
     @property
     def y(self) -> Array:
         """Cell centres along y, shape (ny,) [mm]."""
-        return np.multiply(np.arange(self.grid[1]) + 0.5, self.spacing[1])
+        return cell_centres(self.lengths[1], self.grid[1])
 
     @property
     def mean_height(self) -> float:
@@ -110,7 +93,8 @@ class Surface:
 
     @cached_property
     def _summit(self) -> tuple[float, float, float]:
-        if self.heights.size <= _KEPT_SPLINE or "interpolant" in vars(self):
+        # an interpolant takes three times the memory of the heights: large ones are not kept
+        if self.heights.size <= 2**20 or "interpolant" in vars(self):
             return self.interpolant.maximum()
         summit = Interpolant(self.heights, self.lengths, periodic=self.periodic).maximum()
         gc.collect()  # what scipy minimised refers to itself, and would keep the interpolant
@@ -130,21 +114,6 @@ class Surface:
             InputError: When a point lies outside a surface that is not periodic.
         """
         return self.interpolant(x, y)
-
-    def gradient_at(self, x: ArrayLike, y: ArrayLike) -> Array:
-        """Evaluate the gradient (∂h/∂x, ∂h/∂y) of the interpolant.
-
-        Args:
-            x: Abscissae [mm]; broadcast against ``y``.
-            y: Ordinates [mm].
-
-        Returns:
-            Slopes, broadcast shape + (2,).
-
-        Raises:
-            InputError: When a point lies outside a surface that is not periodic.
-        """
-        return np.stack([self.interpolant(x, y, dx=1), self.interpolant(x, y, dy=1)], axis=-1)
 
     def detrended(self, order: int = 1) -> Surface:
         """Subtract the least-squares polynomial of total degree ``order``.
@@ -169,33 +138,13 @@ class Surface:
             heights = np.zeros(self.grid)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
-    def cropped(
-        self, *, x: tuple[float, float] | None = None, y: tuple[float, float] | None = None
-    ) -> Surface:
-        """Cut out a rectangle, rounded to whole cells; its lower corner becomes the origin.
-
-        Args:
-            x: Interval (lo, hi) kept along x [mm]; all when not given.
-            y: Interval (lo, hi) kept along y [mm]; all when not given.
-
-        Returns:
-            A surface that is not periodic.
-
-        Raises:
-            InputError: When an interval is empty or leaves the surface.
-        """
-        rows = cells_between(x, self.lengths[0], self.grid[0], "x")
-        columns = cells_between(y, self.lengths[1], self.grid[1], "y")
-        heights = self.heights[rows, columns]
-        lengths = (heights.shape[0] * self.spacing[0], heights.shape[1] * self.spacing[1])
-        return replace(self, heights=heights, lengths=lengths, periodic=False)
-
     def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:
         """Return what lies in a rectangle, with the interpolant of the whole.
 
-        It ends exactly at these coordinates and rises nowhere above the whole, whereas the spline
-        of a `cropped` surface may do so by micrometres. Its cells are those of the whole where they
-        fill the rectangle, otherwise a little smaller; there are at least 4 × 4.
+        It ends exactly at these coordinates and rises nowhere above the whole, whereas a spline
+        through the heights of the rectangle alone may do so by micrometres. Its cells are those of
+        the whole where they fill the rectangle, otherwise a little smaller; there are at least
+        4 × 4.
 
         Args:
             x: Interval (lo, hi) along x [mm].
@@ -207,24 +156,14 @@ class Surface:
         Raises:
             InputError: When an interval is empty or leaves the surface.
         """
-        corner, lengths, grid = [], [], []
-        for axis, interval in enumerate((x, y)):
-            low, high = _within(interval, self.lengths[axis], "xy"[axis])
-            corner.append(low)
-            lengths.append(high - low)
-            cells = (high - low) / self.spacing[axis]
-            grid.append(max(ceil(cells - _WHOLE), _FEWEST))
-        interpolant = self.interpolant.window((corner[0], corner[1]), (lengths[0], lengths[1]))
-        centres = [
-            (np.arange(count) + 0.5) * (length / count)
-            for count, length in zip(grid, lengths, strict=True)
-        ]
-        part = replace(
-            self,
-            heights=interpolant(centres[0][:, None], centres[1]),
-            lengths=(lengths[0], lengths[1]),
-            periodic=False,
-        )
+        (x0, x1), (y0, y1) = map(_within, (x, y), self.lengths, "xy")
+        lengths = x1 - x0, y1 - y0
+        # rounding alone makes no further cell
+        cells = (max(ceil(a / b - 1e-6), 4) for a, b in zip(lengths, self.spacing, strict=True))
+        at_x, at_y = map(cell_centres, lengths, cells)
+        interpolant = self.interpolant.window((x0, y0), lengths)
+        heights = interpolant(at_x[:, None], at_y[None])
+        part = replace(self, heights=heights, lengths=lengths, periodic=False)
         # not a field: `replace` must not pass the interpolant on with other heights
         vars(part)["interpolant"] = interpolant
         return part
@@ -237,10 +176,8 @@ class Surface:
         """
         if grid == self.grid:
             return self
-        x, y = (
-            (np.arange(n) + 0.5) * (size / n) for n, size in zip(grid, self.lengths, strict=True)
-        )
-        return replace(self, heights=self.height_at(*np.meshgrid(x, y, indexing="ij")))
+        x, y = map(cell_centres, self.lengths, grid)
+        return replace(self, heights=self.height_at(x[:, None], y[None]))
 
     def shifted(self, i: int, j: int) -> Surface:
         """Move a periodic surface by whole cells.
@@ -263,7 +200,7 @@ class Surface:
 
 def _checked_heights(heights: ArrayLike) -> Array:
     array = frozen_array(heights)
-    if array.ndim != 2 or min(array.shape) < _FEWEST:
+    if array.ndim != 2 or min(array.shape) < 4:
         raise InputError(
             "a surface needs at least 4 × 4 heights on a two-dimensional grid",
             value=array.shape,
@@ -286,7 +223,7 @@ def _checked_heights(heights: ArrayLike) -> Array:
 def _within(interval: tuple[float, float], length: float, axis: str) -> tuple[float, float]:
     """Return an interval, cut to the surface where rounding alone takes it beyond."""
     low, high = map(float, interval)
-    slack = _SLACK * length
+    slack = 1e-9 * length  # of coordinates that were computed from an origin
     if not -slack <= low < high <= length + slack:
         raise InputError(
             f"the piece along {axis} does not lie within the surface or is empty",

@@ -10,31 +10,20 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import Akima1DInterpolator, RectBivariateSpline
 
 from geometry.interpolant import bordered
 from geometry.surface import Surface
+from support.arrays import Array, Indices
 from support.errors import InputError
 
-Array = NDArray[np.float64]
-Axis = tuple[NDArray[np.intp], NDArray[Any], NDArray[Any]]
+Axis = tuple[Indices, Array, Array]
 
 FIRST_TOUCH, MEAN_PLANE = "first touch", "mean plane"
 ALLOWED = "'first touch', 'mean plane', or 'quantile 0.001' with any number between 0 and 1"
-_QUANTILE = re.compile(r"quantile\s+([0-9.]+(?:[eE][+-]?[0-9]+)?)")
-
-_TOPS, _WINDOW, _FINE = 12, 10, 24
-"""Highest samples around which two interpolants are compared, cells on each side that they see
-there, and points per cell and a half. The influence of a sample on a quintic spline falls by 0.43
-a cell."""
-_HIGHER_ORDER = 8.0
-"""Error of the cubic spline's top over its difference from that of the quintic spline. On 24
-plateau-honed surfaces of 8 to 16 heights per wave, where 2 leaves 7 beyond 1.5 × the stated error
-and 8 leaves one, and on 36 self-affine ones of 3 heights and more, where 2 leaves two and 8 one."""
+_QUANTILE = re.compile(r"quantile\s+((?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)", re.ASCII)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +48,7 @@ class Zero:
     def share(self) -> float:
         """Share of the area that lies higher than a quantile; NaN where there is none."""
         quantile = _QUANTILE.fullmatch(self.name)
-        try:
-            return float(quantile[1]) if quantile else math.nan
-        except ValueError:  # two points
-            return math.nan
+        return float(quantile[1]) if quantile else math.nan
 
     def depth(self, surfaces: Sequence[Surface]) -> float:
         """Return how far the zero lies below the highest point [mm].
@@ -120,9 +106,8 @@ def _error_of_top(surface: Surface) -> float:
     hardly overshoot at the edges of grooves; they end at the outermost samples.
     """
     tops, samples = [], surface.heights if surface.periodic else bordered(surface.heights)
-    highest = np.divmod(
-        np.argpartition(surface.heights, -_TOPS, axis=None)[-_TOPS:], surface.grid[1]
-    )
+    twelve = np.argpartition(surface.heights, -12, axis=None)[-12:]
+    highest = np.divmod(twelve, surface.grid[1])
     top = np.floor(np.divide(surface.highest_point, surface.spacing)).astype(int)
     for cell in {(int(i), int(j)) for i, j in (*zip(*highest, strict=True), top)}:
         axes = [_axis(surface, axis, cell[axis]) for axis in range(2)]
@@ -139,14 +124,17 @@ def _error_of_top(surface: Surface) -> float:
         local = Akima1DInterpolator(v, lines, axis=1)(y)
         tops.append((float(quintic.max()), float(local.max())))
     quintic, akima = np.max(tops, axis=0)
-    return float(max(_HIGHER_ORDER * abs(quintic), abs(akima)))
+    # Beyond 1.5 times this error are one of 24 plateau-honed surfaces of 8 to 16 heights per wave,
+    # and one of 36 self-affine ones of 3 heights and more; with 2 in place of 8 seven and two.
+    return float(max(8.0 * abs(quintic), abs(akima)))
 
 
 def _axis(surface: Surface, axis: int, cell: int) -> Axis:
     """Return rows of samples around a cell, where they are, and points near the cell [mm]."""
     count, step, length = surface.grid[axis], surface.spacing[axis], surface.lengths[axis]
-    near = step * (cell + 0.5 + np.linspace(-1.5, 1.5, 3 * _FINE + 1))
-    rows = np.arange(cell - _WINDOW, cell + _WINDOW + 1)
+    near = step * (cell + 0.5 + np.linspace(-1.5, 1.5, 73))
+    # the influence of a sample on a quintic spline falls by 0.43 a cell
+    rows = np.arange(cell - 10, cell + 11)
     if surface.periodic:
         return rows % count, step * (rows + 0.5), near
     rows = rows[(rows >= -1) & (rows <= count)]

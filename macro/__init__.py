@@ -27,11 +27,10 @@ from macro.contact.unilateral_problem import (
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
-from macro.fields import AtPoints, write_fields, write_rough_fields
-from macro.mesh.block import BOTTOM, SIDES, TOP, block_mesh, stepped_mesh
+from macro.fields import write_fields, write_rough_fields
+from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.rough_surface import MeshQuality, rough_block_mesh, rough_stepped_mesh
 from macro.mesh.supports import Support, Traction, check_supports
 from macro.mesh.tagged import TaggedMesh, planar_face
 from macro.mesh.xdmf import write_mesh
@@ -40,7 +39,6 @@ __all__ = [
     "BOTTOM",
     "SIDES",
     "TOP",
-    "AtPoints",
     "Block",
     "ContactFacets",
     "ContactLaw",
@@ -72,8 +70,6 @@ __all__ = [
     "planar_face",
     "read_mesh",
     "rough_block_mesh",
-    "rough_stepped_mesh",
-    "stepped_mesh",
     "vector_space",
     "write_fields",
     "write_mesh",

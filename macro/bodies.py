@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 from dolfinx import fem
@@ -58,14 +58,9 @@ class Block(ElasticBody):
         return self.mesh.shape.degree
 
     @property
-    def poisson_ratio(self) -> float:
-        """Poisson's ratio."""
-        return self.material.poisson_ratio
-
-    @property
-    def cell_lame(self) -> tuple[float, float]:
-        """Lamé's constants [MPa]."""
-        return self.material.lame
+    def materials(self) -> Material:
+        """The one material."""
+        return self.material
 
     @cached_property
     def held(self) -> list[Held]:
@@ -127,33 +122,6 @@ class MeshedBody(ElasticBody):
     def degree(self) -> int:
         """Polynomial degree of the displacements."""
         return self.order
-
-    @property
-    def poisson_ratio(self) -> float:
-        """Largest Poisson's ratio in the body."""
-        if isinstance(self.materials, Material):
-            return self.materials.poisson_ratio
-        return max(material.poisson_ratio for material in self.materials.values())
-
-    @cached_property
-    def cell_lame(self) -> tuple[Any, Any]:
-        """Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,) [MPa]."""
-        if isinstance(self.materials, Material):
-            return self.materials.lame
-        cells = self.mesh.mesh.topology.index_map(3)
-        constants = np.zeros((2, cells.size_local + cells.num_ghosts))
-        tags = self.mesh.cell_tags
-        for tag, material in self.materials.items() if tags is not None else ():
-            constants[:, tags.find(tag)] = np.array(material.lame)[:, None]
-        bare = int(np.sum(constants[1] == 0.0))
-        if bare:
-            raise InputError(
-                f"{bare} cells of the body have no material",
-                key="materials",
-                value=sorted(self.materials),
-                allowed="the markers of all volumes",
-            )
-        return constants[0], constants[1]
 
     @cached_property
     def held(self) -> list[Held]:

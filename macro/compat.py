@@ -9,7 +9,7 @@ from __future__ import annotations
 import ctypes
 import inspect
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -31,9 +31,6 @@ from support.errors import InputError
 _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
-
-_ROUNDING = 1e-12
-"""Value of a basis function that is rounding."""
 
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
 
@@ -99,71 +96,45 @@ def mesh_from_gmsh(model: Any, comm: Any) -> Any:
 def mesh_from_cells(
     cells: NDArray[np.int64],
     points: NDArray[np.float64],
-    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]],
+    neighbours: tuple[NDArray[np.int64], NDArray[np.int64]] | None,
     comm: Any,
 ) -> Any:
-    """Make a mesh of straight cells without ghosts; every cell stays on its rank.
+    """Make a mesh of straight cells.
 
     Args:
-        cells: Numbers of the nodes of this rank's hexahedra or tetrahedra in the order of dolfinx,
-            shape (cells, 8 or 4); there may be none.
+        cells: Numbers of the nodes of this rank's share of the hexahedra or tetrahedra in the order
+            of dolfinx, shape (cells, 8 or 4); there may be none.
         points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
-        neighbours: Indices of this rank's cells next to those of other ranks, and these ranks; at
-            least one pair for every common facet and none twice.
+        neighbours: None to let dolfinx distribute the cells, with ghosts in 0.5 and none later. For
+            cells that stay on their rank, without ghosts: indices of this rank's cells next to
+            those of other ranks, and these ranks; at least one pair for every common facet and none
+            twice.
         comm: MPI communicator.
 
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-    owners = np.full(len(cells), comm.rank)
-    if not _makes_ghosts():
-        stay = _adjacency(np.arange(len(cells)), owners)
-        domain = _straight_domain(cells)
-        return dmesh.create_mesh(comm, cells=cells, x=points, e=domain, partitioner=lambda *_: stay)
-    # dolfinx 0.5 finds common vertices through ghosts, which it drops afterwards
-    rows = np.concatenate([np.arange(len(cells)), neighbours[0]])
-    stay = _adjacency(rows, np.concatenate([owners, neighbours[1]]))
-    domain = _straight_domain(cells)
-    return dmesh.create_mesh(comm, cells, points, domain, dmesh.GhostMode.none, lambda *_: stay)
+    kind = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
+    older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5
+    options: dict[str, Any] = {"domain" if older else "e": _straight_domain(kind, older)}
+    if neighbours is not None:
+        rows, ranks = np.arange(len(cells)), np.full(len(cells), comm.rank)
+        if older:  # it finds common vertices through ghosts, which it drops afterwards
+            rows, ranks = map(np.concatenate, zip((rows, ranks), neighbours, strict=True))
+            options["ghost_mode"] = dmesh.GhostMode.none
+        stay = _adjacency(rows, ranks)
+        options["partitioner"] = lambda *_: stay
+    return dmesh.create_mesh(comm, cells=cells, x=points, **options)
 
 
-@quiet_compiler()
-def partitioned_mesh(cells: NDArray[np.int64], points: NDArray[np.float64], comm: Any) -> Any:
-    """Make a mesh of straight cells, which dolfinx distributes over the ranks.
-
-    Args:
-        cells: Numbers of the nodes of this rank's share of the cells in the order of dolfinx, shape
-            (cells, 8 or 4); there may be none.
-        points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
-        comm: MPI communicator.
-
-    Note:
-        Collective. There are ghost cells in dolfinx 0.5, and none later. The coordinate element is
-        that of `mesh_from_gmsh`.
-    """
-    domain = _straight_domain(cells)
-    if _makes_ghosts():
-        return dmesh.create_mesh(comm, cells, points, domain)
-    return dmesh.create_mesh(comm, cells=cells, x=points, e=domain)
-
-
-def _makes_ghosts() -> bool:
-    """Tell whether meshes from cells take a mode of ghosts, as in dolfinx 0.5."""
-    return "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters
-
-
-def _straight_domain(cells: NDArray[np.int64]) -> Any:
+def _straight_domain(kind: str, older: bool) -> Any:
     """Return the coordinate element of straight hexahedra or tetrahedra, as UFL's mesh."""
-    cell = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
-    if not _makes_ghosts():
-        variant = basix.LagrangeVariant.equispaced
-        return ufl.Mesh(
-            basix.ufl.element("Lagrange", cell, 1, variant, shape=(3,), dtype=np.float64)
-        )
-    straight = ufl.FiniteElement(
-        "Lagrange", ufl.Cell(cell, geometric_dimension=3), 1, variant="equispaced"
-    )
-    return ufl.Mesh(ufl.VectorElement(straight))
+    if older:
+        cell = ufl.Cell(kind, geometric_dimension=3)
+        straight = ufl.FiniteElement("Lagrange", cell, 1, variant="equispaced")
+        return ufl.Mesh(ufl.VectorElement(straight))
+    variant = basix.LagrangeVariant.equispaced
+    return ufl.Mesh(basix.ufl.element("Lagrange", kind, 1, variant, shape=(3,), dtype=np.float64))
 
 
 def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
@@ -173,7 +144,6 @@ def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:
     return cpp.graph.AdjacencyList_int32(values[order].astype(np.int32), offsets.astype(np.int32))
 
 
-@_compiling()
 def vector_space(mesh: Any, degree: int) -> Any:
     """Return the continuous Lagrange space of displacements, three components per node.
 
@@ -181,26 +151,25 @@ def vector_space(mesh: Any, degree: int) -> Any:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
     """
-    if hasattr(fem, "functionspace"):
-        return fem.functionspace(mesh, ("Lagrange", degree, (3,)))
-    return fem.VectorFunctionSpace(mesh, ("Lagrange", degree))
+    return scalar_space(mesh, degree, shape=(3,))
 
 
 @_compiling()
 def scalar_space(
     mesh: Any, degree: int, family: str = "Lagrange", *, shape: tuple[int, ...] = ()
 ) -> Any:
-    """Return a space of scalars, or of as many in every node as a tensor has components.
+    """Return a space of scalars, or of as many in every node as a vector or tensor has components.
 
     Args:
         mesh: dolfinx mesh.
         degree: Polynomial degree.
         family: ``"Lagrange"``, continuous, or ``"DG"``, discontinuous between cells.
-        shape: Shape of the values: that of scalars, or (3, 3).
+        shape: Shape of the values: that of scalars, (3,) or (3, 3).
     """
     if hasattr(fem, "functionspace"):
         return fem.functionspace(mesh, (family, degree, *[shape] * bool(shape)))
-    return (fem.TensorFunctionSpace if shape else fem.FunctionSpace)(mesh, (family, degree))
+    kinds = fem.FunctionSpace, fem.VectorFunctionSpace, fem.TensorFunctionSpace
+    return kinds[len(shape)](mesh, (family, degree))
 
 
 def cell_constant(mesh: Any, values: Any, name: str | None = None) -> Any:
@@ -242,27 +211,19 @@ def lagrange_degree(space: Any) -> int:
     return int(element.degree if isinstance(element.degree, int) else element.degree())
 
 
-_NODES = {
-    ("tetrahedron", 4): 1,
-    ("tetrahedron", 10): 2,
-    ("hexahedron", 8): 1,
-    ("hexahedron", 27): 2,
-}
-
-
-def displacement_degree(space: Any) -> int | None:
-    """Return the degree of a continuous Lagrange space of three components, 1 or 2, else None.
+def holds_displacements(space: Any) -> bool:
+    """Tell whether a space is continuous Lagrange of degree 1 or 2 with three components.
 
     Args:
         space: Function space on any mesh.
     """
     mesh, nodes = space.mesh, space.dofmap
     if nodes.index_map_bs != 3 or space.num_sub_spaces != 3 or mesh.geometry.dim != 3:
-        return None
-    layout = nodes.dof_layout
-    if len(layout.entity_dofs(0, 0)) != 1:  # vertices of other elements have no nodes of their own
-        return None
-    return _NODES.get((mesh.topology.cell_name(), layout.num_dofs))
+        return False
+    layout, counts = nodes.dof_layout, {"tetrahedron": (4, 10), "hexahedron": (8, 27)}
+    # vertices of other elements have no nodes of their own
+    own = len(layout.entity_dofs(0, 0)) == 1
+    return own and layout.num_dofs in counts.get(mesh.topology.cell_name(), ())
 
 
 def cell_vertices(mesh: Any) -> NDArray[np.int32]:
@@ -288,7 +249,7 @@ def lagrange_values(cell_name: str, degree: int, points: NDArray[np.float64]) ->
     if not len(points):  # basix 0.5 aborts the process on no points
         return np.empty((0, element.dim))
     values = element.tabulate(0, points)[0].reshape(len(points), -1)
-    return np.where(np.abs(values) < _ROUNDING, 0.0, values)
+    return np.where(np.abs(values) < 1e-12, 0.0, values)
 
 
 def lagrange_gradients(
@@ -358,8 +319,7 @@ def assemble_matrix(form: Any, conditions: Sequence[Any], kind: str = "aij") -> 
         Collective.
     """
     matrix = fem_petsc.create_matrix(form, kind)
-    fem_petsc.assemble_matrix(matrix, form, list(conditions), 1.0)
-    matrix.assemble()
+    assemble_matrix_into(matrix, form, conditions)
     return matrix
 
 
@@ -484,35 +444,33 @@ def collect_garbage(comm: PETSc.Comm) -> None:
             PETSc.garbage_cleanup(of)
 
 
-class VtxFile:
-    """A VTX file of one Lagrange function of any degree at many times; none without ADIOS2.
+@contextmanager
+def vtx_writer(path: str) -> Iterator[Callable[[float, Any], None]]:
+    """Yield a function that writes a Lagrange function of any degree at a time to a VTX file.
+
+    The file is made with the first function; without ADIOS2 there is none.
 
     Args:
         path: Folder to write, ending in ``.bp``.
 
     Note:
-        Collective. It is made with the first function that is written.
+        Collective.
     """
+    made: list[Any] = []
 
-    def __init__(self, path: str) -> None:
-        self._path = path
-        self._file: Any = None
-        self._shown: Any = None
-
-    def __enter__(self) -> VtxFile:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._file is not None:
-            self._file.close()
-
-    def write(self, time: float, function: Any) -> None:
-        """Write the function at a time."""
+    def write(time: float, function: Any) -> None:
         if not HAS_VTX:
             return
-        if self._file is None:
-            self._shown = function
-            comm = function.function_space.mesh.comm
-            self._file = io.VTXWriter(comm, self._path, [function])
-        self._shown.x.array[:] = function.x.array
-        self._file.write(float(time))
+        if not made:
+            made.extend(
+                (function, io.VTXWriter(function.function_space.mesh.comm, path, [function]))
+            )
+        shown, file = made
+        shown.x.array[:] = function.x.array
+        file.write(float(time))
+
+    try:
+        yield write
+    finally:
+        if made:
+            made[1].close()

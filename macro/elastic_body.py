@@ -5,7 +5,6 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -16,16 +15,72 @@ from dolfinx import fem
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.materials import Material
 from macro import compat
-from macro.elasticity import rigid_body_modes, stiffness_form
 from macro.linear_solvers.multigrid import Lattice
 from macro.linear_solvers.node_matrices import Stiffened
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.supports import Traction
+from support.arrays import Array
+from support.errors import InputError
 
-Array = NDArray[np.float64]
+
+def strain(displacement: Any) -> Any:
+    """Return the small strain ε = sym ∇u as a UFL expression."""
+    return ufl.sym(ufl.grad(displacement))
+
+
+def stress(displacement: Any, lame: tuple[Any, Any]) -> Any:
+    """Return Cauchy's stress σ = λ tr(ε) I + 2 μ ε as a UFL expression [MPa].
+
+    Args:
+        displacement: UFL expression of the displacement.
+        lame: Lamé's constants (λ, μ), numbers or UFL constants.
+    """
+    first, shear = lame
+    eps = strain(displacement)
+    return first * ufl.tr(eps) * ufl.Identity(3) + 2.0 * shear * eps
+
+
+def stiffness_form(space: Any, lame: tuple[Any, Any], quadrature_degree: int) -> Any:
+    """Return the bilinear form a(u, v) = ∫ σ(u) : ε(v) dV as UFL.
+
+    Lamé's constants enter as UFL constants, so that one compiled form serves every material, or as
+    functions that are constant on every cell.
+
+    Args:
+        space: Vector space of the displacements.
+        lame: Lamé's constants (λ, μ), or arrays of those of this rank's cells [MPa].
+        quadrature_degree: Polynomial degree that is integrated exactly.
+    """
+    mesh = space.mesh
+    constants = (
+        compat.cell_constant(mesh, values)
+        if np.ndim(values)
+        else fem.Constant(mesh, PETSc.ScalarType(values))
+        for values in lame
+    )
+    trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+    dx = ufl.Measure("dx", domain=mesh, metadata={"quadrature_degree": quadrature_degree})
+    first, shear = constants
+    return ufl.inner(stress(trial, (first, shear)), strain(test)) * dx
+
+
+def rigid_body_modes(points: Array, comm: Any) -> PETSc.NullSpace:
+    """Return the six rigid body modes of nodes, the near-nullspace for algebraic multigrid.
+
+    Args:
+        points: Coordinates of the nodes of this rank, shape (n, 3) [mm].
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    coordinates = PETSc.Vec().createMPI((points.size, None), bsize=3, comm=comm)
+    coordinates.array[:] = points.ravel()
+    return PETSc.NullSpace().createRigidBody(coordinates)
 
 
 class Held(NamedTuple):
@@ -47,7 +102,7 @@ class Held(NamedTuple):
         return (3 * self.nodes + self.axis).astype(np.int32)
 
 
-class ElasticBody(ABC):
+class ElasticBody:
     """A linear elastic body that is held, ready to be loaded on a face.
 
     Stiffness and preconditioner are made once, on first use, and serve every load afterwards.
@@ -56,6 +111,10 @@ class ElasticBody(ABC):
         mesh: Its dolfinx mesh as ``mesh.mesh``, and ``mesh.facet_tags``.
         normal: Direction out of the contact face, along which `reaction` is taken, shape (3,).
         tractions: Loaded surfaces, beside the contact.
+        materials: Elastic constants of the whole body, or by marker of the volumes.
+        degree: Polynomial degree of the displacements.
+        held: What the supports prescribe.
+        linear: The same body with linear displacements; for quadratic ones, made on first use.
 
     Note:
         Everything is collective over the communicator of the mesh.
@@ -64,31 +123,10 @@ class ElasticBody(ABC):
     mesh: Any
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     tractions: Sequence[Traction] = ()
-
-    @property
-    @abstractmethod
-    def degree(self) -> int:
-        """Polynomial degree of the displacements."""
-
-    @property
-    @abstractmethod
-    def poisson_ratio(self) -> float:
-        """Largest Poisson's ratio in the body."""
-
-    @property
-    @abstractmethod
-    def cell_lame(self) -> tuple[Any, Any]:
-        """Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,) [MPa]."""
-
-    @property
-    @abstractmethod
-    def held(self) -> list[Held]:
-        """What the supports prescribe."""
-
-    @property
-    @abstractmethod
-    def linear(self) -> ElasticBody:
-        """The same body with linear displacements; for quadratic ones, made on first use."""
+    materials: Any
+    degree: Any
+    held: Any
+    linear: Any
 
     @property
     def lattice(self) -> Lattice | None:
@@ -119,6 +157,46 @@ class ElasticBody(ABC):
     def owned_dofs(self) -> int:
         """Number of degrees of freedom that this rank owns."""
         return 3 * int(self.space.dofmap.index_map.size_local)
+
+    @property
+    def poisson_ratio(self) -> float:
+        """Largest Poisson's ratio in the body."""
+        if isinstance(self.materials, Material):
+            return self.materials.poisson_ratio
+        return max(material.poisson_ratio for material in self.materials.values())
+
+    @cached_property
+    def cell_lame(self) -> tuple[Any, Any]:
+        """Lamé's constants of this rank's cells: numbers, or arrays of shape (cells,) [MPa]."""
+        if isinstance(self.materials, Material):
+            return self.materials.lame
+        cells = self.mesh.mesh.topology.index_map(3)
+        constants = np.zeros((2, cells.size_local + cells.num_ghosts))
+        tags = self.mesh.cell_tags
+        for tag, material in self.materials.items() if tags is not None else ():
+            constants[:, tags.find(tag)] = np.array(material.lame)[:, None]
+        bare = int(np.sum(constants[1] == 0.0))
+        if bare:
+            raise InputError(
+                f"{bare} cells of the body have no material",
+                key="materials",
+                value=sorted(self.materials),
+                allowed="the markers of all volumes",
+            )
+        return constants[0], constants[1]
+
+    def materials_of(self, cells: NDArray[np.int32]) -> set[Material]:
+        """Return the materials of some cells, those of all ranks together.
+
+        Args:
+            cells: This rank's part of the cells, shape (n,).
+        """
+        if isinstance(self.materials, Material):
+            own = {self.materials} if len(cells) else set[Material]()
+        else:
+            tags, by_tag = self.mesh.cell_tags, self.materials.items()
+            own = {material for tag, material in by_tag if np.isin(cells, tags.find(tag)).any()}
+        return set().union(*self.comm.allgather(own))
 
     @property
     def quadrature_degree(self) -> int:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -17,25 +17,19 @@ from numpy.typing import NDArray
 from geometry.materials import von_mises
 from macro import compat
 from macro.contact.face_contact_state import FaceContactState
-from macro.contact.loaded_face import LoadedFace
+from macro.contact.loaded_face import LoadedFace, Outline
 from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
+from support.arrays import Array
 from support.collective import on_root
-
-Array = NDArray[np.float64]
 
 _FILES_NOT_CLOSED: list[Any] = []
 """XDMF files that could not be closed, referenced so that no destructor runs before exit."""
 
 
-class AtPoints(NamedTuple):
-    """Pressures at this rank's quadrature points of a face, shape (points,) [MPa]."""
-
-    values: Array
-
-
-Pressures = Array | AtPoints | None
-"""Mean pressures of the N patches, shape (N,), or those at points [MPa]; None leaves them out."""
+Pressures = Array | None
+"""Mean pressures of the N patches, shape (N,), or on a face in regions those at this rank's
+quadrature points, shape (points,) [MPa]; None leaves them out."""
 
 
 def write_fields(
@@ -64,11 +58,11 @@ def write_fields(
     def functions() -> Iterator[tuple[int, list[Any]]]:
         for number, displacement, pressure in steps:
             moved = body.function(displacement)
-            vtx.write(number, moved)
+            write_vtx(number, moved)
             shown = [] if pressure is None else [_facet_pressures(face, pressure)]
             yield number, [*_of_body(body, moved), *shown]
 
-    with compat.VtxFile(str(Path(path).with_suffix(".bp"))) as vtx:
+    with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())
 
 
@@ -139,13 +133,13 @@ def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
     return [shown, compat.cell_constant(mesh, values, "stress"), equivalent]
 
 
-def _facet_pressures(face: LoadedFace, pressure: Array | AtPoints) -> Any:
+def _facet_pressures(face: LoadedFace, pressure: Array) -> Any:
     """Return the mean pressures over the facets of the face, on their cells [MPa]."""
     facets, points = face.facets, face.quadrature
     pressures = fem.Function(compat.scalar_space(face.space.mesh, 0, "DG"), name="pressure")
     cells = compat.cell_nodes(pressures.function_space)[:, 0]
-    values = pressure.values if isinstance(pressure, AtPoints) else pressure[points.patch]
-    force = points.weight * values
+    at_points = pressure if isinstance(face.patches, Outline) else pressure[points.patch]
+    force = points.weight * at_points
     total = np.bincount(cells[points.cell], force, minlength=len(pressures.x.array))
     loaded = cells[facets.cell]
     pressures.x.array[loaded] = total[loaded] / facets.area

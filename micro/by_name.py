@@ -30,5 +30,5 @@ def micro_model(
         return HalfSpaceModel(surface=surface, contact_modulus=contact_modulus)
     if name not in MODELS:
         raise InputError("unknown micro model", value=name, allowed=", ".join(MODEL_NAMES))
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     return AsperityModel(name, asperities, contact_modulus=contact_modulus, solver=solver)

@@ -9,7 +9,7 @@ from typing import NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import Asperities, Control, Partition, PatchGrid, Surface, patch_means
+from geometry import Asperities, Control, PatchGrid, Surface, patch_means
 from geometry.contact_state import ContactState, Start
 from support.arrays import Array
 from support.checks import real_array
@@ -53,7 +53,7 @@ class MicroModel(Protocol):
         self,
         control: Control,
         *,
-        patches: Partition | None = None,
+        patches: PatchGrid | None = None,
         mean_heights: ArrayLike | None = None,
         start: Start | None = None,
     ) -> ContactState:
@@ -115,7 +115,7 @@ def press_along(
     model: MicroModel,
     approaches: ArrayLike,
     *,
-    patches: Partition | None = None,
+    patches: PatchGrid | None = None,
     mean_heights: ArrayLike | None = None,
     tilt: tuple[float, float] | None = (0.0, 0.0),
     known: Mapping[float, Start] | None = None,
@@ -167,9 +167,9 @@ def _nearby(approach: float, starts: Mapping[float, Start]) -> Start | None:
 
 def checked_patches(
     rough: Surface | Asperities,
-    patches: Partition | None = None,
+    patches: PatchGrid | None = None,
     mean_heights: ArrayLike | None = None,
-) -> tuple[Partition, Array]:
+) -> tuple[PatchGrid, Array]:
     """Return patches and their mean heights, by default those of the whole surface.
 
     Args:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.errors import InputError
 
 SMALLEST, LARGEST = 1e-15, 1e15
@@ -37,7 +37,7 @@ def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     return pair
 
 
-def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = None) -> bool:
+def is_level(heights: Array, among: Array | None = None) -> bool:
     """Tell whether heights differ by rounding alone.
 
     Args:
@@ -52,7 +52,7 @@ def is_level(heights: NDArray[np.float64], among: NDArray[np.float64] | None = N
     return float(np.ptp(0.5 * finite)) <= 32.0 * float(np.finfo(float).eps) * size
 
 
-def check_scale(heights: NDArray[np.float64]) -> None:
+def check_scale(heights: Array) -> None:
     """Refuse roughness so fine that squares of its curvatures leave double precision.
 
     Args:
@@ -85,43 +85,19 @@ def cell_counts(value: Any, what: str, *, dimension: int = 2, smallest: int = 1)
     Raises:
         InputError: When their number, type or size is wrong.
     """
-    allowed = f"{dimension} whole numbers, each at least {smallest}"
-    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
-        raise InputError(f"{what} needs {dimension} whole numbers", value=value, allowed=allowed)
-    counts = tuple(value)
+    several = isinstance(value, Sequence | np.ndarray)
+    counts = tuple(value) if several else ()
     whole = all(isinstance(n, int | np.integer) and not isinstance(n, bool) for n in counts)
-    if len(counts) != dimension or not whole or min(counts, default=0) < smallest:
-        raise InputError(f"{what} does not fit", value=counts, allowed=allowed)
+    if len(counts) != dimension or not whole or min(counts) < smallest:
+        raise InputError(
+            f"{what} does not fit",
+            value=counts if several else value,
+            allowed=f"{dimension} whole numbers, each at least {smallest}",
+        )
     return tuple(int(n) for n in counts)
 
 
-def cells_between(
-    interval: tuple[float, float] | None, length: float, count: int, axis: str
-) -> slice:
-    """Return the cells between two coordinates, rounded to whole cells.
-
-    Args:
-        interval: Coordinates (lo, hi) [mm]; all cells when None.
-        length: Side of the rectangle [mm].
-        count: Its cells.
-        axis: Name of the axis, for the error.
-
-    Raises:
-        InputError: When the interval leaves the rectangle or keeps no cell.
-    """
-    if interval is None:
-        return slice(None)
-    lo, hi = (round(float(edge) / length * count) for edge in interval)
-    if not 0 <= lo < hi <= count:
-        raise InputError(
-            f"the crop along {axis} does not lie within the surface or keeps no cell",
-            value=tuple(interval),
-            allowed=f"0 ≤ lo < hi ≤ {length} mm",
-        )
-    return slice(lo, hi)
-
-
-def real_array(value: Any) -> NDArray[np.float64]:
+def real_array(value: Any) -> Array:
     """Return real numbers in double precision; what is masked becomes not a number.
 
     All arrays of users enter by this way: numpy drops masks and units of others in silence.
@@ -148,20 +124,23 @@ def real_array(value: Any) -> NDArray[np.float64]:
         return np.asarray(array.astype(np.float64, copy=False).filled(np.nan))
 
 
-def frozen_array(value: Any) -> NDArray[np.float64]:
+def frozen_array(value: Any) -> Array:
     """Return a contiguous, read-only float64 copy of real numbers, see `real_array`."""
     array = np.array(real_array(value), order="C")
     array.setflags(write=False)
     return array
 
 
-def finite_pair(value: Any, problem: str, *, allowed: str) -> tuple[float, float]:
+def finite_pair(
+    value: Any, problem: str, *, allowed: str, key: str | None = None
+) -> tuple[float, float]:
     """Return two finite numbers as floats.
 
     Args:
         value: Candidate for the pair.
         problem: What to say when it is none.
         allowed: What would be accepted.
+        key: Name of what the pair is given for.
 
     Raises:
         InputError: When there are not two of them, or one is not finite.
@@ -169,9 +148,9 @@ def finite_pair(value: Any, problem: str, *, allowed: str) -> tuple[float, float
     try:
         first, second = (float(part) for part in value)
     except (TypeError, ValueError):
-        raise InputError(problem, value=value, allowed=allowed) from None
+        first = second = math.nan
     if not (math.isfinite(first) and math.isfinite(second)):
-        raise InputError(problem, value=value, allowed=allowed)
+        raise InputError(problem, value=value, allowed=allowed, key=key)
     return first, second
 
 

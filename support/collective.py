@@ -16,10 +16,6 @@ from support.cores import allocated, node_cores
 
 T = TypeVar("T")
 
-_NAP, _SHARE = 1e-3, 0.1
-"""Longest time between two looks of a waiting rank at whether the work is done [s], and that time
-over the one it has waited for."""
-
 
 def on_root(comm: Any, work: Callable[[], T]) -> T:
     """Do work on rank 0 and broadcast its result, or its error, to every rank.
@@ -39,11 +35,7 @@ def on_root(comm: Any, work: Callable[[], T]) -> T:
     """
     if comm is None or comm.size == 1:
         return work()
-    result, error = _attempt(work) if comm.rank == 0 else (None, None)
-    result, error = comm.bcast((result, error), root=0)
-    if error is not None:
-        raise error
-    return result
+    return _from_root(comm, _attempt(work) if comm.rank == 0 else None)
 
 
 def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
@@ -69,6 +61,11 @@ def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
         with allocated(here.alone, here.granted):
             done = _attempt(work)
     _sleep_until_all_arrive(comm)
+    return _from_root(comm, done)
+
+
+def _from_root(comm: Any, done: tuple[T | None, Exception | None] | None) -> T:
+    """Return what `_attempt` gave on rank 0 on every rank, or raise its error there."""
     result, error = comm.bcast(done, root=0)
     if error is not None:
         raise error
@@ -76,10 +73,13 @@ def on_root_alone(comm: Any, work: Callable[[], T]) -> T:
 
 
 def _sleep_until_all_arrive(comm: Any) -> None:
-    """Wait for all ranks; in a collective call of MPI those that wait would keep cores busy."""
+    """Wait for all ranks; in a collective call of MPI those that wait would keep cores busy.
+
+    A rank looks for the others after a tenth of the time it has waited, a millisecond at most.
+    """
     arrived, began = comm.Ibarrier(), time.perf_counter()
     while not arrived.Test():
-        time.sleep(min(_NAP, _SHARE * (time.perf_counter() - began)))
+        time.sleep(min(1e-3, 0.1 * (time.perf_counter() - began)))
 
 
 def together(comm: Any, work: Callable[[], T]) -> T:

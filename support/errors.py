@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Iterator
+import reprlib
+from collections.abc import Iterable
 from enum import Enum
 from typing import Any
 
@@ -146,35 +147,15 @@ def did_you_mean(word: str, known: Iterable[str], *, cutoff: float = 0.6) -> str
 
 def _shortened(value: Any) -> str:
     """Return what stands for a value in a message: a line, however long the value is."""
-    text = ""
+    short = reprlib.Repr()
+    short.maxlist = short.maxtuple = short.maxdict = 20
+    # to be cut at their end, not in the middle
+    short.maxstring = short.maxother = short.maxlong = 10 * _LONGEST
     try:
-        for piece in _pieces(value):
-            text += piece
-            if len(text) > _LONGEST:
-                return f"{text[: _LONGEST - 1]}…"
-    except Exception:  # of thousands of digits, or of a class that has no text
+        text = short.repr(value)
+    except ValueError:  # of thousands of digits
         return f"<{type(value).__name__}>"
-    return text
-
-
-def _pieces(value: Any) -> Iterator[str]:
-    """Yield the text of a value bit by bit: all of it may be longer than any memory."""
-    if type(value) in (list, tuple):
-        yield "[" if type(value) is list else "("
-        for place, part in enumerate(value):
-            yield ", " if place else ""
-            yield from _pieces(part)
-        yield "]" if type(value) is list else ",)" if len(value) == 1 else ")"
-    elif type(value) is dict:
-        yield "{"
-        for place, (key, part) in enumerate(value.items()):
-            yield ", " if place else ""
-            yield from _pieces(key)
-            yield ": "
-            yield from _pieces(part)
-        yield "}"
-    else:
-        yield repr(value[: _LONGEST + 1] if type(value) in (str, bytes) else value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
 def _not_converged(what: str, reason: str, iterations: int, remedy: str) -> NotConverged:

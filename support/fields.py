@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import Field, dataclass, fields
+from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache
 from typing import Annotated, Any, get_args, get_type_hints
 
@@ -111,6 +111,20 @@ def part_of(record: Any, base: type) -> dict[str, Any]:
         base: The base, a dataclass.
     """
     return {field.name: getattr(record, field.name) for field in fields(base)}
+
+
+def changed_fields(record: Any) -> list[str]:
+    """Return the names of a record's fields whose values are not their defaults.
+
+    Args:
+        record: The record.
+    """
+    names = []
+    for one in fields(record):
+        default = one.default if one.default_factory is MISSING else one.default_factory()
+        if getattr(record, one.name) != default:
+            names.append(one.name)
+    return names
 
 
 def key_of(field: Field[Any]) -> str | None:

@@ -23,7 +23,6 @@ _FINITE_ELEMENTS = (
     "take dolfinx, petsc4py, mpi4py and gmsh from one distribution, Debian by ./setup.sh or as "
     "fenics-dolfinx and python-gmsh from conda-forge; pip has no dolfinx",
 )
-_LONGEST = 200  # characters of another package's error
 _NEEDS = {
     package: (what, source)
     for what, packages, source in (_SCENES, _FINITE_ELEMENTS)
@@ -52,7 +51,7 @@ def optional_packages() -> Iterator[None]:
         what, source = _NEEDS[package]
         problem = "is not installed"
         if not (isinstance(error, ModuleNotFoundError) and error.name == package):
-            problem = f"cannot be imported ({' '.join(str(error).split())[:_LONGEST]})"
+            problem = f"cannot be imported ({' '.join(str(error).split())[:200]})"
         raise NotInstalled(f"{package} {problem}, and {what} need it: {source}") from error
 
 

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-import math
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.checks import process_memory, real_array
 from support.errors import InputError, did_you_mean
-
-Array = NDArray[np.float64]
 
 LENGTH_UNITS = {
     "m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3, "nm": 1e-6, "pm": 1e-9, "Å": 1e-7, "in": 25.4,
@@ -69,7 +64,7 @@ def length_unit(text: str) -> str:
     if unit not in LENGTH_UNITS:
         hint = did_you_mean(unit, LENGTH_UNITS, cutoff=1.0)
         raise InputError(
-            f"the values are in '{text}': they are no heights{hint}",
+            f"'{text}' is no unit of heights{hint}",
             allowed=", ".join(LENGTH_UNITS),
         )
     return unit
@@ -101,34 +96,16 @@ def read_array(file: Path) -> FileContent:
     Raises:
         InputError: When the file is no whole array of real numbers, or too large.
     """
-    with file.open("rb") as stream:
-        shape, transposed, dtype = _array_header(stream)
-        count = math.prod(shape)
-        if dtype.kind not in "biuf":  # pickled objects among them
-            raise InputError("the heights are not an array of real numbers", value=str(dtype))
-        if len(shape) != 2 or min(shape) < 0:
-            raise InputError("not a two-dimensional array", value=shape, allowed="(nx, ny)")
-        size = os.fstat(stream.fileno()).st_size - stream.tell()
-        if size < count * dtype.itemsize:
-            raise InputError(
-                f"not a whole numpy array: it has {size} bytes of the {count * dtype.itemsize} "
-                "that its header promises"
-            )
-        check_memory(count * BYTES_PER_HEIGHT)
-        flat = np.fromfile(stream, dtype=dtype, count=count)
-    return FileContent(heights=flat.reshape(shape, order="F" if transposed else "C"))
-
-
-def _array_header(stream: BinaryIO) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
-    """Return shape, whether it is in Fortran's order, and type of a ``.npy`` file."""
-    form = np.lib.format
-    readers = {(1, 0): form.read_array_header_1_0, (2, 0): form.read_array_header_2_0}
     try:
-        return readers[form.read_magic(stream)](stream)
-    except KeyError:
-        raise InputError("not a numpy array of a known version", allowed="1.0, 2.0") from None
-    except Exception as error:  # whatever the parser of the header meets
-        raise InputError(f"not a readable numpy array: {first_line(error)}") from None
+        mapped = np.lib.format.open_memmap(file, mode="r")
+    except OSError:
+        raise
+    except Exception as error:  # whatever the parser of the header meets, or less than it promises
+        raise InputError(f"not a whole, readable numpy array: {first_line(error)}") from None
+    if mapped.ndim != 2:
+        raise InputError("not a two-dimensional array", value=mapped.shape, allowed="(nx, ny)")
+    check_memory(mapped.size * BYTES_PER_HEIGHT)
+    return FileContent(heights=np.array(mapped))
 
 
 def first_line(error: Exception) -> str:

@@ -18,9 +18,6 @@ from geometry.files.content import (
 )
 from support.errors import InputError
 
-_BYTES_PER_BYTE = 20
-"""Memory that readers and the surface take per byte of a file, roughly; heights take 2 to 8 [B]."""
-
 
 class UnknownFormat(InputError):
     """No reader knows what is in a file."""
@@ -42,7 +39,8 @@ def read_instrument(
         InputError: When SurfaceTopography is not installed, the file is too large, the channel
             unknown or none of heights, or when it is a profile.
     """
-    check_memory(file.stat().st_size * _BYTES_PER_BYTE)
+    # readers and the surface take roughly 20 bytes per byte of a file; a height takes 2 to 8
+    check_memory(file.stat().st_size * 20)
     library = _library(file)
     try:
         with warnings.catch_warnings():

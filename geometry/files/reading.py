@@ -59,31 +59,15 @@ def read_surface(
     """
     file, preparation = Path(path), Preparation(**steps)
     try:
-        if not _is_file(file):  # pipes and devices are refused too: they may never end
+        if not file.is_file():  # pipes and devices are refused too: they may never end
             raise InputError("there is no such file")
-        content = _content(file, channel)
-        content = content.swapped() if preparation.swap_xy else content
-        sides = lengths if lengths is not None else content.lengths
-        if sides is None:
-            raise InputError(
-                "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
-            )
-        sides = positive_lengths(sides, "the surface")
-        shape = content.heights.shape
-        if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
-            hint = "; swap_xy = true exchanges x and y" if shape == asked[::-1] else ""
-            raise InputError(
-                f"the file's number of heights differs from the grid that was asked for{hint}",
-                value=shape,
-                allowed=f"{asked}",
-            )
+        content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)
         unit = _unit(content, height_unit)
-        surface = _surface(str(file), content, sides, unit, preparation, periodic)
+        return _surface(str(file), content, sides, unit, preparation, periodic)
     except OSError as error:
         raise InputError(f"cannot be read: {error.strerror}", file=str(file)) from None
     except InputError as error:
         raise error.of_content(str(file)) from None
-    return surface
 
 
 def surface_of(
@@ -107,10 +91,34 @@ def surface_of(
         InputError: When the heights are no surface.
     """
     preparation = Preparation(**steps)
-    content = FileContent(heights=real_array(heights), unit=length_unit(height_unit))
-    content = content.swapped() if preparation.swap_xy else content
-    sides = positive_lengths(lengths, "the surface")
-    return _surface("heights", content, sides, _unit(content, None), preparation, periodic)
+    unit = length_unit(height_unit)
+    content = FileContent(heights=real_array(heights), unit=unit)
+    content, sides = _laid_out(content, lengths, None, preparation)
+    return _surface("heights", content, sides, unit, preparation, periodic)
+
+
+def _laid_out(
+    content: FileContent,
+    lengths: tuple[float, float] | None,
+    grid: tuple[int, int] | None,
+    steps: Preparation,
+) -> tuple[FileContent, tuple[float, float]]:
+    """Return heights with x and y as they are wanted, and the sides of the map [mm]."""
+    content = content.swapped() if steps.swap_xy else content
+    sides = lengths if lengths is not None else content.lengths
+    if sides is None:
+        raise InputError(
+            "the file has no lengths, they must be given", allowed="lengths (Lx, Ly) in mm"
+        )
+    shape = content.heights.shape
+    if grid is not None and shape != (asked := cell_counts(grid, "the grid of the surface")):
+        hint = "; swap_xy = true exchanges x and y" if shape == asked[::-1] else ""
+        raise InputError(
+            f"the file's number of heights differs from the grid that was asked for{hint}",
+            value=shape,
+            allowed=f"{asked}",
+        )
+    return content, positive_lengths(sides, "the surface")
 
 
 def _surface(
@@ -184,10 +192,3 @@ def _unit(content: FileContent, given: str | None) -> str:
             allowed=f"leave out height_unit, or {content.unit}",
         )
     return content.unit or unit or "mm"
-
-
-def _is_file(file: Path) -> bool:
-    try:
-        return file.is_file()
-    except OSError:  # a name longer than any, a folder that may not be entered
-        return False

@@ -8,12 +8,11 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.files.content import BYTES_PER_HEIGHT, check_memory
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Line = tuple[int, str]
 """A line of a file without its comment: its number, from 1, and its text."""
 
@@ -21,8 +20,6 @@ _DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
 _NUMBER = re.compile(rf"{_DIGITS}|[-+]?(?:nan|inf|infinity)", re.IGNORECASE | re.ASCII)
 _WITH_COMMA = re.compile(r"[-+]?\d*,\d+(?:e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
-_SHOWN = 40
-"""Characters of a cell that are shown."""
 
 
 def is_number(cell: str) -> bool:
@@ -97,7 +94,7 @@ def _with_points(lines: list[Line], rows: list[str], separator: str | None) -> l
         line, column, cell = next(one for one in _cells(lines, rows, separator) if "," in one[2])
         raise InputError(
             f"not a matrix of numbers: line {line}, column {column}: it is not clear what the "
-            f"comma in '{cell[:_SHOWN]}' means",
+            f"comma in '{cell[:40]}' means",
             allowed="decimal points; decimal commas in all numbers, with semicolons or white space "
             "between them",
         )
@@ -112,7 +109,7 @@ def _complaint(
     allowed = "numbers with decimal points; nan where a height is missing; # before comments"
     for line, column, cell in _cells(lines, rows, separator):
         if not is_number(cell):
-            what = f"'{cell[:_SHOWN]}' is no number" if cell else "the cell is empty"
+            what = f"'{cell[:40]}' is no number" if cell else "the cell is empty"
             reason = f"line {line}, column {column}: {what}"
             break
     else:

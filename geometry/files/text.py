@@ -8,29 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.files.content import LENGTH_UNITS, FileContent, check_memory, length_unit
 from geometry.files.table import Line, is_number, number_table, words_of
+from support.arrays import Array, Indices
 from support.checks import LARGEST
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_BYTES_PER_CHARACTER = 8
-"""Memory that a text takes per character while it is read, roughly [B]."""
-_START = 4096
-"""Bytes at the start of a file that tell text from other formats."""
-_SHOWN = 40
-"""Characters of a heading that are shown."""
-
-_PLACE_TOLERANCE = 0.01
-"""Distance of a point from its place on a regular grid that is accepted [cells]."""
-_FEWEST = 0.5
-"""Least share of a grid's places that points must take: with fewer it is hardly their grid."""
-
-_FEWEST_POINTS, _MOST_COLUMNS = 16, 12
-"""Rows and columns between which a matrix may be a list of points with more than heights."""
 
 _SIZE = re.compile(r"#[^:：]*[:：]\s*([0-9.,eE+-]+)\s*(\S+)\s*")
 _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
@@ -70,11 +53,11 @@ def load_text(file: Path) -> Text | None:
         InputError: When it is larger than memory.
     """
     with file.open("rb") as stream:
-        start = stream.read(_START)
+        start = stream.read(4096)
     wide = start.startswith((b"\xff\xfe", b"\xfe\xff"))
     if b"\0" in start and not wide:
         return None
-    check_memory(file.stat().st_size * _BYTES_PER_CHARACTER)
+    check_memory(file.stat().st_size * 8)  # roughly what reading takes per character
     content = file.read_bytes()
     try:
         whole = content.decode("utf-16" if wide else "utf-8-sig")
@@ -121,7 +104,7 @@ def read_text(text: Text, *, as_points: bool = False) -> FileContent:
     """
     matrix, remarks = number_table(text.rows)
     if text.heading:
-        remarks.insert(0, f"its heading '{text.heading[0][:_SHOWN]}' left out")
+        remarks.insert(0, f"its heading '{text.heading[0][:40]}' left out")
     image, unit = _image(text.comments)
     if as_points or (matrix.shape[1] == 3 and not image):
         return replace(heights_of_points(matrix), unit=unit, remarks=tuple(remarks))
@@ -178,7 +161,8 @@ def heights_of_points(points: Array) -> FileContent:
     (ix, dx), (iy, dy) = _places(points[:, 0], "x"), _places(points[:, 1], "y")
     nx, ny = int(ix.max()) + 1, int(iy.max()) + 1
     taken, times = np.unique(ix * ny + iy, return_counts=True)
-    if taken.size < _FEWEST * nx * ny or np.any(times != 1):
+    # it is hardly their grid where they take less than half of its places
+    if 2 * taken.size < nx * ny or np.any(times != 1):
         raise InputError(
             f"the points do not fill a regular grid of {nx} × {ny}: "
             f"{nx * ny - taken.size} places are empty, "
@@ -195,7 +179,7 @@ def lists_points(matrix: Array) -> bool:
     Args:
         matrix: A matrix of three or more columns.
     """
-    if len(matrix) < _FEWEST_POINTS or matrix.shape[1] > _MOST_COLUMNS:
+    if len(matrix) < 16 or matrix.shape[1] > 12:  # few rows and many columns are none of points
         return False
     try:
         return heights_of_points(matrix[:, :3]).heights.size == len(matrix)
@@ -203,7 +187,7 @@ def lists_points(matrix: Array) -> bool:
         return False
 
 
-def _places(coordinate: Array, axis: str) -> tuple[NDArray[np.intp], float]:
+def _places(coordinate: Array, axis: str) -> tuple[Indices, float]:
     """Return the index of every coordinate on an even division, and the division's step [mm]."""
     lowest, span = coordinate.min(), float(np.ptp(coordinate))
     gaps = np.diff(np.sort(coordinate))
@@ -213,6 +197,6 @@ def _places(coordinate: Array, axis: str) -> tuple[NDArray[np.intp], float]:
     step = span / count
     place = (coordinate - lowest) / step
     index = np.rint(place).astype(np.intp)
-    if np.max(np.abs(place - index)) > _PLACE_TOLERANCE:
+    if np.max(np.abs(place - index)) > 0.01:
         raise InputError(f"the points are not evenly spaced along {axis}")
     return index, step

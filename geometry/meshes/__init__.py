@@ -1,1 +1,1 @@
-"""Meshes of blocks by gmsh: flat ones, refined ones, families whose results are extrapolated."""
+"""Shapes of blocks and their meshes by gmsh, families of them, and the files of gmsh."""

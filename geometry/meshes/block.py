@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Annotated, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.meshes.lattice import Segment
 from geometry.patches import PatchGrid
+from support.arrays import Array
 from support.checks import cell_counts, positive_lengths
 from support.errors import InputError
 from support.fields import Count, Length, Limits, PositiveLength, check_limits
-
-Array = NDArray[np.float64]
 
 Element = Literal["Q1", "Q2", "P1", "P2"]
 ELEMENTS = get_args(Element)

@@ -17,29 +17,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
 
 from geometry.meshes.block import BlockShape
-from geometry.meshes.expected_contact import contact_radius, places_in_reach
 from geometry.meshes.refined_block import RefinedShape
+from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 
 EDGES = 3.0
 """Edges along the radius of a typical contact in the finest tetrahedra, by default."""
-
-_SPAN = 2.0
-"""Ratio of the coarsest size of a family to the finest."""
-
-_GROWTH = 1.2
-"""Increase of the edge length per distance, with one edge along a contact's radius."""
 
 
 def reference_shapes(
@@ -81,11 +75,9 @@ def reference_shapes(
     """
     if isinstance(count, bool) or not isinstance(count, int) or count < 1:
         raise InputError("a family has at least one mesh", value=count, allowed="1, 2, 3 …")
-    factors = [_SPAN ** (k / max(count - 1, 1)) for k in reversed(range(count))]
+    factors = [2.0 ** (k / max(count - 1, 1)) for k in reversed(range(count))]
     if mesh == "hexahedra":
-        finest = _hexahedra(surface, height, cells, grading, element or "Q1")
-        counts = np.maximum(1, np.rint(np.outer(1.0 / np.array(factors), finest.cells))).astype(int)
-        return _all_finer(tuple(replace(finest, cells=tuple(row)) for row in counts))
+        return _hexahedra(surface, height, cells, factors, grading=grading, element=element or "Q1")
     if mesh != "tetrahedra":
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
@@ -94,10 +86,47 @@ def reference_shapes(
     smallest = radius / EDGES if fine is None else fine
     if not 0.0 < smallest < math.inf:
         raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
-    return tuple(
-        _tetrahedra(surface, approach, tilt, height, radius, smallest * factor, element or "P2")
-        for factor in factors
-    )
+
+    def member(fine: float) -> RefinedShape:
+        """Return a shape, whose sizes all follow from the edges along a contact's radius."""
+        edges = radius / fine
+        coarse = min(*surface.lengths, height) / max(2.0, 2.0 * edges)
+        return RefinedShape(
+            interface=surface.lengths,
+            height=height,
+            places=places_in_reach(surface, approach, spacing=fine, tilt=tilt),
+            fine=fine,
+            coarse=max(coarse, fine),
+            growth=1.2 / edges,
+            element=element or "P2",
+        )
+
+    return tuple(member(smallest * factor) for factor in factors)
+
+
+def _hexahedra(
+    surface: Surface,
+    height: float,
+    cells: tuple[int, int, int] | None,
+    factors: list[float],
+    **options: Any,
+) -> tuple[BlockShape, ...]:
+    """Return a family of hexahedra whose cells become smaller along all axes."""
+    if cells is None:
+        raise InputError("hexahedra need their number along x, y and z", allowed="cells")
+    if options["element"] not in ("Q1", "Q2"):
+        raise InputError("not an element of hexahedra", value=options["element"], allowed="Q1, Q2")
+    finest = BlockShape(interface=surface.lengths, height=height, cells=cells, **options)
+    counts = np.maximum(1, np.rint(np.outer(1.0 / np.array(factors), finest.cells))).astype(int)
+    family = tuple(replace(finest, cells=tuple(row)) for row in counts)
+    sizes = [characteristic_size(shape) for shape in family]
+    if len(family) > 1 and (np.any(counts[0] == counts[-1]) or np.any(np.diff(sizes) >= 0.0)):
+        raise InputError(
+            f"too few hexahedra for {len(family)} meshes that differ along x, y and z",
+            value=finest.cells,
+            allowed="more cells, or fewer meshes",
+        )
+    return family
 
 
 def characteristic_size(shape: Shape) -> float:
@@ -138,53 +167,97 @@ def suggested_fine(
     return contact_radius(surface, approach, tilt=tilt) / edges
 
 
-def _tetrahedra(
+def places_in_reach(
     surface: Surface,
     approach: float,
-    tilt: tuple[float, float],
-    height: float,
-    radius: float,
-    fine: float,
-    element: str,
-) -> RefinedShape:
-    """Return one member, whose sizes all follow from the edges along a contact's radius."""
-    edges = radius / fine
-    coarse = min(*surface.lengths, height) / max(2.0, 2.0 * edges)
-    return RefinedShape(
-        interface=surface.lengths,
-        height=height,
-        places=places_in_reach(surface, approach, spacing=fine, tilt=tilt),
-        fine=fine,
-        coarse=max(coarse, fine),
-        growth=_GROWTH / edges,
-        element=element,
+    *,
+    spacing: float,
+    tilt: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return the places that the plane can touch: where the undeformed surface interferes with it.
+
+    Under pressure a half-space only moves away from the plane, so that contact occurs nowhere else.
+
+    Args:
+        surface: The rough surface.
+        approach: Largest approach at the middle of the surface [mm].
+        spacing: Distance between places [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Points of a square lattice, shape (n, 2) [mm]; at least that of the largest depth.
+    """
+    x, y = (
+        np.linspace(0.0, length, max(2, math.ceil(length / spacing) + 1))
+        for length in surface.lengths
     )
-
-
-def _hexahedra(
-    surface: Surface,
-    height: float,
-    cells: tuple[int, int, int] | None,
-    grading: float,
-    element: str,
-) -> BlockShape:
-    """Return the finest member."""
-    if cells is None:
-        raise InputError("hexahedra need their number along x, y and z", allowed="cells")
-    if element not in ("Q1", "Q2"):
-        raise InputError("not an element of hexahedra", value=element, allowed="Q1, Q2")
-    return BlockShape(
-        interface=surface.lengths, height=height, cells=cells, grading=grading, element=element
+    lattice = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    top = np.array([surface.highest_point])
+    depth = np.concatenate(
+        [
+            depth_below_plane(surface, x[:, None], y[None, :], approach, tilt).ravel(),
+            depth_below_plane(surface, top[:, 0], top[:, 1], approach, tilt),
+        ]
     )
+    return np.vstack([lattice, top])[depth >= min(0.0, float(depth.max()))]
 
 
-def _all_finer(family: tuple[BlockShape, ...]) -> tuple[BlockShape, ...]:
-    """Refuse a family whose cells do not become smaller along all axes."""
-    cells, sizes = np.array([shape.cells for shape in family]), map(characteristic_size, family)
-    if len(family) > 1 and (np.any(cells[0] == cells[-1]) or np.any(np.diff([*sizes]) >= 0.0)):
-        raise InputError(
-            f"too few hexahedra for {len(family)} meshes that differ along x, y and z",
-            value=family[-1].cells,
-            allowed="more cells, or fewer meshes",
-        )
-    return family
+def depth_below_plane(
+    surface: Surface, x: Array, y: Array, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+) -> Array:
+    """Return the interference of the undeformed surface and the rigid plane [mm].
+
+    Args:
+        surface: The rough surface.
+        x: Abscissae [mm].
+        y: Ordinates, broadcast with the abscissae [mm].
+        approach: Approach at the middle of the surface, from first touch of a level plane [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        Interference at every place; negative where there is a gap.
+
+    Raises:
+        InputError: When a value is not finite.
+    """
+    plane = RigidPlane.above(surface, approach, tilt)
+    return surface.height_at(x, y) - surface.highest + plane.at(x, y)
+
+
+def contact_radius(
+    surface: Surface, approach: float, *, tilt: tuple[float, float] = (0.0, 0.0)
+) -> float:
+    """Estimate the radius of a typical contact from the surface alone [mm].
+
+    The surface behind the undeformed plane consists of caps. In a disc of radius r the mean
+    distance from the edge is r / 3, which is used for caps of any form. The contact of a cap has
+    1/√2 of the cap's radius (Hertz). Where more than a twentieth of the surface lies behind the
+    plane, contacts merge and bear the plane together: only the highest twentieth counts then.
+
+    Args:
+        surface: The rough surface.
+        approach: Approach at the middle of the surface [mm].
+        tilt: Slopes of the approach along x and y.
+
+    Returns:
+        The radius, at least the distance of the surface's samples.
+
+    Raises:
+        InputError: When a value is not finite.
+    """
+    x, y = (
+        np.linspace(0.0, length, min(max(256, 2 * n), 1024) + 1)
+        for length, n in zip(surface.lengths, surface.grid, strict=True)
+    )
+    depth = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt)
+    level = float(np.quantile(depth, 0.95))
+    inside = depth >= level if level > 0.0 else depth > 0.0
+    least = max(surface.spacing)
+    if not inside.any():
+        return least
+    if inside.all():
+        return 0.5 * min(surface.lengths)
+    step = (x[1], y[1])
+    # a point lies on average half a step further inside than its distance from those outside
+    distance = distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
+    return max(3.0 * float(distance.mean()) / math.sqrt(2.0), least)

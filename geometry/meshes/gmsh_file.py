@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.meshes.msh_sections import KINDS, MshContent, msh_content
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-
-_STRAIGHT = 1e-6
-"""Distance of a node within a cell from its place on straight edges, relative to the cell."""
 
 _ALLOWED = "tetrahedra alone, or hexahedra alone"
 
@@ -117,10 +115,10 @@ def _arrays(content: MshContent) -> MeshArrays:
 
 def _kind_of_cells(content: MshContent) -> int:
     """Return the one kind of all cells."""
-    counts: dict[int, int] = {}
+    counts = Counter[int]()
     for part in content.elements:
         if KINDS[part.kind][0] == 3 and len(part.nodes):
-            counts[part.kind] = counts.get(part.kind, 0) + len(part.nodes)
+            counts[part.kind] += len(part.nodes)
     kinds = ", ".join(f"{count} × {KINDS[kind][2]}" for kind, count in counts.items())
     if not counts:
         flat = any(KINDS[part.kind][0] == 2 for part in content.elements)
@@ -185,7 +183,7 @@ def _check_straight(nodes: Array, middles: Sequence[Sequence[int]]) -> None:
     size = np.ptp(nodes[:, :corners], axis=1).max(axis=1)
     for k, ends in enumerate(middles, start=corners):
         straight = nodes[:, list(ends)].mean(axis=1)
-        off |= np.abs(nodes[:, k] - straight).max(axis=1) > _STRAIGHT * size
+        off |= np.abs(nodes[:, k] - straight).max(axis=1) > 1e-6 * size
     if off.any():
         raise InputError(
             f"{off.sum()} of {len(off)} cells are of second order with curved edges; make a mesh "

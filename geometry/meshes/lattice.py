@@ -14,7 +14,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from support.arrays import Array
+
 Numbers = NDArray[np.int64]
 Counts: TypeAlias = tuple[int, int, int]
 Part: TypeAlias = tuple[range, range, range]
@@ -45,11 +46,6 @@ class Segment:
     growth: float = 1.0
 
     @property
-    def ratio(self) -> float:
-        """Ratio of the sizes of successive cells."""
-        return self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
-
-    @property
     def narrowest(self) -> float:
         """Size of the smallest cell [mm], without making the others."""
         length, count = abs(self.end - self.start), self.cells
@@ -62,7 +58,8 @@ class Segment:
     @property
     def ticks(self) -> NDArray[np.float64]:
         """Coordinates of the grid planes, shape (cells + 1,) [mm]."""
-        sizes = self.ratio ** np.arange(self.cells)
+        ratio = self.growth ** (1.0 / (self.cells - 1)) if self.cells > 1 else 1.0
+        sizes = ratio ** np.arange(self.cells)
         share = np.concatenate([[0.0], np.cumsum(sizes) / sizes.sum()])
         return self.start + (self.end - self.start) * share
 

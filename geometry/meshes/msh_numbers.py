@@ -7,13 +7,10 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Table = NDArray[np.int64]
-
-_EXACT = 2.0**53
-"""Whole numbers up to this are exact as floats."""
 
 
 class TextNumbers:
@@ -82,12 +79,8 @@ class ByteNumbers:
         row = np.dtype([(str(k), self._types[kind]) for k, kind in enumerate(kinds)])
         if rows < 0 or self.at + rows * row.itemsize > len(self._data):
             raise _too_short()
-        if len(set(kinds)) == 1:
-            flat = np.frombuffer(self._data, self._types[kinds[0]], rows * len(kinds), self.at)
-            numbers = flat.reshape(rows, len(kinds)).astype(np.float64)
-        else:
-            parts = np.frombuffer(self._data, row, rows, self.at)
-            numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
+        parts = np.frombuffer(self._data, row, rows, self.at)
+        numbers = np.column_stack([parts[name] for name in row.names or ()]).astype(np.float64)
         self.at += rows * row.itemsize
         return numbers
 
@@ -114,7 +107,8 @@ def whole(values: Array) -> Table:
     Raises:
         InputError: When one is not, or too large.
     """
-    if not (np.abs(values) <= _EXACT).all() or (values != np.rint(values)).any():
+    exact = np.abs(values) <= 2.0**53  # as floats
+    if not exact.all() or (values != np.rint(values)).any():
         raise InputError("a number or a count of the mesh is no whole number")
     return values.astype(np.int64)
 

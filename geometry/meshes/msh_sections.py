@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.meshes.msh_numbers import ByteNumbers, Numbers, TextNumbers, whole
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Table = NDArray[np.int64]
 
 ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"
@@ -34,9 +34,6 @@ KINDS = {
     7: (3, 5, "pyramid"), 19: (3, 13, "pyramid"), 14: (3, 14, "pyramid"),
 }  # fmt: skip
 """Dimension, nodes and name of gmsh's kinds of elements of first and second order."""
-
-_MOST_TAGS = 100_000
-"""Most numbers beside an element's nodes: its groups and the parts of the mesh it is in."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -165,7 +162,7 @@ def _read_entities(mesh: MshContent, numbers: Numbers, version: float, *, parts:
     counts = whole(numbers.table(1, "uuuu"))[0]
     for dimension, count in enumerate(counts):
         for _ in range(count):
-            tag = _integer(numbers)
+            tag = _count(numbers, "i")
             if parts:
                 numbers.table(1, "ii")
                 numbers.table(_count(numbers), "i")
@@ -238,7 +235,7 @@ def _rows_of_bytes(numbers: Numbers, count: int) -> Iterator[tuple[int, int, Tab
     """Yield kind, number of tags, and tags with nodes of elements of binary files."""
     while count > 0:
         kind, rows, tags = map(int, whole(numbers.table(1, "iii"))[0])
-        if rows < 1 or not 0 <= tags <= _MOST_TAGS:
+        if rows < 1 or not 0 <= tags <= 100_000:
             raise InputError("a section of the file has elements that make no sense")
         _, nodes, _ = _kind(kind)
         yield kind, tags, whole(numbers.table(rows, "i" * (1 + tags + nodes)))[:, 1:]
@@ -272,9 +269,6 @@ def _kind(kind: int) -> tuple[int, int, str]:
     return KINDS[kind]
 
 
-def _count(numbers: Numbers) -> int:
-    return int(whole(numbers.table(1, "u"))[0, 0])
-
-
-def _integer(numbers: Numbers) -> int:
-    return int(whole(numbers.table(1, "i"))[0, 0])
+def _count(numbers: Numbers, kind: str = "u") -> int:
+    """Return the next number, a size unless it is said to be an int."""
+    return int(whole(numbers.table(1, kind))[0, 0])

@@ -9,27 +9,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.meshes.gmsh_session import gmsh_session
+from support.arrays import Array
 from support.checks import positive_lengths
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_DELAUNAY = 5
-"""gmsh's number of the algorithm."""
-_DIGITS = 12
-"""Significant digits of lengths passed to gmsh."""
-_AT_SEAMS = 0.2
-"""Edge length at re-entrant edges, where stresses are singular, over that far from contact. With
-the same length there, 0.1 mm, the compliance of an L 1.5 mm high is too small by 0.1 %."""
-_CURVES = "CurvesList"
-"""Name of a list of curves in gmsh."""
-_NO_BOXES = np.empty((0, 2, 3))
-_PLACE = 3
-"""Decimals of places passed to gmsh, beyond those of the fine edge length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,6 +91,25 @@ class RefinedShape:
                 allowed=f"0 … {self.interface} mm",
             )
 
+    def scaled(self, unit: float) -> RefinedShape:
+        """Return the block in a unit of length, its coordinates rounded as gmsh is to have them.
+
+        Args:
+            unit: Length that becomes 1 [mm].
+        """
+
+        def digits(length: float) -> float:
+            return float(f"{length / unit:.12g}")
+
+        width, depth, height, fine, coarse = map(
+            digits, (*self.interface, self.height, self.fine, self.coarse)
+        )
+        decimals = 3 + math.ceil(-math.log10(fine))
+        places = np.clip(np.round(self.places / unit, decimals), 0.0, (width, depth))
+        return replace(
+            self, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
+        )
+
     @contextmanager
     def meshed(self) -> Iterator[Any]:
         """Mesh the block in gmsh for as long as the context lasts.
@@ -114,63 +118,27 @@ class RefinedShape:
         lengths are in `unit`. A gmsh session of the caller goes on afterwards, with its model and
         options.
         """
-        with refined_solid(self, self.unit) as model:
-            yield model
+        shape = self.scaled(self.unit)
+        with gmsh_session("patchlaw refined block") as gmsh:
+            box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
+            points = [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in shape.places]
+            gmsh.model.occ.synchronize()
+            gmsh.model.addPhysicalGroup(3, [box], 1)
+            fields = gmsh.model.mesh.field
+            fields.setAsBackgroundMesh(size_near(fields, "PointsList", points, shape.fine, shape))
+            generate(gmsh, shape)
+            yield gmsh.model
 
 
-@contextmanager
-def refined_solid(block: RefinedShape, unit: float, boxes: Array = _NO_BOXES) -> Iterator[Any]:
-    """Mesh a block, or a block and the boxes that it stands on, as long as the context lasts.
-
-    Args:
-        block: The block and the sizes of the cells.
-        unit: Length that gmsh meshes in [mm].
-        boxes: Lower and upper corners of boxes below the block, shape (n, 2, 3) [mm].
-
-    Raises:
-        InputError: When block and boxes are not one body.
-    """
-
-    def digits(length: float) -> float:
-        return float(f"{length / unit:.{_DIGITS}g}")
-
-    width, depth, height, fine, coarse = map(
-        digits, (*block.interface, block.height, block.fine, block.coarse)
-    )
-    decimals = _PLACE + math.ceil(-math.log10(fine))
-    places = np.clip(np.round(block.places / unit, decimals), 0.0, (width, depth))
-    shape = replace(
-        block, interface=(width, depth), height=height, places=places, fine=fine, coarse=coarse
-    )
-    with gmsh_session("patchlaw refined block") as gmsh:
-        box = gmsh.model.occ.addBox(0.0, 0.0, -shape.height, *shape.interface, shape.height)
-        if len(boxes):
-            corners = np.vectorize(digits)(boxes)
-            box = _joined(gmsh, box, [(*low, *(high - low)) for low, high in corners])
-        gmsh.model.occ.synchronize()
-        gmsh.model.addPhysicalGroup(3, [box], 1)
-        _set_sizes(gmsh, shape, _seams(gmsh, shape) if len(boxes) else [])
-        _generate(gmsh, shape)
-        gmsh.model.mesh.setOrder(shape.degree)
-        yield gmsh.model
-
-
-def _joined(gmsh: Any, block: int, boxes: list[tuple[float, ...]]) -> int:
-    """Return the volume of a block and boxes, given by corner and sides, that are one body."""
-    tools = [(3, gmsh.model.occ.addBox(*box)) for box in boxes]
-    union, _ = gmsh.model.occ.fuse([(3, block)], tools)
-    if len(union) != 1:
-        raise InputError(
-            "block and boxes are not one body", value=len(union), allowed="boxes that share faces"
-        )
-    return int(union[0][1])
-
-
-def _generate(gmsh: Any, shape: RefinedShape) -> None:
+def generate(gmsh: Any, shape: RefinedShape) -> None:
     """Mesh by the frontal algorithm, and again by Delaunay's if it has missed a place.
 
     The frontal algorithm makes better triangles, but evaluates sizes only at its own nodes and can
     step over a small region between large edges.
+
+    Args:
+        gmsh: The gmsh module, its current model with edge lengths.
+        shape: The block in the model's unit.
     """
     gmsh.model.mesh.generate(2)
     _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
@@ -178,34 +146,28 @@ def _generate(gmsh: Any, shape: RefinedShape) -> None:
     top = nodes[np.abs(nodes[:, 2]) < 1e-9 * shape.height, :2]
     if np.any(cKDTree(top).query(shape.places)[0] > shape.fine):
         gmsh.model.mesh.clear()
-        gmsh.option.setNumber("Mesh.Algorithm", _DELAUNAY)
+        gmsh.option.setNumber("Mesh.Algorithm", 5)  # Delaunay's
         gmsh.model.mesh.generate(2)
     gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(shape.degree)
 
 
-def _set_sizes(gmsh: Any, shape: RefinedShape, seams: list[int]) -> None:
-    """Let the edge length grow linearly with the distance from the places, and from seams."""
-    points = [gmsh.model.occ.addPoint(x, y, 0.0) for x, y in shape.places]
-    gmsh.model.occ.synchronize()
-    fields = gmsh.model.mesh.field
-    sizes = [_size_near(fields, "PointsList", points, shape.fine, shape)]
-    if seams:
-        least = _AT_SEAMS * shape.coarse
-        sizes.append(_size_near(fields, _CURVES, seams, least, shape))
-    smallest = fields.add("Min")
-    fields.setNumbers(smallest, "FieldsList", sizes)
-    fields.setAsBackgroundMesh(smallest if seams else sizes[0])
+def size_near(fields: Any, kind: str, tags: list[int], least: float, shape: RefinedShape) -> int:
+    """Return gmsh's field of an edge length that grows linearly with the distance from something.
 
-
-def _size_near(fields: Any, kind: str, tags: list[int], least: float, shape: RefinedShape) -> int:
-    """Return the field of an edge length that grows with the distance from points or curves."""
+    Args:
+        fields: gmsh's interface to fields.
+        kind: Name of gmsh's list of what it grows from.
+        tags: The list.
+        least: The edge length there, in the model's unit.
+        shape: The block in that unit.
+    """
     near = fields.add("Distance")
     fields.setNumbers(near, kind, tags)
     size = fields.add("Threshold")
-    inner = 2.0 * least
     values = {
-        "DistMin": inner,
-        "DistMax": inner + (shape.coarse - least) / shape.growth,
+        "DistMin": 2.0 * least,
+        "DistMax": 2.0 * least + (shape.coarse - least) / shape.growth,
         "SizeMin": least,
         "SizeMax": shape.coarse,
         "InField": near,
@@ -213,16 +175,3 @@ def _size_near(fields: Any, kind: str, tags: list[int], least: float, shape: Ref
     for option, value in values.items():
         fields.setNumber(size, option, value)
     return int(size)
-
-
-def _seams(gmsh: Any, shape: RefinedShape) -> list[int]:
-    """Return the curves at the bottom of a block along which boxes are joined to it."""
-    slack, seams = 1e-6 * shape.height, []
-    width, depth = shape.interface
-    for _, curve in gmsh.model.getEntities(1):
-        x, y, z, x_end, y_end, z_end = gmsh.model.getBoundingBox(1, curve)
-        level = max(abs(z + shape.height), abs(z_end + shape.height)) < slack
-        within = min(x, y) > -slack and x_end < width + slack and y_end < depth + slack
-        if level and within:
-            seams.append(curve)
-    return seams

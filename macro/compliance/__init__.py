@@ -1,1 +1,1 @@
-"""What pressures on a block's top displace there, in smooth modes, and the cache on disk."""
+"""What pressures on a face displace there, in smooth modes, and the cache on disk."""

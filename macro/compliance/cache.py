@@ -17,12 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from mpi4py.util import pkl5
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from macro import compat
-from macro.elastic_body import ElasticBody
 from support.checked_store import fingerprint, read_record, write_record
 from support.errors import InputError, NotWritten
 
@@ -36,7 +33,6 @@ MOST_BYTES = 500_000_000
 
 _SUFFIX = ".arrays"
 _OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
-_ROOT = 0  # user number of the administrator, who may fill a directory for all
 
 _SOURCES = "macro", "micro", "geometry"
 """Packages whose sources make the cached arrays."""
@@ -134,7 +130,7 @@ def _read(path: Path, words: str) -> Arrays | None:
         facts = os.fstat(file.fileno())
         if not stat.S_ISREG(facts.st_mode) or facts.st_mode & _OTHERS_WRITE:
             return None
-        if facts.st_uid not in (os.geteuid(), _ROOT):
+        if facts.st_uid not in (os.geteuid(), 0):  # the administrator may fill it for all
             return None
         record = read_record(file.read())
         if record["key"] == words:
@@ -166,56 +162,3 @@ def _clear(directory: Path) -> None:
         total += path.stat().st_size
         if total > MOST_BYTES:
             path.unlink(missing_ok=True)
-
-
-Words = NDArray[np.uint64]
-
-
-def body_digest(body: ElasticBody) -> str:
-    """Return a digest of a body's cells, elastic constants, supports and elements, for keys.
-
-    It is the same for every number of ranks: numbers of cells and supported nodes are mixed and
-    summed.
-
-    Args:
-        body: The body.
-
-    Note:
-        Collective.
-    """
-    mesh = body.mesh.mesh
-    count = mesh.topology.index_map(3).size_local
-    points = _mixed(mesh.geometry.x)
-    cells = _mixed(points[compat.cell_vertices(mesh)[:count]])
-    constants = np.zeros((count, 2))
-    for column, values in enumerate(body.cell_lame):
-        constants[:, column] = np.broadcast_to(values, max(count, np.size(values)))[:count]
-    total = _sum(_mixed(np.column_stack([cells, constants.view(np.uint64)])))
-    places = _mixed(body.space.tabulate_dof_coordinates())
-    dofs = np.flatnonzero(body.supported[: body.owned_dofs])
-    held = np.column_stack([places[dofs // 3], (dofs % 3).astype(np.uint64)])
-    total = total + _sum(_mixed(held))
-    whole = np.zeros_like(total)
-    body.comm.Allreduce(total, whole, op=MPI.SUM)
-    return f"{int(whole[0]):016x}-{body.hexahedral}-{body.degree}-{body.dofs}"
-
-
-def _sum(words: Words) -> Words:
-    """Return the sum modulo 2⁶⁴, shape (1,)."""
-    return words.sum(dtype=np.uint64, keepdims=True)
-
-
-def _mixed(rows: ArrayLike) -> Words:
-    """Return a word for each row of numbers, which depends on all bits of all of them.
-
-    Steele, Lea & Flood 2014, doi 10.1145/2660193.2660195: the finaliser of SplitMix64.
-    """
-    rows = np.ascontiguousarray(rows)
-    words = (rows + 0.0).view(np.uint64) if rows.dtype == np.float64 else rows  # no −0
-    mixed = np.full(len(words), 0x9E3779B97F4A7C15, dtype=np.uint64)
-    for column in range(words.shape[1]):
-        mixed = mixed * np.uint64(0xD1342543DE82EF95) + words[:, column]
-        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-        mixed = mixed ^ (mixed >> np.uint64(31))
-    return mixed

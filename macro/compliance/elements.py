@@ -15,11 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from geometry.legendre_modes import mode_values
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _MORE = 6
 """Degree across the top beyond the number of modes. With 4, 6 and 8 the compliance of a free cube
@@ -35,17 +33,11 @@ _LOW = 0.05
 at the edges of the clamped bottom. With 0.15 the mean compliance of a cube was too small by 1.9e-4
 at ν = 0.3 and 1.3e-3 at 0.45, with 0.05 by 0.9e-4 and 4.9e-4."""
 
-_GROWTH = 4.0
-"""Height of an element relative to that of the one above."""
-
 _END = 0.75
 """Distance from the clamped bottom within which a tall block needs finer elements, in widths."""
 
 _AT_TOP, _BETWEEN, _AT_BOTTOM = 9, 6, 4
 """Degrees along z."""
-
-_COARSER = 2
-"""Degrees less, across and along z, in the elements that estimate the error of the usual ones."""
 
 
 class Line(NamedTuple):
@@ -132,25 +124,21 @@ def _shape_functions(t: Array, degree: int) -> tuple[Array, Array]:
     return np.concatenate([ends, rest]), np.concatenate([[-even, even], slopes])
 
 
-def block_lines(
-    lengths: tuple[float, float], height: float, count: int, *, coarse: bool = False
-) -> tuple[Line, Line, Line]:
+def block_lines(lengths: tuple[float, float], height: float, count: int) -> tuple[Line, Line, Line]:
     """Return functions for modes of pressure: one element across the top, more along z.
 
     Args:
         lengths: Sides of the top [mm].
         height: Height of the block [mm].
         count: Modes along a side of the top.
-        coarse: Whether to take lower degrees, to estimate the error of the usual ones.
 
     Returns:
         Functions along x, y and z.
     """
-    less = _COARSER if coarse else 0
-    x, y = (across(length, count + _MORE - less, count) for length in lengths)
+    x, y = (across(length, count + _MORE, count) for length in lengths)
     ticks = levels(lengths, height, count)
     degrees = [_AT_BOTTOM, *(_BETWEEN,) * (len(ticks) - 3), _AT_TOP][-(len(ticks) - 1) :]
-    return x, y, upwards(ticks, [degree - less for degree in degrees])
+    return x, y, upwards(ticks, degrees)
 
 
 def levels(lengths: tuple[float, float], height: float, count: int) -> Array:
@@ -166,7 +154,7 @@ def levels(lengths: tuple[float, float], height: float, count: int) -> Array:
     depths = [0.0]
     while step < 0.6 * low and depths[-1] < 0.5 * width:
         depths.append(step)
-        step *= _GROWTH
+        step *= 4.0
     if low - depths[-1] > 2.0 * _END * width:
         depths.append(low - _END * width)
     if len(depths) > 1 or height > step:

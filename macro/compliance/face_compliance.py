@@ -1,26 +1,201 @@
 """Compliance of a block's top, and the stresses in it, in Legendre modes.
 
+The block is solved for even and odd modes of pressure separately, which its two vertical planes of
+symmetry decouple. Under a pressure that is even along an axis, the displacement component along
+that axis is odd along it, and the other components are even; under an odd pressure it is the other
+way round.
+
 Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from functools import cached_property, reduce
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from petsc4py import PETSc
+from scipy.sparse import bmat, csr_matrix, kron
 
 from geometry.materials import Material
 from macro.bodies import Sides
 from macro.compliance.cache import cached
-from macro.compliance.elements import block_lines
-from macro.compliance.parity_block import Parity, ParityBlock, Response
+from macro.compliance.elements import Line, block_lines
+from macro.linear_solvers.solvers import solved_at_once
+from support.arrays import Array
 from support.collective import shared
 from support.errors import InputError
 
-Array = NDArray[np.float64]
+Parity = tuple[int, int]
+"""Parity of a pressure along x and along y: 0 even, 1 odd."""
+
+
+class Response(NamedTuple):
+    """Response of the top to modes of pressure: integrals over the top of modes times fields.
+
+    Fields are those of a mode of pressure of mean square 1 MPa². The shape is (k, l, m, n): k and l
+    count the modes of the field's parity, m and n those of the pressure's. The parity of the shear
+    strain is the opposite one along both axes.
+
+    Attributes:
+        normal: Displacements downwards [mm³/MPa].
+        xx: Strains along x [mm²/MPa].
+        yy: Strains along y [mm²/MPa].
+        xy: Shear strains ε_xy, half the change of the angle [mm²/MPa].
+        growth: Derivative of ``normal`` with respect to the height of the block [mm²/MPa].
+    """
+
+    normal: Array
+    xx: Array
+    yy: Array
+    xy: Array
+    growth: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ParityBlock:
+    """A block under pressures of one parity, clamped at the bottom.
+
+    Args:
+        lines: Shape functions along x, y and z.
+        height: Height of the block [mm].
+        material: Elastic constants.
+        sides: Support of the block's sides.
+        parity: Parity of the pressures.
+    """
+
+    lines: tuple[Line, Line, Line]
+    height: float
+    material: Material
+    sides: Sides
+    parity: Parity
+
+    def response(self) -> Response:
+        """Return the displacements and strains of the top by the modes of the parity."""
+        (ux, uy, _), (vx, vy, _), (wx, wy, z) = self._lines
+        odd_x, odd_y = self.parity
+        loads = np.kron(wx.modes[odd_x::2], wy.modes[odd_y::2])
+        tops, growth = self._solved(loads, z.end)
+        sizes = len(wx.modes[odd_x::2]), len(wy.modes[odd_y::2])
+
+        def seen(top: Array, along_x: Array, along_y: Array, *, shear: bool = False) -> Array:
+            x, y = along_x[(odd_x + shear) % 2 :: 2], along_y[(odd_y + shear) % 2 :: 2]
+            return np.asarray(np.kron(x, y) @ top).reshape(len(x), len(y), *sizes)
+
+        u, v, w = tops
+        along_y = seen(u, ux.modes, uy.mode_slopes, shear=True)
+        along_x = seen(v, vx.mode_slopes, vy.modes, shear=True)
+        return Response(
+            normal=-seen(w, wx.modes, wy.modes),
+            xx=seen(u, ux.mode_slopes, uy.modes),
+            yy=seen(v, vx.modes, vy.mode_slopes),
+            xy=0.5 * (along_y + along_x),
+            growth=growth.reshape(*sizes, *sizes),
+        )
+
+    def _solved(self, loads: Array, end: int) -> tuple[list[Array], Array]:
+        """Solve for the displacements by loads on the top.
+
+        Args:
+            loads: Downward forces on the vertical unknowns (ix, iy) of the top, shape (m, n) [N].
+            end: Index iz of the unknowns of the top.
+
+        Returns:
+            The displacements of the top by component, shape (unknowns, m), and the derivative of
+            the work of every load along every displacement with respect to the height, (m, m).
+        """
+        sizes = [part.shape for part in self._free]
+        splits = np.cumsum([part.size for part in self._free])
+        free = np.concatenate([part.ravel() for part in self._free])
+        forces = np.zeros((len(free), len(loads)))
+        forces[splits[1] :].reshape(-1, sizes[2][2], len(loads))[:, end] = -loads.T
+        solved = _solution(self._stiffness()[free][:, free], forces[free])
+        displacements = np.zeros_like(forces)  # also where a roller constrains
+        displacements[free] = solved
+        tops = [
+            part.reshape(-1, size[2], len(loads))[:, end]
+            for part, size in zip(np.split(displacements, splits[:2]), sizes, strict=True)
+        ]
+        # derivative of the inverse stiffness when all elements grow in proportion
+        change = self._stiffness(by_height=True)[free][:, free]
+        return tops, -solved.T @ (change @ solved)
+
+    @cached_property
+    def _lines(self) -> list[tuple[Line, Line, Line]]:
+        """Shape functions along x, y and z by component of the displacement."""
+        (x, y, z), (odd_x, odd_y) = self.lines, self.parity
+        return [
+            (x.of_parity((odd_x + (k == 0)) % 2), y.of_parity((odd_y + (k == 1)) % 2), z)
+            for k in range(3)
+        ]
+
+    @cached_property
+    def _free(self) -> list[NDArray[np.bool_]]:
+        """Which unknowns (ix, iy, iz) no roller constrains, by component."""
+        free = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
+        if self.sides == "roller":
+            for axis in (0, 1):
+                np.moveaxis(free[axis], axis, 0)[self._lines[axis][axis].end] = False
+        return free
+
+    def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
+        """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].
+
+        Args:
+            by_height: Return its derivative with respect to the block's height instead [N/mm²].
+        """
+        lame, shear = self.material.lame
+        blocks: list[list[Any]] = [[None] * 3 for _ in range(3)]
+        for row in range(3):
+            weights = [lame + 2.0 * shear if axis == row else shear for axis in range(3)]
+            blocks[row][row] = sum(
+                weight * self._product((row, row), (axis, axis), by_height)
+                for axis, weight in enumerate(weights)
+            )
+            for column in range(row):
+                first = self._product((row, column), (row, column), by_height)
+                second = self._product((row, column), (column, row), by_height)
+                blocks[row][column] = lame * first + shear * second
+                blocks[column][row] = blocks[row][column].T
+        return csr_matrix(bmat(blocks))
+
+    def _product(
+        self, components: tuple[int, int], slopes: tuple[int, int], by_height: bool
+    ) -> csr_matrix:
+        """Return the integrals of products of two components' slopes, or their derivative.
+
+        Args:
+            components: Component of the rows, and of the columns.
+            slopes: Axis of the slopes of the rows' component, and of the columns'.
+            by_height: Return the derivative with respect to the height instead.
+        """
+        factors = []
+        for axis in range(3):
+            one, other = (self._lines[component][axis] for component in components)
+            left = one.slopes if axis == slopes[0] else one.values
+            right = other.slopes if axis == slopes[1] else other.values
+            matrix = (left * one.weights) @ right.T
+            # smaller entries are the rounding of integrals that are zero
+            large = np.abs(matrix) > 1e-13 * np.abs(matrix).max(initial=0.0)
+            factors.append(csr_matrix(np.where(large, matrix, 0.0)))
+        # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
+        share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0
+        return share * reduce(kron, factors)
+
+
+def _solution(stiffness: csr_matrix, right: Array) -> Array:
+    """Solve for many right-hand sides."""
+    pattern = (part.astype(PETSc.IntType) for part in (stiffness.indptr, stiffness.indices))
+    csr = (*pattern, stiffness.data)
+    matrix = PETSc.Mat().createAIJ(stiffness.shape, csr=csr, comm=PETSc.COMM_SELF)
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    solution = solved_at_once(matrix, right)
+    matrix.destroy()
+    return solution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,6 +218,12 @@ class FaceCompliance:
     stresses: Array
     rough: Array | None = None
 
+    @classmethod
+    def of(cls, normal: Array, growth: Array, stresses: Array) -> FaceCompliance:
+        """Return the compliance from matrices that are symmetric up to rounding."""
+        normal, growth = (0.5 * (matrix + matrix.T) for matrix in (normal, growth))
+        return cls(normal=normal, growth=growth, stresses=stresses)
+
     @property
     def count(self) -> int:
         """Modes K along a side."""
@@ -62,7 +243,6 @@ def face_compliance(
     count: int,
     comm: Any,
     *,
-    coarse: bool = False,
     use_cache: bool = False,
 ) -> FaceCompliance:
     """Solve for the response of a block's top to every mode of pressure.
@@ -78,7 +258,6 @@ def face_compliance(
         sides: Support of the block's sides.
         count: Modes K along a side of the top.
         comm: MPI communicator.
-        coarse: Whether to take lower degrees. The difference bounds the error of the usual ones.
         use_cache: Whether to read the result from the cache on disk, or to write it there.
 
     Returns:
@@ -93,15 +272,15 @@ def face_compliance(
     """
     if use_cache:
         block = (lengths, height, material, sides, count)
-        compute = lambda: face_compliance(*block, comm, coarse=coarse).arrays  # noqa: E731
-        return FaceCompliance(**cached("face", (*block, coarse), compute, comm))
+        compute = lambda: face_compliance(*block, comm).arrays  # noqa: E731
+        return FaceCompliance(**cached("face", block, compute, comm))
     if not all(math.isfinite(length) and length > 0.0 for length in (*lengths, height)):
         raise InputError(
             "the block has no such size", value=(*lengths, height), allowed="lengths > 0 mm"
         )
     if count < 1:
         raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
-    lines = block_lines(lengths, height, count, coarse=coarse)
+    lines = block_lines(lengths, height, count)
     parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
     families = [parity for parity in parities if max(parity) < count]
     alike = lengths[0] == lengths[1]
@@ -133,13 +312,20 @@ def _gathered(
             seen_x, seen_y = (odd_x + turn) % 2, (odd_y + turn) % 2
             field[seen_x::2, seen_y::2, odd_x::2, odd_y::2] = part
     normal, xx, yy, xy, growth = total.reshape(-1, count**2, count**2) / area**2
-    # Hooke's law from the strains in the face and σ_zz = −p
-    nu = material.poisson_ratio
-    modulus = material.young_modulus / (1.0 - nu**2)
-    pushed = nu / (1.0 - nu) * (np.eye(count**2) / area)
-    sigma_xx, sigma_yy = modulus * (xx + nu * yy) - pushed, modulus * (yy + nu * xx) - pushed
-    return FaceCompliance(
-        normal=0.5 * (normal + normal.T),  # symmetric up to rounding
-        growth=0.5 * (growth + growth.T),
-        stresses=np.stack([sigma_xx, sigma_yy, material.young_modulus / (1.0 + nu) * xy]),
-    )
+    return FaceCompliance.of(normal, growth, stresses_in_face(material, (xx, yy, xy), area))
+
+
+def stresses_in_face(material: Material, strains: Sequence[Array], area: float | None) -> Array:
+    """Return the stresses σ_xx, σ_yy and σ_xy in a face by Hooke's law, shape (3, K², K²) [1/mm²].
+
+    Args:
+        material: Elastic constants.
+        strains: ε_xx, ε_yy and ε_xy in modes, shape (3, K², K²) [1/N].
+        area: Area that the modes are on, where σ_zz = −p; None where σ_zz = 0 [mm²].
+    """
+    (xx, yy, xy), nu, modulus = strains, material.poisson_ratio, material.young_modulus
+    plane = modulus / (1.0 - nu**2)
+    stresses = np.stack([plane * (xx + nu * yy), plane * (yy + nu * xx), modulus / (1.0 + nu) * xy])
+    if area is not None:
+        stresses[:2] -= nu / (1.0 - nu) * (np.eye(len(xx)) / area)
+    return stresses

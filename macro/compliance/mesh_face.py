@@ -29,29 +29,22 @@ from geometry.materials import Material
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.bodies import MeshedBody
-from macro.compliance.face_compliance import FaceCompliance
-from macro.compliance.face_moments import FaceMoments
-from macro.elastic_body import ElasticBody
-from macro.elasticity import stiffness_form
+from macro.compliance.face_compliance import FaceCompliance, stresses_in_face
+from macro.compliance.surroundings import FaceMoments
+from macro.elastic_body import ElasticBody, stiffness_form
 from macro.linear_solvers.options import PREFIX
+from macro.linear_solvers.selection import FACTORISED
 from macro.linear_solvers.solvers import solve_linear, solved_at_once
 from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
 from macro.mesh.facets import OuterFacets, outer_facets
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
-_FACTORISED = 100_000
-"""Degrees of freedom up to which the stiffness is factorised: 10⁵ take 5 s and 1 GB."""
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
-_MORE = 4
-"""Degree of the quadrature of tractions beyond that of two basis functions."""
-_SAME = 1e-9
-"""Relative difference of elastic constants that is rounding."""
 
 
 class HalfSpaceFields(Protocol):
@@ -104,16 +97,9 @@ def turned(face: FaceCompliance) -> FaceCompliance:
     )
 
 
-def raised(body: ElasticBody) -> ElasticBody:
+def raised(body: MeshedBody) -> MeshedBody:
     """Return the body with quadratic elements, if it is not too large; else the body itself."""
-    if isinstance(body, MeshedBody) and body.degree == 1 and 8 * body.dofs <= MOST_DOFS:
-        return replace(body, order=2)
-    return body
-
-
-def lowered(body: ElasticBody) -> ElasticBody | None:
-    """Return the body with linear elements, where it has quadratic ones on a mesh of its own."""
-    return body.linear if isinstance(body, MeshedBody) and body.degree == 2 else None
+    return replace(body, order=2) if body.degree == 1 and 8 * body.dofs <= MOST_DOFS else body
 
 
 def mesh_face_compliance(
@@ -165,24 +151,15 @@ def _gathered(
     responses: Array, area: float, material: Material, fields: HalfSpaceFields | None
 ) -> FaceCompliance:
     """Return the whole response from the moments of displacements and strains."""
-    normal, xx, yy, xy = responses
-    nu, modulus = material.poisson_ratio, material.young_modulus
-    plane = modulus / (1.0 - nu**2)
-    stresses = np.stack([plane * (xx + nu * yy), plane * (yy + nu * xx), modulus / (1.0 + nu) * xy])
-    one = np.eye(len(normal)) / area
+    normal, *strains = responses
+    stresses = stresses_in_face(material, strains, area if fields is None else None)
     if fields is not None:
         below, beside = fields.modes()
         normal, stresses = normal + below, stresses + beside
-    else:  # Hooke's law with σ_zz = −p
-        stresses[:2] -= nu / (1.0 - nu) * one
-    xx, yy, xy = stresses
-    strain = (
-        xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
-    ) / modulus
-    growth = one / modulus - area * strain
-    return FaceCompliance(
-        normal=0.5 * (normal + normal.T), growth=0.5 * (growth + growth.T), stresses=stresses
-    )
+    (xx, yy, xy), nu, modulus = stresses, material.poisson_ratio, material.young_modulus
+    work = xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
+    growth = np.eye(len(normal)) / area / modulus - area * (work / modulus)
+    return FaceCompliance.of(normal, growth, stresses)
 
 
 class _Corrections:
@@ -197,10 +174,9 @@ class _Corrections:
         fields: HalfSpaceFields,
     ) -> None:
         frame = facets.frame.moved(*rectangle.origin)
-        outer = outer_facets(body.space, 2 * body.degree + _MORE)
-        level = np.abs(frame.height(outer.points.reshape(-1, 3))).reshape(outer.weights.shape)
-        off = level.max(axis=1, initial=0.0) > FLAT * max(rectangle.lengths)
-        outer = outer.among(off)
+        outer = outer_facets(body.space, 2 * body.degree + 4)
+        level = np.abs(frame.height(outer.points)).max(axis=1, initial=0.0)
+        outer = outer.among(level > FLAT * max(rectangle.lengths))
         self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
         self._frame, self._fields, self._material = frame, fields, material
         self._tractions = self._integrated(outer)
@@ -273,7 +249,7 @@ class _Corrections:
             for values, own in zip(body.cell_lame, self._material.lame, strict=True)
         ]
         size = sum(self._material.lame)
-        other = np.abs(differences[0]) + np.abs(differences[1]) > _SAME * size
+        other = np.abs(differences[0]) + np.abs(differences[1]) > 1e-9 * size
         if not body.comm.allreduce(bool(other.any())):
             return None
         cells = [np.where(other, values, 0.0) for values in differences]
@@ -289,7 +265,7 @@ def _solutions(
 ) -> Iterator[tuple[int, Array]]:
     """Yield every mode and its displacements, this rank's owned ones."""
     free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
-    if body.dofs <= _FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
+    if body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
         right = np.stack([free * loads.load(mode) for mode in range(count)], axis=1)
         yield from enumerate(solved_at_once(body.stiffness, right).T)
         return

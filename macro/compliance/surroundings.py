@@ -1,4 +1,7 @@
-"""What is around a rectangle on the contact face of a body: free sides, thickness, the plane.
+"""A rectangle on the contact face of a body: what is around it, and Legendre modes on it.
+
+Around it are free sides, a thickness and the plane of the face. The modes are loads, and moments of
+displacements.
 
 Theory: sections 5 and 6 of ``docs/theory.md``.
 """
@@ -6,32 +9,28 @@ Theory: sections 5 and 6 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
+from scipy.sparse import csr_matrix
 
 from geometry.face_frame import FaceFrame
+from geometry.legendre_modes import mode_values
 from geometry.materials import Material
 from geometry.patches import PatchGrid
+from macro import compat
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import OuterFacets, outer_facets
+from macro.mesh.tagged import FLAT_IN_FILES
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
-
-_FLAT = 1e-6
-"""Distance from a plane, relative to the rectangle, and angle to it, that are rounding."""
-_COVERED = 1e-6
-"""Part of an area that is rounding."""
-_STRIP = 0.25
-"""Height of the strip of a free side that must be whole, relative to the rectangle's shorter side
-or the thickness: the distance that sides count up to as quarter-spaces."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,44 +70,43 @@ def surroundings(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid)
         Collective.
     """
     comm, area = body.comm, float(np.prod(rectangle.lengths))
-    covered = _area_in(body, facets, rectangle)
-    if covered < (1.0 - _COVERED) * area:
+    under = LoadedFace(body, facets, rectangle, degree=1).quadrature
+    covered = comm.allreduce(float(under.weight.sum()))
+    if covered < (1.0 - FLAT_IN_FILES) * area:
         raise InputError(
             "the surface's rectangle reaches beyond the contact face",
             value=f"{covered:.6g} of {area:.6g} mm² on the face",
             allowed="a rectangle on the face",
         )
-    outer = outer_facets(body.space, 2)
-    frame, slack = facets.frame, _FLAT * min(rectangle.lengths)
-    height = frame.height(outer.points.reshape(-1, 3)).reshape(outer.weights.shape)
-    above = comm.allreduce(float(height.max(initial=0.0)), op=MPI.MAX)
-    thickness = _thickness(comm, outer, facets, rectangle, height)
-    strip = _STRIP * min(*rectangle.lengths, thickness)
-    free = outer.among(~_held(body, outer))
-    sides = [_free_plane(body, free, frame, rectangle, side, strip, slack) for side in range(4)]
+    materials = body.materials_of(under.cell)
+    if len(materials) != 1:
+        raise InputError(
+            "the surface's rectangle lies on several materials",
+            value=len(materials),
+            allowed="one material under the rectangle",
+        )
+    outer, frame = outer_facets(body.space, 2), facets.frame
+    height = frame.height(outer.points)
+    above = comm.allreduce(float(height.max(initial=0.0)), max)
+    thickness = _thickness(comm, outer, frame, rectangle)
+    strip = 0.25 * min(*rectangle.lengths, thickness)  # as deep as quarter-spaces count
+    free, slack = outer.among(~_held(body, outer)), FLAT_IN_FILES * min(rectangle.lengths)
+    sides = [_is_free(body, free, _side(frame, rectangle, k), strip, slack) for k in range(4)]
     return Surroundings(
         free_sides=(sides[0], sides[1], sides[2], sides[3]),
         thickness=thickness,
         above=above if above > slack else 0.0,
-        material=_material_under(body, facets, rectangle),
+        material=materials.pop(),
     )
 
 
-def _area_in(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> float:
-    """Return the area of facets within a rectangle in their plane, of all ranks [mm²]."""
-    quadrature = LoadedFace(body, facets, rectangle, degree=1).quadrature
-    return float(body.comm.allreduce(float(quadrature.weight.sum())))
-
-
-def _thickness(
-    comm: Any, outer: OuterFacets, facets: ContactFacets, rectangle: PatchGrid, height: Array
-) -> float:
+def _thickness(comm: Any, outer: OuterFacets, frame: FaceFrame, rectangle: PatchGrid) -> float:
     """Return the least depth of the underside under the rectangle, else the body's depth [mm]."""
-    places = facets.frame.in_plane(outer.points.reshape(-1, 3)) - rectangle.origin
-    inside = np.all((places > 0.0) & (places < rectangle.lengths), axis=1).reshape(height.shape)
-    under = inside & (outer.normals @ facets.frame.normal < -0.5)
-    least = comm.allreduce(float((-height[under]).min(initial=np.inf)), op=MPI.MIN)
-    deepest = comm.allreduce(float((-height).max(initial=0.0)), op=MPI.MAX)
+    depth, places = -frame.height(outer.points), frame.in_plane(outer.points) - rectangle.origin
+    inside = np.all((places > 0.0) & (places < rectangle.lengths), axis=-1)
+    under = inside & (outer.normals @ frame.normal < -0.5)
+    least = comm.allreduce(float(depth[under].min(initial=np.inf)), min)
+    deepest = comm.allreduce(float(depth.max(initial=0.0)), max)
     return float(min(least, deepest))
 
 
@@ -118,65 +116,108 @@ def _held(body: ElasticBody, outer: OuterFacets) -> NDArray[np.bool_]:
     return np.asarray(nodes.all(axis=1).any(axis=1))
 
 
-def _free_plane(
-    body: ElasticBody,
-    free: OuterFacets,
-    frame: FaceFrame,
-    rectangle: PatchGrid,
-    side: int,
-    strip: float,
-    slack: float,
-) -> bool:
-    """Tell whether a free plane across the face bounds a side of the rectangle, strip deep."""
+def _side(frame: FaceFrame, rectangle: PatchGrid, side: int) -> tuple[FaceFrame, float]:
+    """Return the plane across the face at a side of the rectangle, and the length of the side.
+
+    The side runs along the first axis of the plane, from its origin; the second points into depth.
+    """
     axis, high = divmod(side, 2)
     outward = (1.0 if high else -1.0) * frame.axes[axis]
     along = np.cross(-frame.normal, outward)
     corner = np.array(rectangle.origin) + high * np.eye(2)[axis] * rectangle.lengths
-    other = frame.axes[1 - axis]
-    if along @ other < 0.0:  # the strip is to run from 0 to the length of the side
+    if along @ frame.axes[1 - axis] < 0.0:
         corner = corner + np.eye(2)[1 - axis] * rectangle.lengths
     axes = np.stack([along, -frame.normal, outward])
-    plane = FaceFrame(origin=frame.in_space(corner), axes=axes)
-    level = np.abs(plane.height(free.points.reshape(-1, 3))).reshape(free.weights.shape)
-    flat = (level.max(axis=1, initial=0.0) < slack) & np.all(
-        free.normals @ outward > 1.0 - _FLAT, axis=1
-    )
-    chosen = contact_sides(body, free.among(flat), plane)
-    length = rectangle.lengths[1 - axis]
-    area = _area_in(body, chosen, PatchGrid(grid=(1, 1), lengths=(length, strip)))
-    return area > (1.0 - _COVERED) * length * strip
+    return FaceFrame(origin=frame.in_space(corner), axes=axes), rectangle.lengths[1 - axis]
 
 
-def contact_sides(body: ElasticBody, outer: OuterFacets, frame: FaceFrame) -> ContactFacets:
-    """Return outer facets in a plane as facets of that plane."""
-    mesh = body.space.mesh
-    mesh.topology.create_connectivity(3, 2)
-    table = mesh.topology.connectivity(3, 2)
-    facets = table.array[table.offsets[outer.cell] + outer.side]
-    return contact_facets(mesh, facets.astype(np.int32), frame)
+def _is_free(
+    body: ElasticBody, free: OuterFacets, side: tuple[FaceFrame, float], strip: float, slack: float
+) -> bool:
+    """Tell whether free facets in the plane of a side cover it, strip deep."""
+    plane, length = side
+    level = np.abs(plane.height(free.points)).max(axis=1, initial=0.0)
+    upright = np.all(free.normals @ plane.normal > 1.0 - FLAT_IN_FILES, axis=1)
+    flat = free.among((level < slack) & upright)
+    chosen = contact_facets(body.space.mesh, flat.facet, plane)
+    whole = PatchGrid(grid=(1, 1), lengths=(length, strip))
+    weight = LoadedFace(body, chosen, whole, degree=1).quadrature.weight
+    area = body.comm.allreduce(float(weight.sum()))
+    return bool(area > (1.0 - FLAT_IN_FILES) * length * strip)
 
 
-def _material_under(body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid) -> Material:
-    """Return the one material of the cells under the rectangle."""
-    cells = np.unique(LoadedFace(body, facets, rectangle, degree=1).quadrature.cell)
-    own = _pairs(body, cells)
-    pairs = set().union(*body.comm.allgather(own))
-    if len(pairs) != 1:
-        raise InputError(
-            "the surface's rectangle lies on several materials",
-            value=len(pairs),
-            allowed="one material under the rectangle",
+class FaceMoments:
+    """Modes on a rectangle of the contact face of a body.
+
+    Args:
+        body: The body.
+        facets: Facets of its contact face, in its frame.
+        rectangle: The rectangle as one patch, in that frame.
+        count: Modes K along a side.
+
+    Note:
+        Construction and every method are collective.
+    """
+
+    def __init__(
+        self, body: ElasticBody, facets: ContactFacets, rectangle: PatchGrid, count: int
+    ) -> None:
+        self._body, self._frame = body, facets.frame
+        self._area = float(np.prod(rectangle.lengths))
+        degree = (4 if body.hexahedral else 2) * body.degree + 4
+        number = max(body.comm.allreduce(len(facets.cell)), 1)
+        degree += 2 * round(2.0 * count / np.sqrt(number))  # on few facets modes vary much
+        self.points = LoadedFace(body, facets, rectangle, degree=degree).quadrature
+        (x, y), (lx, ly) = rectangle.origin, rectangle.lengths
+        along_x = mode_values(self.points.x - x, lx, count)
+        along_y = mode_values(self.points.y - y, ly, count)
+        self._modes = (along_x[:, None] * along_y).reshape(count**2, -1) * self.points.weight
+
+    def of(self, displacement: Any) -> Array:
+        """Return integrals over the rectangle of modes times fields, divided by the area, (4, K²).
+
+        The fields are the displacements into the body [mm], and the strains along x, along y and
+        in shear, ε_xy: half the change of the angle.
+
+        Args:
+            displacement: dolfinx Function, ghosts up to date [mm].
+        """
+        values = displacement.x.array
+        local = np.stack([self._modes @ (part @ values) for part in self._operators])
+        return np.asarray(self._body.comm.allreduce(local) / self._area)
+
+    def load(self, mode: int) -> Array:
+        """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
+        return compat.sum_of_ranks(self._body.space, self._operators[0].T @ self._modes[mode])
+
+    @cached_property
+    def _operators(self) -> tuple[csr_matrix, ...]:
+        """From nodal values to displacements into the body and strains at the points."""
+        points, axes = self.points, self._frame.axes
+        slopes = self._slopes()
+        parts = [
+            -points.values[..., None] * axes[2],
+            *(slopes[..., a : a + 1] * axes[a] for a in (0, 1)),
+            0.5 * (slopes[..., :1] * axes[1] + slopes[..., 1:] * axes[0]),
+        ]
+        columns = (3 * points.nodes[..., None] + np.arange(3)).reshape(
+            len(points.x), 3 * points.nodes.shape[1]
         )
-    first, shear = pairs.pop()
-    return Material(
-        young_modulus=shear * (3.0 * first + 2.0 * shear) / (first + shear),
-        poisson_ratio=0.5 * first / (first + shear),
-    )
+        starts = columns.shape[1] * np.arange(len(points.x) + 1)
+        size = len(points.x), 3 * len(self._body.space.tabulate_dof_coordinates())
+        return tuple(
+            csr_matrix((part.ravel(), columns.ravel(), starts), shape=size) for part in parts
+        )
 
-
-def _pairs(body: ElasticBody, cells: NDArray[np.int32]) -> set[tuple[float, float]]:
-    """Return the pairs of Lamé's constants of cells."""
-    first, shear = (np.atleast_1d(np.asarray(part, float)) for part in body.cell_lame)
-    if len(first) == 1:
-        return {(float(first[0]), float(shear[0]))}
-    return set(zip(first[cells].tolist(), shear[cells].tolist(), strict=True))
+    def _slopes(self) -> Array:
+        """Return the slopes of the basis functions along both axes of the face, (n, m, 2)."""
+        points, mesh = self.points, self._body.space.mesh
+        name, degree = mesh.topology.cell_name(), compat.lagrange_degree(self._body.space)
+        if not len(points.x):
+            return np.empty((*points.values.shape, 2))
+        rows = compat.cell_vertices(mesh)[points.cell]
+        shape = compat.lagrange_gradients(name, compat.geometry_degree(mesh), points.reference)
+        maps = np.einsum("nak,naj->nkj", shape, mesh.geometry.x[rows])  # ∂x_j/∂X_k
+        basis = compat.lagrange_gradients(name, degree, points.reference)
+        gradients = np.linalg.solve(maps, basis.transpose(0, 2, 1))
+        return np.asarray(np.einsum("aj,njm->nma", self._frame.axes[:2], gradients))

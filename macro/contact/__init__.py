@@ -5,11 +5,11 @@
       └ ContactForces           laws under a plane                           `contact_forces`
     ContactProblem              laws in a user's own variational problem     `contact_problem`
       └ Interface               laws on a face, as a term of its equations   `interface`
-      └ UserEquations           residual and tangent of both                 `user_equations`
+      └ UserEquations           residual and tangent of both                 `equations`
     UnilateralContactProblem    no interference with a rough top           `unilateral_problem`
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 
-Both problems with laws are solved by `newton`; all three give a `contact_state`. `face_nodes` and
-`facet_area` read results off a rough top.
+Both problems with laws are solved by `newton`; all three give a `face_contact_state`.
+`face_nodes` reads results off a rough top.
 """

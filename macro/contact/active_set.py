@@ -21,39 +21,26 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import Guess
-from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
+from macro.contact.rough_face import (
+    ContactSolution,
+    Guess,
+    PlaneOverNodes,
+    RoughFace,
+    largest,
+    not_found,
+)
 from macro.linear_solvers.constrained import ConstrainedSolver, contact_tolerance
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from support.arrays import Array, Flags
 
 _LOOSE, _CLOSER = 0.1, 1e-2
 """Relative residuals of solves while the active set changes much, and while it changes little."""
 
-_FEW = 200
-"""The set changes little when at most one active node in this many changes."""
-
 _PATIENCE = 10
 """Solves without progress before nodes change one by one."""
-
-_CLOSED = 1e-8
-"""Gap relative to the largest displacement below which a node counts as touching."""
-
-_ROUNDING = 1e-15
-"""Interference relative to the block's size that is rounding."""
-
-_SOFT = 8.0
-"""Stiffness of the springs under a plane without support: E* times this over the block's width."""
-
-_NO_FORCE = 1e-17
-"""Force over E* and the square of half the diagonal that counts as zero."""
 
 
 @dataclass(slots=True, eq=False)
@@ -100,8 +87,10 @@ class PrimalDualActiveSet:
         self._residual = body.stiffness.createVecRight()
         self.points = len(top.dofs)
         modulus, half = face.modulus, plane.levers.half
-        self._zero_force, self._rounding = _NO_FORCE * modulus * half**2, _ROUNDING * half
-        self._springs = top.area * modulus * _SOFT / (2.0 * half)
+        # what counts as no force, and as no interference
+        self._zero_force, self._rounding = 1e-17 * modulus * half**2, 1e-15 * half
+        # under a plane without support: E* eight times over the block's width
+        self._springs = top.area * modulus * 8.0 / (2.0 * half)
 
     def solve(self, control: Control, guess: Guess) -> ContactSolution:
         """Find the contact of a load step.
@@ -143,7 +132,8 @@ class PrimalDualActiveSet:
                 return self._converged(now, sets, spent)
             fewest, waited = (changed, 0) if changed < fewest else (fewest, waited + 1)
             sets += changed > 0
-            if changed > max(1, total // _FEW) and waited <= _PATIENCE:
+            # more than one active node in 200
+            if changed > max(1, total // 200) and waited <= _PATIENCE:
                 tolerance = _LOOSE
             else:
                 tolerance = self._tolerance if tolerance <= _CLOSER else _CLOSER
@@ -206,7 +196,7 @@ class PrimalDualActiveSet:
         now.displacement.array[self._top.dofs] -= removed
         self._update_residual(now.displacement)
         forces = np.maximum(self._residual.array_r[self._top.dofs], 0.0)
-        slack = _CLOSED * largest(now.displacement.array_r, self._comm)
+        slack = 1e-8 * largest(now.displacement.array_r, self._comm)
         forces = np.where(now.active, forces, 0.0)
         return ContactSolution(
             end=Guess(now.plane, now.displacement.array_r.copy(), forces),
@@ -229,14 +219,14 @@ class PrimalDualActiveSet:
     def _first(self, moved: Flags) -> Flags:
         """Keep the first of the flags, over all ranks (Murty 1974: such changes cannot cycle)."""
         comm = self._comm
-        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, op=MPI.MIN)
+        lowest = comm.allreduce(comm.rank if moved.any() else comm.size, min)
         alone = np.zeros_like(moved)
         if comm.rank == lowest:
             alone[np.argmax(moved)] = True
         return alone
 
     def _norm(self, values: Array) -> float:
-        return float(np.sqrt(self._comm.allreduce(float(values @ values), op=MPI.SUM)))
+        return float(np.sqrt(self._comm.allreduce(float(values @ values))))
 
     def _count(self, flags: Flags) -> int:
-        return int(self._comm.allreduce(int(np.count_nonzero(flags)), op=MPI.SUM))
+        return int(self._comm.allreduce(int(np.count_nonzero(flags))))

@@ -13,24 +13,32 @@ Theory: section 12 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
+from geometry.plane_equilibrium import slope_search
 from geometry.rigid_plane import Control
-from geometry.slope_search import slope_search
 from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import Guess
-from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace, largest, not_found
-from macro.contact.unilateral_springs import AugmentedLaw, StiffPreconditioner
-from macro.linear_solvers.constrained import contact_tolerance
+from macro.contact.rough_face import (
+    ContactSolution,
+    Guess,
+    PlaneOverNodes,
+    RoughFace,
+    largest,
+    not_found,
+)
+from macro.linear_solvers.constrained import ConstrainedPreconditioner, contact_tolerance
+from macro.linear_solvers.node_matrices import node_submatrix, springs_at
 from macro.linear_solvers.options import conjugate_gradients, reason_name
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _LOOSEST = 0.03
 """Largest relative residual of linear solves, and tolerance of the first equilibrium."""
@@ -46,20 +54,10 @@ INTERFERENCE = {1: 1e-8, 2: 1e-5}
 the largest displacement, by the element's degree. On quadratic facets the conditions of
 neighbouring points are nearly dependent, and multipliers that share a load converge slowly."""
 
-_SOFT, _HARD = 30.0, 1000.0
-"""First and usual stiffness k, in E* over the size of the facet."""
-
-_HARDER, _HARDEST = 10.0, 10.0
+_HARDER = 10.0
 """Factor of k between updates, and its largest factor beyond the usual one."""
 
-_FALL = 0.1
-"""Factor by which an update must reduce the interference; otherwise k grows."""
-
 _MOST_UPDATES = 40
-_NO_FORCE = 1e-6
-"""Nodal force relative to the largest one that counts as zero."""
-
-_TINY = 1e-300
 
 
 class AugmentedLagrangian:
@@ -81,17 +79,16 @@ class AugmentedLagrangian:
 
     def __init__(self, face: RoughFace, top: TopNodes, plane: PlaneOverNodes) -> None:
         self._body, self._top, self._plane = face.body, top, plane
-        body, loaded = face.body, face.loaded(2 * face.body.degree)
-        self._sampling = sampling = loaded.pointwise
+        body, loaded = face.body, face.loaded
         (distance,) = top.with_ghosts(plane.distance)
         self._points = points = loaded.quadrature
         unit = face.modulus / _facet_sizes(points.cell, points.weight)
-        self._stiff, self._soft = _HARD * unit, _SOFT * unit
+        self._stiff, self._soft = 1000.0 * unit, 30.0 * unit  # usual and first stiffness
         self._tolerance = contact_tolerance()
         self._interference = INTERFERENCE[body.degree]
         self.law = AugmentedLaw(np.sum(points.values * distance[points.nodes], axis=1))
         none = np.zeros_like(points.x)  # the law has the distances between face and plane
-        self._forces = ContactForces(loaded, sampling, [self.law], none)
+        self._forces = ContactForces(loaded, loaded.pointwise, [self.law], none)
         self.equilibrium = Equilibrium(body, self._forces)
         self._preconditioner = StiffPreconditioner(
             body.stiffness, body.solver.pc, loaded.points_by_dofs, layers=3 - body.degree
@@ -126,14 +123,13 @@ class AugmentedLagrangian:
             # interference of points without pressure, interference or gap of points under pressure
             depth = largest((law.pressure(closure) - law.multiplier) / law.slope, comm)
             allowed = self._interference * largest(displacement.array_r, comm)
-            ratio = depth / max(allowed, _TINY)
-            hard = bool(np.all(law.slope >= self._stiff))
-            hard = bool(comm.allreduce(hard, op=MPI.LAND))
+            ratio = depth / max(allowed, 1e-300)
+            hard = comm.allreduce(bool(np.all(law.slope >= self._stiff)), min)
             if hard and tolerance <= self._tolerance and ratio <= 1.0:
                 return self._converged(displacement, steps, spent)
             law.multiplier = law.pressure(closure)
-            if hard and ratio > _FALL * before:
-                hardest = np.minimum(_HARDER * hardest, _HARDEST * self._stiff)
+            if hard and ratio > 0.1 * before:  # the interference falls too slowly
+                hardest = np.minimum(_HARDER * hardest, _HARDER * self._stiff)
             before = ratio
             law.slope = np.minimum(_HARDER * law.slope, hardest)
             if hard:
@@ -204,16 +200,14 @@ class AugmentedLagrangian:
         return slope_search(slope_after, -float(residual.dot(step)), 1.0) is not None
 
     def _converged(self, displacement: PETSc.Vec, steps: int, spent: int) -> ContactSolution:
-        closure, plane = self._forces.closure(displacement), self._forces.plane.copy()
-        pressure, load = self.law.pressure(closure), displacement.duplicate()
-        samples = self._sampling.operator.createVecRight()
-        samples.array[:] = pressure
-        self._sampling.operator.mult(samples, load)
+        load, forces = displacement.duplicate(), self._forces
+        forces.write(displacement, load)
+        pressure, plane = self.law.pressure(forces.closure(displacement)), forces.plane.copy()
         nodal_force = -load.array_r[self._top.dofs]
         gap = -self._plane.interference(plane, -displacement.array_r[self._top.dofs])
         comm = self._body.comm
         pressed = largest(nodal_force, comm)
-        touching = nodal_force > _NO_FORCE * pressed
+        touching = nodal_force > 1e-6 * pressed
         if pressed:
             touching |= gap < self._interference * largest(displacement.array_r, comm)
         return ContactSolution(
@@ -235,3 +229,94 @@ def _facet_sizes(cell: NDArray[np.int32], weight: Array) -> Array:
     """
     _, at = np.unique(cell, return_inverse=True)
     return np.sqrt(np.bincount(at, weights=weight))[at] if len(at) else np.empty(0)
+
+
+class AugmentedLaw:
+    """The law p = ⟨p₀ + k d⟩ of this rank's quadrature points; a `ContactLaw`.
+
+    Args:
+        distance: Distances d₀ of the points from the plane at no approach and no tilt, shape (n,)
+            [mm]; the interference d is the closure minus d₀.
+
+    Attributes:
+        distance: As given.
+        slope: Stiffness k of the points, shape (n,) [MPa/mm].
+        multiplier: Pressures p₀ at no interference, shape (n,) [MPa].
+    """
+
+    def __init__(self, distance: Array) -> None:
+        self.distance = distance
+        self.slope, self.multiplier = np.zeros_like(distance), np.zeros_like(distance)
+
+    def pressure(self, closure: Array) -> Array:
+        """Return the pressures, shape (n,) [MPa]."""
+        return np.maximum(self.multiplier + self.slope * (closure - self.distance), 0.0)
+
+    def stiffness(self, closure: Array) -> Array:
+        """Return their derivatives, shape (n,) [MPa/mm]."""
+        return np.where(self.pressure(closure) > 0.0, self.slope, 0.0)
+
+
+class StiffPreconditioner:
+    """M⁻¹ = P B P + (1 − P) S⁻¹ (1 − P), for a matrix K + C with stiff springs C at some dofs.
+
+    B is a preconditioner of K. P constrains the dofs with springs to the motions of the plane, and
+    P B P is corrected near them (see `ConstrainedPreconditioner`). S is the part of K + C between
+    the dofs with springs; every rank factorises the part that it owns. The stiffer the springs,
+    the weaker the two parts are coupled.
+
+    Args:
+        matrix: K.
+        preconditioner: B.
+        points_by_dofs: −w φ of every quadrature point, shape (points, dofs) [mm²].
+        layers: Layers of nodes near which P B P is corrected.
+
+    Note:
+        Everything here is collective.
+    """
+
+    def __init__(
+        self, matrix: PETSc.Mat, preconditioner: PETSc.PC, points_by_dofs: PETSc.Mat, layers: int
+    ) -> None:
+        self._matrix, self._points = matrix, points_by_dofs
+        self._work = matrix.createVecRight()
+        self._constrained = ConstrainedPreconditioner(matrix, preconditioner, layers)
+        self._projection = self._constrained.projection
+        self._dofs: NDArray[np.intp] = np.empty(0, dtype=np.intp)
+        self._factors: Any = None
+
+    def update(self, stiffness: Array, dofs: NDArray[np.intp], motions: Array) -> None:
+        """Move to other springs.
+
+        Args:
+            stiffness: Stiffness over weight of this rank's quadrature points [MPa/mm/mm²].
+            dofs: Vertical dofs of this rank that have springs, ascending, shape (n,).
+            motions: Their displacements by free motions of the plane, shape (n, k); orthonormal.
+        """
+        springs = springs_at(self._points, stiffness)
+        nodes = np.unique(dofs // 3)
+        among = 3 * np.searchsorted(nodes, dofs // 3) + dofs % 3
+        # a copy of all rows and columns would take 1 kB per dof
+        part = sum(
+            node_submatrix(matrix.getDiagonalBlock(), nodes, nodes)[among][:, among]
+            for matrix in (self._matrix, springs)
+        )
+        springs.destroy()
+        self._dofs = dofs
+        self._constrained.constrain(dofs, motions)
+        self._factors = splu(csc_array(part)) if len(dofs) else None
+
+    def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write the preconditioner's y for x; PETSc calls this."""
+        work = self._work
+        self._constrained.apply(pc, x, y)
+        x.copy(work)
+        self._projection.project(work)
+        work.axpby(1.0, -1.0, x)  # (1 − P) x, which is zero but at the dofs with springs
+        rest = work.array_r[self._dofs]
+        work.set(0.0)
+        if self._factors is not None:
+            work.array[self._dofs] = self._factors.solve(rest)
+        y.axpy(1.0, work)
+        self._projection.project(work)
+        y.axpy(-1.0, work)

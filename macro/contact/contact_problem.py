@@ -8,18 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from macro import compat
 from macro.contact.equations import UserEquations
 from macro.contact.interface import Interface
 from macro.contact.newton import Newton, NewtonReport
 from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS
 from macro.linear_solvers.selection import algebraic_options
+from support.arrays import Array
 from support.errors import InputError, NotConverged
-
-Array = NDArray[np.float64]
 
 _SMALL = 3000
 """Largest number of unknowns that is factorised by default. The coarse grids of smaller problems

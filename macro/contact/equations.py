@@ -16,7 +16,7 @@ from petsc4py import PETSc
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactTangent
 from macro.contact.interface import Interface
-from macro.elasticity import rigid_body_modes
+from macro.elastic_body import rigid_body_modes
 from macro.linear_solvers.node_matrices import free_unknowns
 from support.errors import InputError
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.rigid_plane import RigidPlane
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 class NodalContact(NamedTuple):
@@ -55,7 +54,7 @@ class FaceContactState:
         patch_closure: Their mean closures: the approach of the plane less the displacement of the
             face into the body, and, with laws, less the macroscopic gap, shape (N,) [mm].
         contact_area: Real contact area [mm²]; None where a law does not know it. Of meshed
-            roughness, with its border within facets, see `macro.contact.facet_area.covered`.
+            roughness, with its border within facets, see `macro.contact.face_nodes.covered`.
         displacement: This rank's owned displacements, dof by dof, those by other loads than the
             contact included [mm]; in a user's own problem they are in the user's function.
         reaction: Force that the supports bear [N]; equals ``force`` in equilibrium.
@@ -108,8 +107,3 @@ class FaceContactState:
     def tilt(self) -> tuple[float, float]:
         """Change of the approach along x and y [mm/mm]."""
         return self.plane.tilt
-
-    @property
-    def residual(self) -> float:
-        """Norm of the residual at the end; not a number where it is not known."""
-        return float(self.residuals[-1]) if len(self.residuals) else np.nan

@@ -1,4 +1,4 @@
-"""The nodes of a rough face, the triangles between them, and their shares of the patches.
+"""The nodes of a rough face, their shares of the patches, and the contact area between them.
 
 Theory: section 12 of ``docs/theory.md``.
 """
@@ -6,11 +6,10 @@ Theory: section 12 of ``docs/theory.md``.
 from __future__ import annotations
 
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-import ufl
 from dolfinx import fem
-from mpi4py import MPI
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
@@ -18,11 +17,10 @@ from scipy.spatial import cKDTree
 
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.contact.facet_area import FacetLattice, covered, facet_lattice
 from macro.contact.rough_face import RoughFace
 from macro.mesh.contact_face import triangle_areas
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 _NO_AREA = 1e-9
@@ -38,13 +36,13 @@ class TopNodes:
 
     Args:
         face: The face, the top of its body.
-        patches: Patches on it, in its frame.
+        patches: Patches on it.
 
     Attributes:
         dofs: Vertical degrees of freedom of this rank's nodes of the top, shape (n,).
-        x: Abscissae of this rank's nodes in the frame of the face, shape (n,) [mm].
+        x: Abscissae of this rank's nodes, shape (n,) [mm].
         y: Their ordinates [mm].
-        height: Their heights above its plane [mm].
+        height: Their heights z [mm].
         area: Their tributary areas, the integrals of their basis functions over the plane [mm²];
             none at the vertices of quadratic triangles.
         patches: The patches.
@@ -59,10 +57,9 @@ class TopNodes:
         nodes = fem.locate_dofs_topological(space, 2, tags.find(face.marker))
         nodes = np.sort(nodes[nodes < space.dofmap.index_map.size_local])
         self.dofs = 3 * nodes + 2
-        points = space.tabulate_dof_coordinates()[nodes]
-        self.x, self.y = face.frame.in_plane(points).T.copy()
-        self.height = face.frame.height(points)
-        self.area = self._areas()
+        self.x, self.y, self.height = space.tabulate_dof_coordinates()[nodes].T.copy()
+        points = face.loaded.quadrature
+        self.area = self.sum_of_ranks(points.nodes, points.weight[:, None] * points.values)
         self._patch_areas = self.patch_sums(self.area)
 
     @cached_property
@@ -128,7 +125,7 @@ class TopNodes:
 
     def patch_sums(self, values: Array) -> Array:
         """Return the sums of nodal values over every patch, shape (N,), on every rank."""
-        return self._sum(self._shares.T @ values)
+        return np.asarray(self._body.comm.allreduce(self._shares.T @ values))
 
     def patch_means(self, values: Array) -> Array:
         """Return the means of nodal values over every patch, shape (N,), on every rank.
@@ -139,7 +136,8 @@ class TopNodes:
         means = np.empty(self.patches.count)
         means[~empty] = self.patch_sums(self.area * values)[~empty] / self._patch_areas[~empty]
         if empty.any():
-            means[empty] = self._sum(nearest.T @ values) / self._sum(nearest.sum(axis=0))
+            total = self._body.comm.allreduce
+            means[empty] = total(nearest.T @ values) / total(nearest.sum(axis=0))
         return means
 
     def regions(self, touching: NDArray[np.bool_]) -> tuple[Index, int]:
@@ -190,22 +188,14 @@ class TopNodes:
     def _shares(self) -> csr_array:
         """Share of every node of this rank that belongs to every patch, shape (n, N)."""
         # four points around each node, of which two or four may lie in other patches
-        slack, count = 1e-9 * max(self.patches.lengths), len(self.x)
-        x = np.concatenate([self.x - slack, self.x - slack, self.x + slack, self.x + slack])
-        y = np.concatenate([self.y - slack, self.y + slack, self.y - slack, self.y + slack])
-        across, along = self.patches.borders_x, self.patches.borders_y
-        inside = (x > across[0]) & (x < across[-1]) & (y > along[0]) & (y < along[-1])
+        steps = 1e-9 * max(self.patches.lengths) * np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
+        around = (np.column_stack([self.x, self.y]) + steps[:, None]).reshape(-1, 2)
+        count, lower = len(self.x), np.array(self.patches.origin)
+        inside = np.all((around > lower) & (around < lower + self.patches.lengths), axis=1)
         rows = np.tile(np.arange(count), 4)[inside]
-        columns = self.patches.index_of(x[inside], y[inside])
+        columns = self.patches.index_of(*around[inside].T)
         entries = 1.0 / np.bincount(rows, minlength=count)[rows]
         return coo_array((entries, (rows, columns)), shape=(count, self.patches.count)).tocsr()
-
-    def _areas(self) -> Array:
-        space, mesh = self._body.space, self._body.mesh
-        test = ufl.TestFunction(space)
-        ds = ufl.Measure("ds", domain=mesh.mesh, subdomain_data=mesh.facet_tags)
-        form = compat.compile_form(test[2] * ufl.FacetNormal(mesh.mesh)[2] * ds(self._face.marker))
-        return compat.assemble_vector(form).array_r[self.dofs].copy()
 
     @cached_property
     def _thirds(self) -> Array:
@@ -231,5 +221,83 @@ class TopNodes:
         index_map = self._body.space.dofmap.index_map
         return index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(nodes.shape)
 
-    def _sum(self, values: Array) -> Array:
-        return self._body.comm.allreduce(values, op=MPI.SUM)
+
+class FacetLattice(NamedTuple):
+    """The nodes of a facet and the triangles between neighbours.
+
+    Attributes:
+        nodes: Nodes of the cell that lie on each of its facets, shape (facets, n).
+        corners: Indices of the triangles' corners into a row of ``nodes``, shape (m, 3).
+        weight: Weight of each triangle, shape (m,): ½ in squares, which both diagonals divide.
+    """
+
+    nodes: Index
+    corners: Index
+    weight: Array
+
+
+def facet_lattice(cell_name: str, degree: int) -> FacetLattice:
+    """Divide the facets of a Lagrange element into triangles between neighbouring nodes.
+
+    Args:
+        cell_name: ``hexahedron`` or ``tetrahedron``.
+        degree: Polynomial degree of the element.
+    """
+    vertices, facets = compat.reference_facets(cell_name)
+    points, square = compat.lagrange_points(cell_name, degree), facets.shape[1] == 4
+    steps = [
+        (i, j) for i in range(degree + 1) for j in range(degree + 1) if square or i + j <= degree
+    ]
+    nodes = np.empty((len(facets), len(steps)), dtype=np.intp)
+    for side, at in enumerate(facets):
+        start, edges = vertices[at[0]], vertices[at[1:3]] - vertices[at[0]]
+        places = start + np.array(steps) @ edges / degree
+        nodes[side] = np.argmin(np.linalg.norm(points[None] - places[:, None], axis=2), axis=1)
+    number = {step: n for n, step in enumerate(steps)}
+    corners = []
+    for i, j in steps:
+        a, b, c, d = (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)
+        triangles = [(a, b, c), (d, c, b)] + ([(b, d, a), (c, a, d)] if square else [])
+        corners += [[number[x] for x in t] for t in triangles if all(x in number for x in t)]
+    weight = np.full(len(corners), 0.5 if square else 1.0)
+    return FacetLattice(nodes=nodes, corners=np.array(corners), weight=weight)
+
+
+def covered(touching: NDArray[np.bool_], pressure: Array, gap: Array, length: Array) -> Array:
+    """Return the share of every triangle that is in contact, shape (m,).
+
+    The border of contact crosses the edges between a node in contact and one out of contact. For
+    smooth bodies the pressure grows as κ √s with the distance s inside the border, and the gap as
+    (4 κ / 3 E*) s^(3/2) with the distance outside (Johnson 1985, section 5.1,
+    doi 10.1017/CBO9781139171731). The pressure at one node and the gap at the other give its place.
+
+    Args:
+        touching: Whether corners are in contact, shape (m, 3).
+        pressure: Pressures there, over the contact modulus E*, shape (m, 3).
+        gap: Gaps there, shape (m, 3) [mm].
+        length: Lengths of the edges opposite the corners, shape (m, 3) [mm].
+    """
+    count = touching.sum(axis=1)
+    share = (count == 3).astype(float)
+    for alone in (True, False):  # one corner that touches, or one that does not
+        rows = np.flatnonzero(count == (1 if alone else 2))
+        one = np.argmax(touching[rows] == alone, axis=1)
+        cut = np.ones(len(rows))
+        for turn in (1, 2):
+            other, third = (one + turn) % 3, (one - turn) % 3
+            inner, outer = (one, other) if alone else (other, one)
+            inside = _inside(pressure[rows, inner], gap[rows, outer], length[rows, third])
+            cut *= inside if alone else 1.0 - inside
+        share[rows] = cut if alone else 1.0 - cut
+    return share
+
+
+def _inside(pressure: Array, gap: Array, length: Array) -> Array:
+    """Return the share of edges that is in contact: 1 − z with c z³ + z = 1.
+
+    The real root is z = 2/√(3c) sinh(asinh(3√(3c)/2)/3), a hyperbolic form of Cardano's.
+    """
+    open_ = gap > 0.0
+    c = np.divide(4.0 * pressure * length, 3.0 * gap, out=np.zeros_like(gap), where=open_) ** 2
+    root = np.sqrt(3.0 * np.maximum(c, 1e-100))
+    return np.where(open_, 1.0 - 2.0 / root * np.sinh(np.arcsinh(1.5 * root) / 3.0), 1.0)

@@ -1,4 +1,4 @@
-"""The contact faces of two elastic bodies that are pressed on each other.
+"""Two elastic bodies that are pressed on each other: one set of unknowns, and one contact face.
 
 Meshes need not match. Laws at points are evaluated at the quadrature points of the first body's
 face; the basis functions of the counter-body are evaluated where these points lie on its face.
@@ -19,29 +19,141 @@ from petsc4py import PETSc
 from scipy.sparse import csr_matrix, vstack
 from scipy.spatial import cKDTree
 
-from geometry.patches import PatchGrid
 from macro import compat
-from macro.body_pair import BodyPair
-from macro.contact.loaded_face import ContactFace, LoadedFace, Outline, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, normal_rows
 from macro.contact.sampling import Sampling
+from macro.elastic_body import ElasticBody
 from macro.linear_solvers.node_matrices import distributed
+from macro.linear_solvers.options import (
+    KRYLOV_DEFAULTS,
+    PREFIX,
+    WeakContext,
+    default_options,
+    set_own_preconditioner,
+)
 from macro.mesh.contact_face import ContactFacets
+from macro.mesh.tagged import FLAT_IN_FILES
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_NEAREST = 12
-"""Facets of the nearest middles that a point is looked for in first."""
-_SLACK = 1e-8
-"""Distance beyond a facet, in its own coordinates, at which a point still counts as on it."""
-_UNLIKE = 1e-6
-"""Difference of a patch's areas on both faces, relative to the patch, that is rounding."""
-
-
-_SAMPLED = ("weight", "x", "y", "depth", "patch")
 
 
 @dataclass(frozen=True, eq=False)
+class BodyPair:
+    """A body and the counter-body that is pressed on it.
+
+    On every rank the unknowns are those of the body, then those of the counter-body. The stiffness
+    is block diagonal, and so is the preconditioner.
+
+    Args:
+        body: The body.
+        counter: The counter-body, on the same communicator. The approach is that of its supports.
+
+    Note:
+        Everything is collective.
+    """
+
+    body: ElasticBody
+    counter: ElasticBody
+
+    @property
+    def comm(self) -> Any:
+        """Communicator of both meshes."""
+        return self.body.comm
+
+    @property
+    def dofs(self) -> int:
+        """Number of degrees of freedom of both, all ranks together."""
+        return self.body.dofs + self.counter.dofs
+
+    @property
+    def owned_dofs(self) -> int:
+        """Number of degrees of freedom of both that this rank owns."""
+        return self.body.owned_dofs + self.counter.owned_dofs
+
+    def split(self, values: Array) -> tuple[Array, Array]:
+        """Return the parts of both bodies in this rank's owned values.
+
+        Args:
+            values: Values of the body, then of the counter-body, shape (owned_dofs,).
+        """
+        return values[: self.body.owned_dofs], values[self.body.owned_dofs :]
+
+    @cached_property
+    def stiffness(self) -> PETSc.Mat:
+        """Block diagonal stiffness [N/mm], a PETSc matrix without entries."""
+        sizes = (self.owned_dofs, None)
+        matrix = PETSc.Mat().createPython((sizes, sizes), WeakContext(self._product), self.comm)
+        matrix.setUp()
+        return matrix
+
+    @cached_property
+    def solver(self) -> PETSc.KSP:
+        """Linear solver of both; its preconditioner also serves the contact solves."""
+        solver = PETSc.KSP().create(self.comm)
+        solver.setOptionsPrefix(PREFIX)
+        solver.setOperators(self.stiffness)
+        set_own_preconditioner(solver, self._preconditioner)
+        with default_options(PREFIX, KRYLOV_DEFAULTS):
+            solver.setFromOptions()
+        solver.setUp()
+        return solver
+
+    @cached_property
+    def preload(self) -> Array | None:
+        """Displacements without contact, this rank's owned ones [mm]; None where there are none."""
+        parts = [each.preload for each in (self.body, self.counter)]
+        if all(part is None for part in parts):
+            return None
+        both = np.zeros(self.owned_dofs)
+        for part, own in zip(parts, self.split(both), strict=True):
+            own[:] = 0.0 if part is None else part
+        return both
+
+    def reaction(self, displacement: PETSc.Vec) -> float:
+        """Return the force that the body's supports bear against contact pressures [N].
+
+        Args:
+            displacement: Owned degrees of freedom of both, without the preload [mm].
+        """
+        part = self.body.stiffness.createVecRight()
+        part.array[:] = self.split(displacement.array_r)[0]
+        return self.body.reaction(part)
+
+    @cached_property
+    def _product(self) -> _Halves:
+        return _Halves(self, self.body.stiffness.mult, self.counter.stiffness.mult)
+
+    @cached_property
+    def _preconditioner(self) -> _Halves:
+        return _Halves(self, self.body.solver.pc.apply, self.counter.solver.pc.apply)
+
+
+class _Halves:
+    """Applies an operator of each body to its part of a vector; PETSc calls `mult` or `apply`.
+
+    Args:
+        pair: The bodies.
+        first: Writes y for x of the body.
+        second: Writes y for x of the counter-body.
+    """
+
+    def __init__(self, pair: BodyPair, first: Any, second: Any) -> None:
+        self._count, self._operators = pair.body.owned_dofs, (first, second)
+        self._vectors = [each.stiffness.createVecs() for each in (pair.body, pair.counter)]
+
+    def apply(self, _owner: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Write y for x."""
+        parts = slice(None, self._count), slice(self._count, None)
+        for operate, part, (given, result) in zip(
+            self._operators, parts, self._vectors, strict=True
+        ):
+            given.array[:] = x.array_r[part]
+            operate(given, result)
+            y.array[part] = result.array_r
+
+    mult = multTranspose = apply
+
+
 class FacePair(ContactFace):
     """Patches on the contact faces of a body and its counter-body.
 
@@ -54,25 +166,12 @@ class FacePair(ContactFace):
         Everything here is collective.
     """
 
-    first: LoadedFace
-    second: LoadedFace
+    def __init__(self, first: LoadedFace, second: LoadedFace) -> None:
+        self.first, self.second = first, second
+        self.body = BodyPair(first.body, second.body)
+        self.comm, self.patches = first.comm, first.patches
 
     @cached_property
-    def body(self) -> BodyPair:
-        """Both bodies."""
-        return BodyPair(self.first.body, self.second.body)
-
-    @property
-    def comm(self) -> Any:
-        """Communicator of both meshes."""
-        return self.first.comm
-
-    @property
-    def patches(self) -> PatchGrid | Outline:  # type: ignore[override]
-        """Patches on both faces."""
-        return self.first.patches
-
-    @property
     def areas(self) -> Array:
         """Areas of the patches on the first face, shape (N,) [mm²]."""
         return self.first.areas
@@ -80,13 +179,13 @@ class FacePair(ContactFace):
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""
-        one, other = self.first.patchwise, self.second.patchwise
-        if np.any(np.abs(self.first.areas - self.second.areas) > _UNLIKE * self.areas):
+        if np.any(np.abs(self.first.areas - self.second.areas) > FLAT_IN_FILES * self.areas):
             raise InputError(
                 "the two faces do not cover the patches alike",
                 value=float(np.abs(self.first.areas / self.second.areas - 1.0).max()),
                 allowed="patches that lie on both faces, or laws at points",
             )
+        one, other = self.first.patchwise, self.second.patchwise
         return self._both(one, _local_rows(one.operator), _local_rows(other.operator), other.depth)
 
     @cached_property
@@ -101,7 +200,8 @@ class FacePair(ContactFace):
             matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
             matrix.transpose(transposed)
             both.append(_local_rows(transposed))
-        samples = {name: getattr(one, name)[kept] for name in _SAMPLED}
+        names = ("weight", "x", "y", "depth", "patch")
+        samples = {name: getattr(one, name)[kept] for name in names}
         return self._both(replace(one, **samples), both[0], both[1], depth[kept])
 
     @property
@@ -167,44 +267,26 @@ def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Ar
     facet, local = np.full(len(points), -1), np.zeros_like(points)
     if not count or not len(points):
         return facet, local
+
+    def look(wanted: NDArray[np.intp], candidates: NDArray[np.intp]) -> None:
+        """Note which points, by their indices, lie on the facet that is tried for each."""
+        at = facets.local(candidates, points[wanted])
+        beyond = at.sum(axis=1) if corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
+        inside = (at.min(axis=1, initial=0.0) >= -1e-8) & (beyond <= 1.0 + 1e-8)
+        facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
+
     middles = corners.mean(axis=1)
     tree = cKDTree(middles)
     reach = float(np.linalg.norm(corners - middles[:, None], axis=2).max())
-    nearest = min(_NEAREST, count)
-    neighbours = tree.query(points, k=nearest)[1].reshape(len(points), nearest)
-    for candidates in neighbours.T:
+    nearest = min(12, count)
+    for candidates in tree.query(points, k=nearest)[1].reshape(len(points), nearest).T:
         left = np.flatnonzero(facet < 0)
-        _try(facets, points, left, candidates[left], facet, local)
+        look(left, candidates[left])
     for point in np.flatnonzero(facet < 0):  # near large facets, or beside the face
-        around = np.array(tree.query_ball_point(points[point], reach), dtype=np.intp)
-        for candidate in around[:, None]:
+        for candidate in tree.query_ball_point(points[point], reach):
             if facet[point] < 0:
-                _try(facets, points, np.array([point]), candidate, facet, local)
+                look(np.array([point]), np.array([candidate]))
     return facet, local
-
-
-def _try(
-    facets: ContactFacets,
-    points: Array,
-    wanted: NDArray[np.intp],
-    candidates: NDArray[np.intp],
-    facet: NDArray[np.intp],
-    local: Array,
-) -> None:
-    """Write the facets and coordinates of those points that lie on the facets tried for them.
-
-    Args:
-        facets: Facets in the plane.
-        points: All points, shape (n, 2) [mm].
-        wanted: Indices of the points that are looked for, shape (m,).
-        candidates: The facet that is tried for each of them, shape (m,).
-        facet: The facet of every point, shape (n,).
-        local: Its coordinates there, shape (n, 2).
-    """
-    at = facets.local(candidates, points[wanted])
-    beyond = at.sum(axis=1) if facets.corners.shape[1] == 3 else at.max(axis=1, initial=0.0)
-    inside = (at.min(axis=1, initial=0.0) >= -_SLACK) & (beyond <= 1.0 + _SLACK)
-    facet[wanted[inside]], local[wanted[inside]] = candidates[inside], at[inside]
 
 
 def _local_rows(matrix: PETSc.Mat) -> csr_matrix:

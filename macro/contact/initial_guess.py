@@ -2,22 +2,20 @@
 
 With laws, guesses minimise the energy in the space of earlier solutions. Extrapolation took 1.8 to
 3.2 times as many linear iterations over eight load steps with 4 patches and one closure for each,
-and 3 to 24 % more with 16 and 64 patches or laws at points. Meshed roughness has no smooth energy
-in such a basis; its solutions are extrapolated.
+and 3 to 24 % more with 16 and 64 patches or laws at points.
 
-Theory: sections 11 and 12 of ``docs/theory.md``.
+Theory: section 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.rigid_plane import Control
 from macro.contact.equations import Equilibrium
 from macro.contact.sampling import Sampling
 
@@ -28,9 +26,6 @@ _ROUNDING = 1e-7
 
 _STEPS, _HALVINGS = 30, 10
 """Newton steps in the basis, and halvings of each."""
-
-_LARGEST_STEP = 1.0
-"""Largest extrapolation, forwards or backwards, in steps between the last two solutions."""
 
 
 class DisplacementBasis:
@@ -127,56 +122,3 @@ class DisplacementBasis:
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)
-
-
-class Guess(NamedTuple):
-    """Where an iteration on meshed roughness starts.
-
-    Attributes:
-        plane: Approach [mm] and slopes of the plane, shape (3,).
-        displacement: This rank's owned degrees of freedom [mm].
-        contact: Contact forces of its nodes, or pressures of its quadrature points, shape (n,).
-    """
-
-    plane: Array
-    displacement: Array
-    contact: Array
-
-
-class Extrapolation:
-    """Extrapolates the last two solutions along the approach or the force.
-
-    Args:
-        dofs: Number of this rank's degrees of freedom.
-        points: Number of its nodes or quadrature points on the top.
-    """
-
-    def __init__(self, dofs: int, points: int) -> None:
-        self._at_rest = Guess(np.zeros(3), np.zeros(dofs), np.zeros(points))
-        self._last: list[tuple[Guess, float]] = []
-
-    def add(self, solution: Guess, force: float) -> None:
-        """Add a solution.
-
-        Args:
-            solution: The solution.
-            force: Its force [N].
-        """
-        self._last = [*self._last[-1:], (solution, force)]
-
-    def guess(self, control: Control) -> Guess:
-        """Return the line through the last two solutions at the prescribed approach or force.
-
-        Args:
-            control: What the load step prescribes.
-        """
-        if not self._last:
-            return self._at_rest
-        (before, force_before), (last, force) = self._last[0], self._last[-1]
-        if control.approach is not None:
-            run, ahead = last.plane[0] - before.plane[0], control.approach - last.plane[0]
-        else:
-            run, ahead = force - force_before, (control.force or 0.0) - force
-        share = float(np.clip(ahead / run, -_LARGEST_STEP, _LARGEST_STEP)) if run else 0.0
-        pairs = zip(last, before, strict=True)
-        return Guess(*(new + share * (new - old) for new, old in pairs))

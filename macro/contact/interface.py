@@ -20,14 +20,14 @@ from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTangent
 from macro.contact.face_contact_state import FaceContactState
-from macro.contact.interface_parts import ChosenFace, InterfaceLaws, chosen_face, laws_on_face
+from macro.contact.interface_parts import InterfaceLaws, chosen_face, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode
 from macro.contact.sampling import crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
+from macro.mesh.contact_face import ContactFacets
+from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def _result(name: str, meaning: str) -> Any:
@@ -116,19 +116,20 @@ class Interface:
         face = chosen_face(space, facet_tags, tag, names, frame)
         compat.collect_garbage(self.comm)  # of interfaces before this one
         chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
+        facets = face.facets
         if frame is None and chosen.shift.any():
-            face = face.moved(*chosen.shift)
-        self._make(face, chosen, crown)
+            facets = facets.moved(*chosen.shift)
+        self.marked, self._crown = face.marked, crown
+        self._make(facets, chosen)
         self.constrain(bcs)
         self.indenter = indenter
 
-    def _make(self, face: ChosenFace, chosen: InterfaceLaws, crown: Any) -> None:
-        self.frame, self.patches, self.mode = face.facets.frame, chosen.patches, chosen.mode
+    def _make(self, facets: ContactFacets, chosen: InterfaceLaws) -> None:
+        self.frame, self.patches, self.mode = facets.frame, chosen.patches, chosen.mode
         self.laws: tuple[ContactLaw, ...] = chosen.laws
-        self._face = LoadedFace(SimpleNamespace(space=self.space), face.facets, chosen.patches)
-        sampling = self._face.sampling(chosen.mode)
-        self.sampling, self.marked, self._crown = sampling, face.marked, crown
-        gap = together(self.comm, lambda: sampling.below(crown))
+        self._face = LoadedFace(SimpleNamespace(space=self.space), facets, chosen.patches)
+        self.sampling = sampling = self._face.sampling(chosen.mode)
+        gap = together(self.comm, lambda: sampling.below(self._crown))
         self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
         for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
             values = evaluate(-gap)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any, get_args
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
@@ -17,14 +17,10 @@ from macro.contact.contact_forces import ContactLaw
 from macro.contact.loaded_face import Mode
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import facet_indices
-from macro.mesh.tagged import TaggedMesh, bounding_box, planar_face
+from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
+from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_PARALLEL = 1e-6
-"""Largest deviation of a given frame's normal from that of the face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,16 +39,6 @@ class ChosenFace:
     lower: Array
     lengths: tuple[float, float]
 
-    def moved(self, x: float, y: float) -> ChosenFace:
-        """Return the same face with its coordinates counted from a point of them [mm]."""
-        shift = np.array([x, y])
-        facets = replace(
-            self.facets,
-            frame=self.facets.frame.moved(x, y),
-            corners=self.facets.corners - shift,
-        )
-        return replace(self, facets=facets, lower=self.lower - shift)
-
 
 def check_space(space: Any) -> None:
     """Refuse a space whose functions are no displacements as contact takes them.
@@ -63,7 +49,7 @@ def check_space(space: Any) -> None:
     Raises:
         InputError: On all ranks.
     """
-    fits = compat.displacement_degree(space) is not None
+    fits = compat.holds_displacements(space)
     straight = fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8)
     if not straight:
         raise InputError(
@@ -113,7 +99,7 @@ def chosen_face(
     if frame is None:
         placed = contact_facets(mesh, facets, plane.frame)
         return ChosenFace(facets=placed, marked=marked, lower=np.zeros(2), lengths=plane.lengths)
-    if np.abs(frame.normal - plane.frame.normal).max() > _PARALLEL:
+    if np.abs(frame.normal - plane.frame.normal).max() > FLAT_IN_FILES:
         raise InputError(
             "the frame's normal is not that of the face",
             value=frame.normal.tolist(),
@@ -148,10 +134,6 @@ def _on_all_ranks(mesh: Any, facets: NDArray[Any]) -> NDArray[np.int32]:
     chosen = mesh.comm.allgather(numbers.local_to_global(facets.astype(np.int32)))
     local = np.arange(numbers.size_local + numbers.num_ghosts, dtype=np.int32)
     return local[np.isin(numbers.local_to_global(local), np.concatenate(chosen))]
-
-
-_ROUNDING = 1e-12
-"""Shift of patches, relative to the face, that is rounding."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -189,10 +171,8 @@ def laws_on_face(
         lengths: Sides of that rectangle [mm].
 
     Raises:
-        InputError: When these are no laws, or not as many as patches, or there is no such mode.
+        InputError: When these are no laws, or not as many as patches.
     """
-    if mode is not None and mode not in get_args(Mode):
-        raise InputError("unknown interface", value=mode, allowed=", ".join(get_args(Mode)))
     if not isinstance(patches, PatchGrid | None):
         raise InputError("these are no patches", value=patches, allowed="a PatchGrid")
     shift = np.zeros(2)
@@ -208,7 +188,7 @@ def laws_on_face(
         if patches is None:
             patches = laws.patches
             shift = lower + 0.5 * np.asarray(lengths) - patches.middle
-            shift[np.abs(shift) < _ROUNDING * max(lengths)] = 0.0
+            shift[np.abs(shift) < 1e-12 * max(lengths)] = 0.0
         laws = laws.laws
     if not isinstance(laws, Sequence) or not laws or not all(map(_is_law, laws)):
         raise InputError(

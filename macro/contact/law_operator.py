@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from macro.contact.interface import Interface
 from macro.mesh.facets import facet_nodes
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 PACKAGE = "dolfinx_external_operator"
 
@@ -48,10 +47,8 @@ class LawsAtPoints:
         flat = np.reshape(points, (-1, 3))
         places = interface.frame.in_plane(flat)
         self._x, self._y = places.T
-        patches = interface.patches
-        self._inside = np.ones(len(flat), dtype=bool)
-        for values, borders in zip(places.T, (patches.borders_x, patches.borders_y), strict=True):
-            self._inside &= (values >= borders[0]) & (values <= borders[-1])
+        patches, lower = interface.patches, np.array(interface.patches.origin)
+        self._inside = np.all((places >= lower) & (places <= lower + patches.lengths), axis=1)
         self._patch = np.zeros(len(flat), dtype=np.intp)
         self._patch[self._inside] = patches.index_of(*places[self._inside].T)
         self._gap = interface.crown_at(self._x, self._y) - interface.frame.height(flat)

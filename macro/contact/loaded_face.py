@@ -5,14 +5,12 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
@@ -30,37 +28,43 @@ from macro.mesh.contact_face import (
     facet_quadrature,
     top_facets,
 )
+from support.arrays import Array
 from support.errors import InputError
 
-Array = NDArray[np.float64]
-_ALONG_AXIS = 1e-14
-"""Component of a unit normal that is rounding."""
-_WHOLE = 1e-9
-"""Part of a patch beyond the face that is rounding."""
 Mode = Literal["patchwise", "pointwise"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outline:
-    """What stands for patches on a face that is covered as a whole.
+    """What stands for patches on a face that is covered as a whole, in regions.
 
     Attributes:
+        region: Region of every facet of this rank, shape (facets,). Its facets may lie anywhere in
+            the plane.
         count: Number of regions.
-        middle: Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm].
-        lengths: Sides of the bounding rectangle [mm].
+        lengths: Sides of the bounding rectangle, which begins at the origin [mm].
     """
 
+    region: NDArray[np.intp]
     count: int
-    middle: Array
     lengths: tuple[float, float]
 
+    @property
+    def middle(self) -> Array:
+        """Middle of the bounding rectangle, which the plane turns about, shape (2,) [mm]."""
+        return 0.5 * np.asarray(self.lengths)
 
-class ContactFace(ABC):
+
+class ContactFace:
     """The contact face of a body, or of two bodies that are pressed together.
 
     Attributes:
         body: The body, or both.
         patches: Patches on the face, in its frame; or the outline of a face in regions.
+        comm: MPI communicator.
+        areas: Areas of the patches, shape (N,) [mm²].
+        patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
+        pointwise: Laws at quadrature points.
 
     Note:
         Everything is collective.
@@ -68,34 +72,23 @@ class ContactFace(ABC):
 
     body: Any
     patches: PatchGrid | Outline
+    comm: Any
+    areas: Any
+    patchwise: Any
+    pointwise: Any
 
-    @property
-    @abstractmethod
-    def comm(self) -> Any:
-        """MPI communicator."""
-
-    @property
-    @abstractmethod
-    def areas(self) -> Array:
-        """Areas of the patches, shape (N,) [mm²]."""
-
-    @property
-    @abstractmethod
-    def patchwise(self) -> Sampling:
-        """Laws at the mean closures of the patches, which are distributed over the ranks."""
-
-    @property
-    @abstractmethod
-    def pointwise(self) -> Sampling:
-        """Laws at quadrature points."""
-
-    @abstractmethod
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of pressures that are uniform on every patch.
 
         Args:
             pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
         """
+        sampling = self.patchwise
+        values = sampling.operator.createVecRight()
+        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
+        load = sampling.operator.createVecLeft()
+        sampling.operator.mult(values, load)
+        return load
 
     def sampling(self, mode: Mode) -> Sampling:
         """Return the samples of a mode: ``"patchwise"`` or ``"pointwise"``.
@@ -125,11 +118,9 @@ class LoadedFace(ContactFace):
             is Lagrange of degree 1 or 2.
         facets: Facets of the face, in its frame.
         patches: Patches on the face, in its frame. Parts of a patch beyond the face do not count.
+            Or the regions of the whole face, which have a law each at their points.
         degree: Polynomial degree that the quadrature is exact for; None: that of products of two
             basis functions.
-        region: Region of every facet, on a face in regions that have a law each at its points,
-            shape (facets,); None on a face with patches. A region takes the place of a patch; its
-            facets may lie anywhere in the plane.
 
     Note:
         Everything here is collective. A rank may own no facet, or no part of a patch.
@@ -139,7 +130,6 @@ class LoadedFace(ContactFace):
     facets: ContactFacets
     patches: PatchGrid | Outline
     degree: int | None = None
-    region: NDArray[np.intp] | None = None
 
     @classmethod
     def of_block(cls, block: Block, patches: PatchGrid, degree: int | None = None) -> LoadedFace:
@@ -168,8 +158,7 @@ class LoadedFace(ContactFace):
             lengths: Sides of the rectangle around all of them, from the origin of the frame [mm].
         """
         region = np.repeat(np.arange(len(parts)), [len(part.cell) for part in parts])
-        outline = Outline(len(parts), 0.5 * np.asarray(lengths), lengths)
-        return cls(body, parts[0].joined(parts[1:]), outline, region=region)
+        return cls(body, parts[0].joined(parts[1:]), Outline(region, len(parts), lengths))
 
     @property
     def space(self) -> Any:
@@ -184,8 +173,7 @@ class LoadedFace(ContactFace):
     @cached_property
     def quadrature(self) -> FacetQuadrature:
         """Quadrature points of this rank."""
-        parts = self.region if isinstance(self.patches, Outline) else self.patches
-        assert parts is not None
+        parts = self.patches.region if isinstance(self.patches, Outline) else self.patches
         return facet_quadrature(self.facets, self.space, parts, degree=self.quadrature_degree)
 
     @property
@@ -201,16 +189,20 @@ class LoadedFace(ContactFace):
         Raises:
             InputError: When a patch has no part of the face.
         """
-        points = self.quadrature
-        local = np.bincount(points.patch, weights=points.weight, minlength=self.patches.count)
-        areas = self.comm.allreduce(local, op=MPI.SUM)
+        (areas,) = self._integrals(1.0)
         if not np.all(areas > 0.0):
             raise InputError(
                 "patches that have no part of the contact face",
                 value=int(np.sum(areas == 0.0)),
                 allowed="patches that each cover a part of it",
             )
-        return np.asarray(areas)
+        return areas
+
+    def _integrals(self, *fields: Array | float) -> Array:
+        """Return the integrals of fields at this rank's points over the patches, (fields, N)."""
+        points, count = self.quadrature, self.patches.count
+        local = [np.bincount(points.patch, points.weight * field, count) for field in fields]
+        return np.asarray(self.comm.allreduce(np.array(local)))
 
     @cached_property
     def pointwise(self) -> Sampling:
@@ -249,19 +241,6 @@ class LoadedFace(ContactFace):
             count=self.patches.count,
         )
 
-    def load(self, pressures: Array) -> PETSc.Vec:
-        """Return the nodal load of pressures that are uniform on every patch.
-
-        Args:
-            pressures: Pressures of all patches, on every rank, shape (N,) [MPa].
-        """
-        sampling = self.patchwise
-        values = sampling.operator.createVecRight()
-        values.array[:] = np.asarray(pressures, dtype=np.float64)[sampling.patch]
-        load = sampling.operator.createVecLeft()
-        sampling.operator.mult(values, load)
-        return load
-
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:
         """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
@@ -282,14 +261,10 @@ class LoadedFace(ContactFace):
     def _means(self) -> tuple[Array, Array, Array]:
         """Mean place of the patches on the face, and its depth there, shape (N,) each [mm]."""
         points, patches = self.quadrature, self.patches
-        moments = [
-            np.bincount(points.patch, points.weight * values, minlength=patches.count)
-            for values in (points.x, points.y, points.depth)
-        ]
-        means = self.comm.allreduce(np.array(moments), op=MPI.SUM) / self.areas
+        means = self._integrals(points.x, points.y, points.depth) / self.areas
         if isinstance(patches, Outline):
             return means[0], means[1], means[2]
-        whole = np.abs(self.areas - patches.areas) <= _WHOLE * patches.areas
+        whole = np.abs(self.areas - patches.areas) <= 1e-9 * patches.areas
         x, y = np.where(whole, patches.centres.T, means[:2])
         return x, y, means[2]
 
@@ -310,7 +285,7 @@ def normal_rows(
         outward: Normal n out of the body, shape (3,).
         nodes: Number of all nodes.
     """
-    axes = np.flatnonzero(np.abs(outward) > _ALONG_AXIS)
+    axes = np.flatnonzero(np.abs(outward) > 1e-14)
     columns = (3 * numbers[used][:, None] + axes).ravel()
     starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
     entries = (-weights[used][:, None] * outward[axes]).ravel()

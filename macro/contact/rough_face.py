@@ -6,56 +6,38 @@ Theory: section 12 of ``docs/theory.md``.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from mpi4py import MPI
-from numpy.typing import NDArray
 
-from geometry.face_frame import UPWARD, FaceFrame
+from geometry.face_frame import UPWARD
 from geometry.patches import PatchGrid
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers
 from macro.bodies import Block
-from macro.contact.initial_guess import Guess
 from macro.contact.loaded_face import LoadedFace
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import TOP
 from macro.mesh.contact_face import ContactFacets, contact_facets
+from support.arrays import Array, Flags
 from support.errors import InputError, NotConverged
 
-_UPRIGHT = 1e-12
-"""Deviation of a face's normal from the z axis that is rounding."""
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class RoughFace:
-    """The rough face of a body that is meshed with its roughness; it looks along the z axis.
+    """The rough face of a body that is meshed with its roughness: around z = 0, looking along z.
 
     Args:
         body: The body.
         marker: Marker of the face's facets.
-        lengths: Sides (Lx, Ly) of the face's rectangle, about whose middle a plane turns [mm].
-        modulus: Contact modulus E* of the body at the face [MPa].
-        frame: Frame of the face, in whose coordinates the rectangle begins at the origin.
-
-    Raises:
-        InputError: When the face does not look along the z axis.
+        lengths: Sides (Lx, Ly) of the face's rectangle, which begins at the origin [mm]. A plane
+            turns about its middle.
     """
 
     body: ElasticBody
     marker: int
     lengths: tuple[float, float]
-    modulus: float
-    frame: FaceFrame = UPWARD
-
-    def __post_init__(self) -> None:
-        if not np.allclose(self.frame.normal, [0.0, 0.0, 1.0], rtol=0.0, atol=_UPRIGHT):
-            raise InputError(
-                "a face that is meshed with its roughness must look along the z axis",
-                value=self.frame.normal.tolist(),
-                allowed="[0, 0, 1]",
-            )
 
     @classmethod
     def of_block(cls, block: Block) -> Self:
@@ -70,60 +52,35 @@ class RoughFace:
                 value=block.mesh.shape.margin,
                 allowed="0 mm",
             )
-        lengths, modulus = block.mesh.shape.interface, block.material.contact_modulus
-        return cls(body=block, marker=TOP, lengths=lengths, modulus=modulus)
+        return cls(block, TOP, block.mesh.shape.interface)
 
-    @classmethod
-    def of_body(
-        cls,
-        body: ElasticBody,
-        marker: int,
-        lengths: tuple[float, float],
-        frame: FaceFrame = UPWARD,
-    ) -> Self:
-        """Return a face of any body, with the largest contact modulus of the cells behind it.
-
-        Args:
-            body: The body.
-            marker: Marker of the face's facets.
-            lengths: Sides (Lx, Ly) of the face's rectangle [mm].
-            frame: Frame of the face, in whose coordinates the rectangle begins at the origin.
-
-        Raises:
-            InputError: When no facet has the marker, or the face does not look along the z axis.
-
-        Note:
-            Collective.
-        """
-        facets = contact_facets(body.mesh.mesh, body.mesh.facet_tags.find(marker), frame)
-        lame, shear = body.cell_lame
-        modulus = np.broadcast_to(
-            4.0 * shear * (lame + shear) / (lame + 2.0 * shear), np.shape(lame) or 1
-        )
-        behind = modulus[facets.cell] if np.ndim(lame) else modulus[: len(facets.cell)]
-        largest = body.comm.allreduce(float(behind.max(initial=0.0)), op=MPI.MAX)
-        if not largest:
-            raise InputError("no facet of the body has this marker", value=marker)
-        return cls(body=body, marker=marker, lengths=lengths, modulus=largest, frame=frame)
-
-    @property
+    @cached_property
     def facets(self) -> ContactFacets:
         """The facets whose cells this rank owns; there may be none."""
         mesh = self.body.mesh
-        return contact_facets(mesh.mesh, mesh.facet_tags.find(self.marker), self.frame)
+        return contact_facets(mesh.mesh, mesh.facet_tags.find(self.marker), UPWARD)
+
+    @cached_property
+    def modulus(self) -> float:
+        """Largest contact modulus E* of the cells behind the face [MPa].
+
+        Raises:
+            InputError: When no facet has the marker.
+        """
+        behind = self.body.materials_of(self.facets.cell)
+        if not behind:
+            raise InputError("no facet of the body has this marker", value=self.marker)
+        return max(material.contact_modulus for material in behind)
 
     @property
     def whole(self) -> PatchGrid:
         """One patch of the whole face."""
         return PatchGrid(grid=(1, 1), lengths=self.lengths)
 
-    def loaded(self, degree: int) -> LoadedFace:
-        """Return the face with quadrature that is exact for a polynomial degree."""
-        return LoadedFace(self.body, self.facets, self.whole, degree)
-
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+    @cached_property
+    def loaded(self) -> LoadedFace:
+        """The face with quadrature that is exact for products of two basis functions."""
+        return LoadedFace(self.body, self.facets, self.whole, 2 * self.body.degree)
 
 
 class PlaneOverNodes:
@@ -232,6 +189,20 @@ def not_found(control: Control, reason: str, iterations: int) -> NotConverged:
     )
 
 
+class Guess(NamedTuple):
+    """Where an iteration on meshed roughness starts, and what a solution is for further ones.
+
+    Attributes:
+        plane: Approach [mm] and slopes of the plane, shape (3,).
+        displacement: This rank's owned degrees of freedom [mm].
+        contact: Contact forces of its nodes, or pressures of its quadrature points, shape (n,).
+    """
+
+    plane: Array
+    displacement: Array
+    contact: Array
+
+
 class ContactSolution(NamedTuple):
     """Contact of a rough top with a rigid plane; arrays hold this rank's part.
 
@@ -246,7 +217,7 @@ class ContactSolution(NamedTuple):
 
     end: Guess
     nodal_force: Array
-    touching: NDArray[np.bool_]
+    touching: Flags
     iterations: int
     linear_iterations: int
     reason: str
@@ -262,4 +233,4 @@ def largest(values: Array, comm: Any) -> float:
     Note:
         Collective.
     """
-    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), op=MPI.MAX))
+    return float(comm.allreduce(float(np.abs(values).max(initial=0.0)), max))

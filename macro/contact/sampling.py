@@ -11,14 +11,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from support.arrays import Array
 from support.checks import real_array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +74,7 @@ class Sampling:
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
-        return self.operator.comm.tompi4py().allreduce(local, op=MPI.SUM)
+        return self.operator.comm.tompi4py().allreduce(local)
 
     def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
         """Return functions of closure, one per patch, at this rank's samples, shape (n,).

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 import numpy as np
-from mpi4py import MPI
 
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
@@ -19,8 +18,7 @@ from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
 from macro.contact.face_contact_state import FaceContactState, NodalContact
 from macro.contact.face_nodes import TopNodes
-from macro.contact.initial_guess import Extrapolation
-from macro.contact.rough_face import ContactSolution, PlaneOverNodes, RoughFace
+from macro.contact.rough_face import ContactSolution, Guess, PlaneOverNodes, RoughFace
 from support.errors import InputError
 
 Method = Literal["active-set", "augmented-lagrangian"]
@@ -31,8 +29,7 @@ class UnilateralContactProblem:
 
     Args:
         body: A block whose top is rough, or the rough face of any body.
-        reference_height: Height of the highest point above the plane of the face's frame, from
-            which the approach counts [mm].
+        reference_height: Height z of the highest point, from which the approach counts [mm].
         method: ``"active-set"``: no node of the top lies behind the plane;
             ``"augmented-lagrangian"``: no quadrature point of its facets does.
         patches: Patches on the top, for forces and areas by patch; None: one of the whole top.
@@ -74,7 +71,8 @@ class UnilateralContactProblem:
         self._plane = PlaneOverNodes(x, y, distance, face.lengths, self.body.comm)
         kind = PrimalDualActiveSet if method == "active-set" else AugmentedLagrangian
         self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(face, self.top, self._plane)
-        self._history = Extrapolation(self.body.owned_dofs, self.method.points)
+        self._at_rest = Guess(*map(np.zeros, (3, self.body.owned_dofs, self.method.points)))
+        self._last: list[tuple[Guess, float]] = []
 
     def solve(self, control: Control) -> FaceContactState:
         """Find the contact of one load step, with an initial guess from the steps before.
@@ -90,13 +88,29 @@ class UnilateralContactProblem:
             NotConverged: When an iteration fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        guess = self._history.guess(control)
+        guess = self._extrapolated(control)
         guess = guess._replace(plane=self._plane.placed(control, guess.plane))
         solution = self.method.solve(control, guess)
         state = self._state(solution)
-        self._history.add(solution.end, state.force)
+        self._last = [*self._last[-1:], (solution.end, state.force)]
         compat.collect_garbage(self.body.stiffness.comm)
         return state
+
+    def _extrapolated(self, control: Control) -> Guess:
+        """Return the line through the last two solutions at the prescribed approach or force.
+
+        It goes at most as far, forwards or backwards, as they are apart.
+        """
+        if not self._last:
+            return self._at_rest
+        (before, force_before), (last, force) = self._last[0], self._last[-1]
+        if control.approach is not None:
+            run, ahead = last.plane[0] - before.plane[0], control.approach - last.plane[0]
+        else:
+            run, ahead = force - force_before, (control.force or 0.0) - force
+        share = float(np.clip(ahead / run, -1.0, 1.0)) if run else 0.0
+        pairs = zip(last, before, strict=True)
+        return Guess(*(new + share * (new - old) for new, old in pairs))
 
     def _state(self, solution: ContactSolution) -> FaceContactState:
         """Return the state of a solution; collective."""
@@ -112,7 +126,7 @@ class UnilateralContactProblem:
         weight = np.stack([top.area, top.area * gap, area, touching], axis=1)
         region, contacts = top.regions(touching)
         pressure, patch_force = top.pressure(nodal_force), top.patch_sums(solution.nodal_force)
-        whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0), op=MPI.SUM)
+        whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0))
         (approach, tx, ty), (xc, yc) = map(float, plane), map(float, self._plane.centre)
         return FaceContactState(
             plane=RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)),
@@ -132,7 +146,7 @@ class UnilateralContactProblem:
             nodes=round(nodes),
             contacts=contacts,
             mean_separation=float(volume / whole),
-            peak_pressure=body.comm.allreduce(float(pressure.max(initial=0.0)), op=MPI.MAX),
+            peak_pressure=body.comm.allreduce(float(pressure.max(initial=0.0)), max),
             nodal=NodalContact(
                 x=top.x,
                 y=top.y,

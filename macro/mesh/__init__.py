@@ -1,1 +1,1 @@
-"""Meshes of blocks in dolfinx, and what their contact face consists of."""
+"""Meshes of blocks, flat and rough, and of bodies in dolfinx, and what their faces consist of."""

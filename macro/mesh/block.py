@@ -1,8 +1,10 @@
-"""Distributed dolfinx meshes of blocks with marked faces, by gmsh or as a lattice."""
+"""Distributed dolfinx meshes of blocks with marked faces, by gmsh or as a lattice; rough ones, too.
+
+Theory: section 12 of ``docs/theory.md``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
@@ -20,9 +22,11 @@ from geometry.meshes.lattice import (
     node_share,
 )
 from geometry.meshes.refined_block import RefinedShape
-from geometry.meshes.stepped import SteppedShape
+from geometry.surface import Surface
 from macro import compat
+from macro.mesh.facets import exterior_facets
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.collective import on_root
 from support.errors import InputError
 
@@ -32,28 +36,31 @@ BOTTOM, TOP, SIDES = 1, 2, 3
 FLAT = 1e-9
 """Distance from a face, relative to the size of a body that was meshed here, that is rounding."""
 
+_DECAY = 3.0
+"""Power of the height above the bottom with which the roughness decays into the depth."""
+
+_LEAST_VOLUME = 0.05
+"""Smallest volume of a cell relative to that in the flat block; smaller cells are refused."""
+
+_STEEPEST = 2.0
+"""Largest slope between neighbouring nodes; steeper tops are refused (edges 27° apart)."""
+
+_EDGES = np.array([(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)])
+"""Ends of a quadratic tetrahedron's edges, in dolfinx's order of the nodes 4 … 9 between them."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BlockMesh:
-    """A block's mesh, distributed over the ranks of a communicator.
+class BlockMesh(TaggedMesh):
+    """A block's mesh, its facets marked BOTTOM, TOP or SIDES.
 
     Args:
-        mesh: The dolfinx mesh; lengths in mm.
-        facet_tags: Its outer facets that this rank owns, marked BOTTOM, TOP or SIDES.
         shape: The shape that was meshed.
         planes: Indices of the grid planes across x, y and z that every row of ``mesh.geometry.x``
             lies on in the flat block, shape (n, 3); None for meshes without grid planes.
     """
 
-    mesh: Any
-    facet_tags: Any
     shape: BlockShape | RefinedShape
     planes: NDArray[np.intp] | None = None
-
-    @property
-    def comm(self) -> Any:
-        """Communicator of the mesh."""
-        return self.mesh.comm
 
 
 def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
@@ -76,30 +83,24 @@ def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
         3·10⁶ hexahedra on two ranks take 5 s and 1.1 GB each. Four fifths are spent on dolfinx'
         topology and geometry, a sixth on facets.
     """
+    planes = None
     if isinstance(shape, BlockShape):
-        return _from_lattice(shape, comm)
-    mesh = _from_gmsh(shape, comm)
-    return BlockMesh(mesh=mesh, facet_tags=_faces(mesh, shape.height), shape=shape)
+        mesh, planes = _from_lattice(shape, comm)
+    else:
+        with ExitStack() as gmsh_session:
+            models: list[Any] = []
+            on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
+            mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
+        mesh.geometry.x[:] *= shape.unit
+    facets = exterior_facets(mesh)
+    level = dmesh.compute_midpoints(mesh, 2, facets)[:, 2] / shape.height
+    markers = np.select([level < -1.0 + FLAT, level > -FLAT], [BOTTOM, TOP], SIDES)
+    tags = dmesh.meshtags(mesh, 2, facets, markers.astype(np.int32))
+    return BlockMesh(mesh=mesh, facet_tags=tags, shape=shape, planes=planes)
 
 
-def _from_gmsh(shape: RefinedShape | SteppedShape, comm: Any) -> Any:
-    """Return the mesh that gmsh makes on rank 0, distributed."""
-    with ExitStack() as gmsh_session:
-        models: list[Any] = []
-        on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
-        mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
-    mesh.geometry.x[:] *= shape.unit
-    return mesh
-
-
-def _outer_facets(mesh: Any) -> tuple[NDArray[np.int32], NDArray[np.float64]]:
-    """Return the outer facets of this rank, shape (n,), and their middles (n, 3) [mm]."""
-    mesh.topology.create_connectivity(2, 3)
-    facets = np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
-    return facets, dmesh.compute_midpoints(mesh, 2, facets)
-
-
-def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
+def _from_lattice(shape: BlockShape, comm: Any) -> tuple[Any, NDArray[np.intp]]:
+    """Return the mesh of a lattice, and the planes that its nodes lie on."""
     x, y, z = ticks = shape.ticks
     counts = (len(x) - 1, len(y) - 1, len(z) - 1)
     part = lattice_part(counts, comm.size, comm.rank)
@@ -110,54 +111,178 @@ def _from_lattice(shape: BlockShape, comm: Any) -> BlockMesh:
     points = node_share(ticks, comm.size, comm.rank)
     mesh = compat.mesh_from_cells(cells, points, (boxes, others), comm)
     numbers = np.asarray(mesh.geometry.input_global_indices, dtype=np.int64)  # empty lists too
-    return BlockMesh(
-        mesh=mesh,
-        facet_tags=_faces(mesh, shape.height),
-        shape=shape,
-        planes=node_planes(counts, numbers),
-    )
+    return mesh, node_planes(counts, numbers)
 
 
-def _faces(mesh: Any, height: float) -> Any:
-    """Return the outer facets of this rank, marked by the height of their middles."""
-    facets, middles = _outer_facets(mesh)
-    level = middles[:, 2] / height
-    markers = np.select([level < -1.0 + FLAT, level > -FLAT], [BOTTOM, TOP], SIDES)
-    return dmesh.meshtags(mesh, 2, facets, markers.astype(np.int32))
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MeshQuality:
+    """How far the roughness has deformed the cells.
+
+    Attributes:
+        thinnest: Smallest volume at a node of a cell (the Jacobian of its map), relative to that
+            of the flat block; negative in a cell turned inside out.
+        steepest: Largest slope of an edge of the top.
+    """
+
+    thinnest: float
+    steepest: float
 
 
-ROUGH = "rough"
-"""Name of the contact face."""
+def rough_block_mesh(
+    shape: BlockShape | RefinedShape, surface: Surface, comm: Any
+) -> tuple[BlockMesh, MeshQuality]:
+    """Mesh a flat block and move its nodes onto the roughness.
 
+    The top becomes z = h(x, y) − <h>, with the surface's interpolant h at the nodes. Below the top
+    the movement decays as (1 + z/height)³. Every rank moves its own nodes.
 
-def stepped_mesh(
-    shape: SteppedShape, planes: Mapping[str, tuple[int, float]], comm: Any
-) -> TaggedMesh:
-    """Mesh a block on boxes, distributed over all ranks.
+    The edges of quadratic tetrahedra bend with the roughness. They stay straight in the few cells
+    that bending would turn inside out: cells far from contact that are long beside its waves.
+
+    Along a vertical line the movement keeps the order of points if the deepest valley lies less
+    than height/3 below the mean. Hexahedra have vertical sides and then stay valid; tetrahedra are
+    checked one by one.
 
     Args:
-        shape: The body and its cells.
-        planes: Surfaces to mark, such as those of supports: by name the axis that a plane is
-            perpendicular to (0, 1, 2) and its coordinate [mm]. The contact face is marked as
-            ``ROUGH``.
-        comm: MPI communicator that the mesh will live on.
+        shape: The flat block, without margin; its interface is the surface's rectangle.
+        surface: The rough surface.
+        comm: MPI communicator.
 
     Raises:
-        InputError: When gmsh cannot make the body, or no facet lies in a plane.
+        InputError: When the rectangles differ, a valley is too deep for the block, the roughness
+            is too steep for the mesh, or it turns a cell inside out.
 
     Note:
-        Collective. It is meshed whole on rank 0, as refined blocks are.
+        Collective.
     """
-    mesh = _from_gmsh(shape, comm)
-    facets, middles = _outer_facets(mesh)
-    markers, names = np.zeros(len(facets), dtype=np.int32), {}
-    for number, (name, (axis, at)) in enumerate({ROUGH: (2, 0.0), **planes}.items(), start=1):
-        inside = np.abs(middles[:, axis] - at) < FLAT * shape.unit
-        if not comm.allreduce(int(inside.sum())):
-            raise InputError(
-                f"no outer facet lies in the plane {name!r}", value=at, allowed="a face of the body"
-            )
-        markers[inside], names[name] = number, number
-    marked = markers > 0
-    tags = dmesh.meshtags(mesh, 2, facets[marked], markers[marked])
-    return TaggedMesh(mesh=mesh, facet_tags=tags, facet_names=names)
+    if shape.margin or not np.allclose(shape.interface, surface.lengths, rtol=1e-9, atol=0.0):
+        raise InputError(
+            "the rough surface must cover the block's top",
+            value=shape.interface,
+            allowed=f"an interface of {surface.lengths} mm without margin",
+        )
+    _check_depth(shape.height, surface)
+    flat = block_mesh(shape, comm)
+    return flat, move_onto(flat.mesh, surface, shape.height)
+
+
+def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
+    """Move the nodes below a planar face onto the roughness; see `rough_block_mesh`.
+
+    The face is the rectangle [0, Lx] × [0, Ly] at z = 0. Down to a depth below it the body must be
+    a block with vertical sides; the movement decays to that depth, and nothing moves below it.
+
+    Args:
+        mesh: The dolfinx mesh of a body with a flat face.
+        surface: The rough surface, which covers the face.
+        depth: Height of the block under the face [mm].
+
+    Raises:
+        InputError: When the body is no such block below the face, a valley is too deep for it, the
+            roughness is too steep for the mesh, or it turns a cell inside out.
+
+    Note:
+        Collective.
+    """
+    points, comm = mesh.geometry.x, mesh.comm
+    _check_depth(depth, surface)
+    _check_sides(mesh, surface, depth)
+    x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
+    rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
+    moved = points.copy()
+    moved[:, 2] += rise * np.maximum(1.0 + points[:, 2] / depth, 0.0) ** _DECAY
+    if compat.geometry_degree(mesh) == 2:
+        _straighten(mesh, moved)
+    quality = MeshQuality(
+        thinnest=float(comm.allreduce(_volumes(mesh, moved).min(initial=np.inf), min)),
+        steepest=float(comm.allreduce(_steepest(mesh, depth, rise), max)),
+    )
+    if quality.steepest > _STEEPEST:
+        raise InputError(
+            "the roughness is too steep for a mesh",
+            value=quality.steepest,
+            allowed=f"slopes up to {_STEEPEST:g} between neighbouring nodes of the top",
+        )
+    if quality.thinnest <= _LEAST_VOLUME:
+        raise InputError(
+            "the roughness turns cells inside out, which are much longer than its waves",
+            value=quality.thinnest,
+            allowed=f"cells that keep {_LEAST_VOLUME:.0%} of their volume at every node",
+        )
+    points[:] = moved
+    return quality
+
+
+def _check_depth(depth: float, surface: Surface) -> None:
+    valley = surface.mean_height - float(surface.heights.min())
+    deepest = (1.0 - _LEAST_VOLUME) * depth / _DECAY
+    if valley > deepest:
+        raise InputError(
+            "a valley of the roughness is too deep for the block",
+            value=valley,
+            allowed=f"{deepest:.6g} mm below the mean, for a block {depth:g} mm high",
+        )
+
+
+def _check_sides(mesh: Any, surface: Surface, depth: float) -> None:
+    """Refuse bodies that are wider, or higher, than the block under their face; collective."""
+    points, slack = mesh.geometry.x, FLAT * max(*surface.lengths, depth)
+    above = points[points[:, 2] > -depth + slack]
+    beyond = np.maximum(-above, above - np.array([*surface.lengths, 0.0]))
+    beyond[:, 2] = above[:, 2]
+    worst = mesh.comm.allreduce(float(beyond.max(initial=0.0)), max)
+    if worst > slack:
+        raise InputError(
+            "the body is wider than its rough face within the depth that the roughness decays in",
+            value=worst,
+            allowed=f"a block of {surface.lengths} mm, from z = 0 to {-depth:g} mm",
+        )
+
+
+def _straighten(mesh: Any, moved: Array) -> None:
+    """Move the middle nodes of edges onto the chord in cells that bend too much, on all ranks.
+
+    They are those that bending leaves less than 0.3 of their volume at a node.
+    """
+    cells, names = compat.cell_vertices(mesh), mesh.geometry.input_global_indices
+    done: Array = np.empty(0, dtype=np.int64)
+    while True:
+        middles = cells[:, 4:]
+        bent = np.unique(np.asarray(names)[middles[_volumes(mesh, moved) < 0.3]])
+        straight = np.union1d(done, np.concatenate(mesh.comm.allgather(bent)))
+        if len(straight) == len(done):
+            return
+        done = straight
+        cell, edge = np.nonzero(np.isin(np.asarray(names)[middles], done))
+        ends = cells[cell[:, None], _EDGES[edge]]
+        moved[middles[cell, edge], 2] = moved[ends, 2].mean(axis=1)
+
+
+def _volumes(mesh: Any, moved: Array) -> Array:
+    """Return each cell's smallest ratio of the volumes at its nodes after and before a movement.
+
+    Nodes move along z alone, which changes one row of the Jacobian matrix.
+    """
+    cells, points = compat.cell_vertices(mesh), mesh.geometry.x
+    x, y, before, after = (row[cells] for row in (*points.T, moved[:, 2]))
+    smallest = np.full(len(cells), np.inf)
+    degree = compat.geometry_degree(mesh)
+    for slopes in compat.lagrange_gradients(mesh.topology.cell_name(), degree):
+        normal = np.cross(x @ slopes, y @ slopes)
+        volumes = (np.einsum("ci,ci->c", normal, z @ slopes) for z in (after, before))
+        np.minimum(smallest, np.divide(*volumes), out=smallest)
+    return smallest
+
+
+def _steepest(mesh: Any, depth: float, rise: Array) -> float:
+    """Return the largest slope between horizontal neighbours on the top."""
+    points = mesh.geometry.x
+    cells = compat.cell_vertices(mesh)
+    top = np.abs(points[:, 2]) < FLAT * depth
+    cells = cells[top[cells].any(axis=1)]
+    i, j = np.triu_indices(cells.shape[1], 1)
+    a, b = cells[:, i].ravel(), cells[:, j].ravel()
+    both = top[a] & top[b]
+    a, b = a[both], b[both]
+    run = np.linalg.norm(points[a, :2] - points[b, :2], axis=1)
+    return float((np.abs(rise[a] - rise[b]) / run).max(initial=0.0))

@@ -10,24 +10,14 @@ from numpy.typing import NDArray
 from macro import compat
 from macro.mesh.facets import facets_between_ranks, inner_facets, parts
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_FLAT = 1e-8
-"""Volume at a corner, relative to the product of its edges, that counts as none."""
 
 _CHUNK = 1 << 14
 """Cells that are checked at a time, which bounds the memory to 10 MB."""
 
 _SMALL, _LARGE = 1.0, 2.0e4
 """Diagonals of bodies beyond which the unit of their mesh is in doubt [mm]."""
-
-_SMALLEST, _LARGEST = 1e-4, 1e7
-"""Diagonals beyond which no body is meant [mm]."""
-
-_SHOWN = 5
-"""Parts of a mesh whose sizes a message lists."""
 
 
 def check_cells(tagged: TaggedMesh) -> None:
@@ -53,7 +43,7 @@ def check_cells(tagged: TaggedMesh) -> None:
     for start in range(0, len(vertices), _CHUNK):
         part = slice(start, start + _CHUNK)
         quality[part], hands[part] = _volumes(mesh.geometry.x[vertices[part]])
-    bad = quality <= _FLAT
+    bad = quality <= 1e-8  # of the product of the edges
     handedness = {hand for hands_there in comm.allgather(set(hands[~bad])) for hand in hands_there}
     if len(handedness) > 1:
         bad |= _folded(mesh, vertices)
@@ -131,7 +121,7 @@ def check_connected(tagged: TaggedMesh) -> None:
     """
     sizes = parts(tagged.mesh)
     if len(sizes) > 1:
-        shown = ", ".join(str(size) for size in sizes[:_SHOWN]) + ", …" * (len(sizes) > _SHOWN)
+        shown = ", ".join(str(size) for size in sizes[:5]) + ", …" * (len(sizes) > 5)
         raise InputError(
             f"the mesh is in {len(sizes)} parts that share no facets, of {shown} cells; where "
             "volumes touch they must share nodes (in gmsh: fragment them before meshing)",
@@ -139,42 +129,30 @@ def check_connected(tagged: TaggedMesh) -> None:
         )
 
 
-def check_size(tagged: TaggedMesh, *, key: str | None = None) -> None:
-    """Refuse bodies of a size that only a wrong unit gives.
-
-    Args:
-        tagged: The mesh.
-        key: Key of the scene that says the unit, for the error.
-
-    Raises:
-        InputError: On all ranks.
-
-    Note:
-        Collective.
-    """
-    lower, upper = tagged.bounding_box()
-    size = float(np.linalg.norm(upper - lower))
-    if not _SMALLEST <= size <= _LARGEST:
-        raise InputError(
-            f"the body's mesh would be {size:.3g} mm large",
-            key=key,
-            allowed=f"a unit that makes it {_SMALLEST:g} … {_LARGEST:g} mm large",
-        )
-
-
-def size_note(tagged: TaggedMesh) -> str | None:
+def size_note(tagged: TaggedMesh, *, key: str | None = None) -> str | None:
     """Return a note where the size of the mesh suggests that its unit was mistaken, else None.
 
     Args:
         tagged: The mesh [mm].
+        key: Key of the scene that says the unit, for the error.
+
+    Raises:
+        InputError: On all ranks, when only a wrong unit gives such a size.
 
     Note:
         Collective.
     """
     lower, upper = tagged.bounding_box()
-    lengths = upper - lower
-    if _SMALL <= np.linalg.norm(lengths) <= _LARGE:
+    lengths, size = upper - lower, float(np.linalg.norm(upper - lower))
+    least, most = 1e-4, 1e7
+    if not least <= size <= most:
+        raise InputError(
+            f"the body's mesh would be {size:.3g} mm large",
+            key=key,
+            allowed=f"a unit that makes it {least:g} … {most:g} mm large",
+        )
+    if _SMALL <= size <= _LARGE:
         return None
-    size = " × ".join(f"{length:.4g}" for length in lengths)
-    guess = '"m"' if np.linalg.norm(lengths) < _SMALL else '"mm" or "um"'
-    return f"the mesh of the body is {size} mm large; is its unit right? (mesh_unit = {guess}?)"
+    sides = " × ".join(f"{length:.4g}" for length in lengths)
+    guess = '"m"' if size < _SMALL else '"mm" or "um"'
+    return f"the mesh of the body is {sides} mm large; is its unit right? (mesh_unit = {guess}?)"

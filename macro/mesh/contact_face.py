@@ -14,13 +14,7 @@ from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
 from macro.mesh.facets import facet_indices, facet_nodes
-
-Array = NDArray[np.float64]
-
-_BILINEAR_STEPS = 8
-"""Newton steps that invert the bilinear map of a quadrilateral; a parallelogram needs none."""
-_BENT = 1e-12
-"""Deviation from a parallelogram, relative to its edges, that is rounding."""
+from support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -87,6 +81,10 @@ class ContactFacets:
             self, **{name: np.concatenate([getattr(p, name) for p in parts]) for name in arrays}
         )
 
+    def moved(self, x: float, y: float) -> ContactFacets:
+        """Return the facets with coordinates that count from a point of the plane [mm]."""
+        return replace(self, frame=self.frame.moved(x, y), corners=self.corners - (x, y))
+
     def local(self, facet: NDArray[np.intp], points: Array) -> Array:
         """Return the coordinates of points on the unit triangle or square, shape (n, 2).
 
@@ -101,9 +99,10 @@ class ContactFacets:
         if corners.shape[1] == 3:
             return s
         twist = corners[:, 0] - corners[:, 1] - corners[:, 2] + corners[:, 3]
-        bent = (np.abs(twist).max(axis=1) > _BENT * np.abs(edges).max(axis=(1, 2)))[facet]
+        # a parallelogram needs no Newton step to invert the map
+        bent = (np.abs(twist).max(axis=1) > 1e-12 * np.abs(edges).max(axis=(1, 2)))[facet]
         edges, twist = edges[facet[bent]], twist[facet[bent]]
-        for _ in range(_BILINEAR_STEPS if bent.any() else 0):
+        for _ in range(8 if bent.any() else 0):
             at = s[bent]
             miss = np.einsum("nij,nj->ni", edges, at) + twist * at.prod(axis=1)[:, None]
             slope = edges + twist[:, :, None] * at[:, None, ::-1]

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from dolfinx import mesh as dmesh
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from macro import compat
+from support.arrays import Array, Indices
 from support.errors import InputError
 
 Ints = NDArray[np.int64]
@@ -129,42 +131,19 @@ def facets_between_ranks(mesh: Any) -> tuple[Ints, Ints, Ints]:
 
     Returns:
         The facets' global numbers, this rank's cells, and the indices in them, shapes (n,).
-
-    Note:
-        Collective.
     """
-    facet, cell, side, common = _single(mesh)
-    return facet[common], cell[common], side[common]
-
-
-def outer_sides(mesh: Any) -> tuple[Ints, Ints]:
-    """Return the outer facets of the cells that this rank owns.
-
-    Args:
-        mesh: dolfinx mesh.
-
-    Returns:
-        The cell of every facet and its index there, shapes (n,).
-
-    Note:
-        Collective.
-    """
-    _, cell, side, common = _single(mesh)
-    return cell[~common], side[~common]
-
-
-def _single(mesh: Any) -> tuple[Ints, Ints, Ints, NDArray[np.bool_]]:
-    """Return the facets of one owned cell: numbers, cells, places, and if another rank has them."""
     facet, cell, side = _sides(mesh)
-    single = np.ones(len(facet), dtype=bool)
-    single[1:] &= facet[1:] != facet[:-1]
-    single[:-1] &= facet[:-1] != facet[1:]
-    facet, cell, side = facet[single], cell[single], side[single]
-    numbers = mesh.topology.index_map(2)
-    known = np.asarray(numbers.local_to_global(facet.astype(np.int32)), dtype=np.int64)
-    foreign = known[facet >= numbers.size_local]
-    common = np.isin(known, np.concatenate(mesh.comm.allgather(foreign)))
-    return known, cell, side, common
+    common = ~np.isin(facet, exterior_facets(mesh))
+    common[1:] &= facet[1:] != facet[:-1]
+    common[:-1] &= facet[:-1] != facet[1:]
+    numbers = mesh.topology.index_map(2).local_to_global(facet[common].astype(np.int32))
+    return np.asarray(numbers, dtype=np.int64), cell[common], side[common]
+
+
+def exterior_facets(mesh: Any) -> NDArray[np.int32]:
+    """Return the outer facets of the cells that this rank owns, ascending, shape (n,)."""
+    mesh.topology.create_connectivity(2, 3)
+    return np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
 
 
 def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
@@ -179,16 +158,13 @@ def _sides(mesh: Any) -> tuple[Ints, Ints, Ints]:
     return facet[order].astype(np.int64), order // sides, order % sides
 
 
-Array = NDArray[np.float64]
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OuterFacets:
     """Outer facets of the cells that this rank owns, and q quadrature points on each.
 
     Args:
-        cell: Rank-local cell of every facet, shape (f,).
-        side: Index of the facet in its cell, shape (f,).
+        facet: Rank-local index of every facet, shape (f,).
+        side: Its index in its cell, shape (f,).
         points: Places, shape (f, q, 3) [mm].
         normals: Outward unit normals, shape (f, q, 3).
         weights: Weights, whose sum over all ranks is the area of the body, shape (f, q) [mm²].
@@ -196,8 +172,8 @@ class OuterFacets:
         values: Basis functions of these nodes by the side of the cell, shape (sides, q, m).
     """
 
-    cell: NDArray[np.int64]
-    side: NDArray[np.int64]
+    facet: NDArray[np.int32]
+    side: Indices
     points: Array
     normals: Array
     weights: Array
@@ -211,15 +187,8 @@ class OuterFacets:
 
     def among(self, chosen: NDArray[np.bool_]) -> OuterFacets:
         """Return some of the facets, shape of the choice (f,)."""
-        return OuterFacets(
-            cell=self.cell[chosen],
-            side=self.side[chosen],
-            points=self.points[chosen],
-            normals=self.normals[chosen],
-            weights=self.weights[chosen],
-            nodes=self.nodes[chosen],
-            values=self.values,
-        )
+        names = ("facet", "side", "points", "normals", "weights", "nodes")
+        return replace(self, **{name: getattr(self, name)[chosen] for name in names})
 
 
 def outer_facets(space: Any, exact: int) -> OuterFacets:
@@ -235,7 +204,9 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     mesh = space.mesh
     name, degree = mesh.topology.cell_name(), compat.lagrange_degree(space)
     vertices, corners = compat.reference_facets(name)
-    cell, side = outer_sides(mesh)
+    facets = exterior_facets(mesh)
+    outer = facet_nodes(mesh, facets)
+    cell, side = outer.cell, outer.side
     shape_nodes = compat.cell_vertices(mesh)[cell]
     shape = compat.geometry_degree(mesh)
     rule, weights = _facet_rule(corners.shape[1], exact)
@@ -257,7 +228,7 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     areas *= outwards[side, None, None]
     sizes = np.linalg.norm(areas, axis=2)
     return OuterFacets(
-        cell=cell,
+        facet=facets,
         side=side,
         points=np.einsum("fqa,faj->fqj", values[side], places),
         normals=areas / sizes[..., None],

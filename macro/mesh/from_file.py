@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,8 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
             file=str(path),
             allowed=".msh of gmsh, .xdmf of dolfinx",
         )
-    on_root(comm, lambda: _check_there(path))
+    if not on_root(comm, path.is_file):
+        raise InputError("there is no such file", file=str(path))
     try:
         tagged = reader(path, comm)
         tagged.mesh.geometry.x[:] *= unit
@@ -62,32 +64,24 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
     return tagged
 
 
-def _check_there(path: Path) -> None:
-    if not path.is_file():
-        raise InputError("there is no such file", file=str(path))
-
-
 def _from_gmsh(path: Path, comm: Any) -> TaggedMesh:
-    """Distribute what gmsh reads on rank 0."""
+    """Distribute what a file of gmsh has, which rank 0 reads."""
     whole: list[MeshArrays] = []
-    on_root(comm, lambda: whole.append(read_gmsh_file(path)))
 
-    def marks() -> tuple[Any, ...]:
-        of = whole[0]
-        tables = of.facets, of.facet_tags, of.cell_tags
-        return of.cells.shape[1], *tables, of.facet_names, of.cell_names
+    def read() -> MeshArrays:
+        """Return all but cells and nodes, of which there are many."""
+        whole.append(read_gmsh_file(path))
+        return replace(whole[0], cells=whole[0].cells[:0], points=whole[0].points[:0])
 
-    corners, facets, tags_of_facets, tags_of_cells, facet_names, cell_names = on_root(comm, marks)
-    cells, points = np.empty((0, corners), np.int64), np.empty((0, 3))
-    if whole:
-        cells, points = whole[0].cells, whole[0].points
-    mesh = compat.partitioned_mesh(cells, points, comm)
+    known = on_root(comm, read)
+    own = whole[0] if whole else known
+    mesh, names = compat.mesh_from_cells(own.cells, own.points, None, comm), known.facet_names
     return TaggedMesh(
         mesh=mesh,
-        facet_tags=facet_tags(mesh, facets, tags_of_facets, facet_names),
-        cell_tags=cell_tags(mesh, tags_of_cells),
-        facet_names=facet_names,
-        cell_names=cell_names,
+        facet_tags=facet_tags(mesh, known.facets, known.facet_tags, names),
+        cell_tags=cell_tags(mesh, known.cell_tags),
+        facet_names=names,
+        cell_names=known.cell_names,
     )
 
 

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from macro.mesh.facets import facet_nodes
 from macro.mesh.tagged import TaggedMesh
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_FREE = 1e-12
-"""Square of a support's movement, relative to the largest in a motion of the same size, that is
-rounding: supports over a part in 10⁶ of the body's length still hold rotations."""
 
 _SHARP = 1e-6
 """Component of a motion's direction that is rounding."""
@@ -53,119 +49,94 @@ def check_supports(
     tagged: TaggedMesh,
     supports: Sequence[Support],
     contact: int | None = None,
+    tractions: Sequence[Traction] = (),
     *,
     key: str | None = None,
 ) -> None:
-    """Refuse supports that do not hold the body, or that are on the contact face.
+    """Refuse supports that do not hold the body, and loads that do nothing.
 
     Args:
         tagged: The mesh.
         supports: Surfaces with prescribed displacements.
         contact: Tag of the contact face.
-        key: Key of the scene that the supports come from, for errors.
+        tractions: Surfaces under tractions.
+        key: Section of the scene that has ``supports`` and ``tractions``, for errors.
 
     Raises:
-        InputError: On all ranks, when a support has no facets, when one is the contact face, when
-            two prescribe different displacements of one surface or of nodes that two surfaces
-            share, and when a rigid motion is left; the error says which.
+        InputError: On all ranks, when a surface has no facets or is the contact face, when two
+            supports prescribe different displacements of one surface or of nodes that two surfaces
+            share, when a traction acts along what a support holds, and when a rigid motion is left;
+            the error says which.
 
     Note:
         Collective.
     """
-    held: dict[tuple[int, int], float] = {}
+    where = key and f"{key}.supports"
     for support in supports:
-        name = _checked_name(tagged, support.tag, contact, "held", key)
-        for axis, value in enumerate(support.displacement):
-            if value is not None and held.setdefault((support.tag, axis), value) != value:
-                raise InputError(
-                    f"the surface {name!r} is held twice along {'xyz'[axis]}, with displacements "
-                    f"{held[support.tag, axis]:g} and {value:g} mm",
-                    key=key,
-                )
-    _check_common_nodes(tagged, held, key)
+        _check_surface(tagged, support.tag, contact, "held", where)
+    for one, other in combinations(supports, 2):
+        for axis, pair in enumerate(zip(one.displacement, other.displacement, strict=True)):
+            if None not in pair and pair[0] != pair[1]:
+                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, where)
     left = free_motions(tagged, supports)
     if left:
         raise InputError(
             f"the supports leave the body free to move: {'; '.join(left)}",
-            key=key,
+            key=where,
             allowed="supports that hold all rigid motions, without help of the contact",
         )
-
-
-def check_tractions(
-    tagged: TaggedMesh,
-    tractions: Sequence[Traction],
-    supports: Sequence[Support],
-    contact: int | None = None,
-    *,
-    key: str | None = None,
-) -> None:
-    """Refuse tractions that are no loads: on the contact face, or along what supports hold.
-
-    Args:
-        tagged: The mesh.
-        tractions: Surfaces under tractions.
-        supports: Surfaces with prescribed displacements.
-        contact: Tag of the contact face.
-        key: Key of the scene that the tractions come from, for errors.
-
-    Raises:
-        InputError: On all ranks.
-
-    Note:
-        Collective.
-    """
     for traction in tractions:
-        name = _checked_name(tagged, traction.tag, contact, "loaded", key)
+        _check_surface(tagged, traction.tag, contact, "loaded", key and f"{key}.tractions")
         for support in supports:
             for axis, stress in enumerate(traction.stress):
                 on_held = support.tag == traction.tag and support.displacement[axis] is not None
                 if on_held and stress:
                     raise InputError(
-                        f"the surface {name!r} is held along {'xyz'[axis]}, where a traction of "
-                        f"{stress:g} MPa does nothing",
-                        key=key,
+                        f"the surface {tagged.facet_name(support.tag)!r} is held along "
+                        f"{'xyz'[axis]}, where a traction of {stress:g} MPa does nothing",
+                        key=key and f"{key}.tractions",
                         allowed="tractions along directions that no support holds",
                     )
 
 
-def _checked_name(
+def _check_surface(
     tagged: TaggedMesh, tag: int, contact: int | None, how: str, key: str | None
-) -> str:
-    """Return the name of a surface that is to be held or loaded, after refusing what cannot be."""
-    names = {tag: name for name, tag in tagged.facet_names.items()}
-    name = names.get(tag, str(tag))
+) -> None:
+    """Refuse surfaces that cannot be held or loaded."""
+    name = tagged.facet_name(tag)
     if tag == contact:
         raise InputError(
             f"the surface {name!r} is the contact face and cannot be {how} too", key=key
         )
     if not any(tagged.comm.allgather(len(tagged.facet_tags.find(tag)))):
         raise InputError(f"the surface {name!r} has no facets that belong to cells", key=key)
-    return name
 
 
-def _check_common_nodes(
-    tagged: TaggedMesh, held: Mapping[tuple[int, int], float], key: str | None
+def _check_apart(
+    tagged: TaggedMesh, tags: tuple[int, int], axis: str, values: Any, key: str | None
 ) -> None:
-    """Refuse different displacements of one node, on the edge between two surfaces."""
-    mesh, names = tagged.mesh, {tag: name for name, tag in tagged.facet_names.items()}
-    points = np.asarray(mesh.geometry.input_global_indices)
-    known: dict[int, set[int]] = {}
+    """Refuse different displacements of one surface, or of an edge between two."""
+    one, two = (repr(tagged.facet_name(tag)) for tag in tags)
+    if tags[0] == tags[1]:
+        raise InputError(
+            f"the surface {one} is held twice along {axis}, with displacements {values[0]:g} and "
+            f"{values[1]:g} mm",
+            key=key,
+        )
+    first, second = (_nodes(tagged, tag) for tag in tags)
+    names = np.asarray(tagged.mesh.geometry.input_global_indices)
+    parts = tagged.comm.allgather([names[nodes].tolist() for nodes in (first, second)])
+    if set().union(*(part[0] for part in parts)) & set().union(*(part[1] for part in parts)):
+        raise InputError(
+            f"the surfaces {one} and {two} share nodes and are held at different displacements "
+            f"along {axis}, {values[0]:g} and {values[1]:g} mm",
+            key=key,
+        )
 
-    def nodes(tag: int) -> set[int]:
-        if tag not in known:
-            own = points[np.unique(facet_nodes(mesh, tagged.facet_tags.find(tag)).corners)]
-            known[tag] = {node for part in tagged.comm.allgather(own.tolist()) for node in part}
-        return known[tag]
 
-    for ((one, axis), first), ((other, across), second) in combinations(held.items(), 2):
-        if axis == across and first != second and nodes(one) & nodes(other):
-            both = " and ".join(repr(names.get(tag, str(tag))) for tag in (one, other))
-            raise InputError(
-                f"the surfaces {both} share nodes and are held at different displacements along "
-                f"{'xyz'[axis]}, {first:g} and {second:g} mm",
-                key=key,
-            )
+def _nodes(tagged: TaggedMesh, tag: int) -> NDArray[np.int32]:
+    """Return the rows of ``mesh.geometry.x`` of this rank's facets with a tag."""
+    return np.unique(facet_nodes(tagged.mesh, tagged.facet_tags.find(tag)).corners)
 
 
 def free_motions(tagged: TaggedMesh, supports: Sequence[Support]) -> list[str]:
@@ -180,22 +151,19 @@ def free_motions(tagged: TaggedMesh, supports: Sequence[Support]) -> list[str]:
     Note:
         Collective.
     """
-    comm = tagged.comm
-    mesh = tagged.mesh
     lower, upper = tagged.bounding_box()
     centre, size = 0.5 * (lower + upper), float(np.linalg.norm(upper - lower))
     square = np.zeros((6, 6))
     for support in supports:
-        nodes = np.unique(facet_nodes(mesh, tagged.facet_tags.find(support.tag)).corners)
-        arms = (mesh.geometry.x[nodes] - centre) / size
+        arms = (tagged.mesh.geometry.x[_nodes(tagged, support.tag)] - centre) / size
         for axis, value in enumerate(support.displacement):
             if value is not None:
                 along = np.eye(3)[axis]
                 rows = np.concatenate([np.tile(along, (len(arms), 1)), np.cross(arms, along)], 1)
                 square += rows.T @ rows
-    square = comm.allreduce(square)
-    values, vectors = np.linalg.eigh(square)
-    free = vectors[:, values <= _FREE * max(float(values[-1]), 1.0)].T
+    values, vectors = np.linalg.eigh(tagged.comm.allreduce(square))
+    # supports over a part in 10⁶ of the body's length still hold rotations
+    free = vectors[:, values <= 1e-12 * max(float(values[-1]), 1.0)].T
     return _in_words(free, centre, size)
 
 

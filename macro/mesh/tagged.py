@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from dolfinx import mesh as dmesh
-from numpy.typing import NDArray
 
 from geometry.face_frame import FaceFrame
 from macro import compat
-from macro.mesh.facets import facet_nodes
-from support.errors import InputError
-
-Array = NDArray[np.float64]
-
-_SHOWN = 12
-"""Names that a message lists."""
+from macro.mesh.facets import exterior_facets, facet_nodes
+from support.arrays import Array
+from support.errors import InputError, did_you_mean
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -73,6 +66,10 @@ class TaggedMesh:
         """
         return bounding_box(self.mesh.geometry.x, self.comm)
 
+    def facet_name(self, tag: int) -> str:
+        """Return the name of a tag of facets; its number where it has none."""
+        return {number: name for name, number in self.facet_names.items()}.get(tag, str(tag))
+
     def facet_tag(self, wanted: str | int, *, key: str | None = None) -> int:
         """Return the tag of facets by its name or number.
 
@@ -108,29 +105,23 @@ def bounding_box(points: Array, comm: Any) -> tuple[Array, Array]:
 def _tag(names: Mapping[str, int], wanted: str | int, what: str, key: str | None) -> int:
     if isinstance(wanted, str) and wanted in names:
         return names[wanted]
-    tag = int(wanted) if not isinstance(wanted, str) or wanted.strip().isdecimal() else None
+    tag = int(wanted) if str(wanted).strip().lstrip("-").isdecimal() else None
     if tag is not None and (tag in names.values() or not names):
         return tag
-    folded = {name.casefold(): name for name in names}
-    near = get_close_matches(str(wanted).casefold(), folded, n=1)
-    hint = f"; did you mean {folded[near[0]]!r}?" if near else ""
-    listed = [
-        repr(name) if name != str(number) else name for name, number in list(names.items())[:_SHOWN]
-    ]
-    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    hint = did_you_mean(str(wanted), names)
+    listed = [name if name == str(number) else repr(name) for name, number in names.items()]
+    more = f" and {len(listed) - 12} more" if len(listed) > 12 else ""
     raise InputError(
         f"the mesh has no {what} of this name{hint}" if names else f"the mesh has no named {what}s",
         value=wanted,
         key=key,
-        allowed=", ".join(listed) + more if names else "a number",
+        allowed=", ".join(listed[:12]) + more if names else "a number",
     )
 
 
-_FLAT = 1e-6
-"""Distance from the plane, relative to the face, that is rounding of coordinates in files."""
-
-_CLOSED = 0.5
-"""Least length of the sum of a face's areas as vectors, relative to its area."""
+FLAT_IN_FILES = 1e-6
+"""Part of the size of a face that is rounding in files: distance from its plane, and areas; also
+the components of normals."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -141,17 +132,13 @@ class PlanarFace:
         frame: The coordinates; the plane goes through the highest node.
         lengths: Sides of the bounding rectangle along e1 and e2 [mm].
         area: Area of the facets of all ranks [mm²].
-        facets: Number of the facets of all ranks.
         deviation: Half the difference of height between the highest and the lowest node [mm].
-        steepest: Largest slope of a facet against the plane.
     """
 
     frame: FaceFrame
     lengths: tuple[float, float]
     area: float
-    facets: int
     deviation: float
-    steepest: float
 
 
 def planar_face(
@@ -167,7 +154,7 @@ def planar_face(
     Args:
         tagged: The mesh.
         tag: Tag of the facets.
-        name: Name of the face, for errors; its tag by default.
+        name: Name of the face, for errors; that of its tag by default.
         deviation: Largest distance of a node from the plane half-way between the highest and the
             lowest that is allowed [mm]: half the height of a crown. Rounding of the coordinates
             always is.
@@ -180,51 +167,39 @@ def planar_face(
     Note:
         Collective. The results do not depend on the ranks but for rounding.
     """
-    told = _Words(name=str(tag) if name is None else name, key=key)
-    comm = tagged.comm
+    named, comm = repr(name or tagged.facet_name(tag)), tagged.comm
+
+    def refused(problem: str, allowed: str | None = None) -> InputError:
+        return InputError(f"the surface {named} {problem}", key=key, allowed=allowed)
+
     corners, outward, inner = _facets(tagged, tag)
     count, inside = comm.allreduce(len(corners) + inner), comm.allreduce(inner)
     if not count:
-        raise told.error("has no facets that belong to cells")
+        raise refused("has no facets that belong to cells")
     if inside:
-        raise told.error(f"has {inside} of {count} facets inside the body, between two cells")
+        raise refused(f"has {inside} of {count} facets inside the body, between two cells")
     areas = np.linalg.norm(outward, axis=1)
     area, total = comm.allreduce(float(areas.sum())), comm.allreduce(outward.sum(axis=0))
-    if np.linalg.norm(total) < _CLOSED * area:
-        raise told.error("is not planar: its facets face different ways and close around a body")
+    if np.linalg.norm(total) < 0.5 * area:
+        raise refused("is not planar: its facets face different ways and close around a body")
     frame = FaceFrame.across(total)
-    local = corners.reshape(-1, 3) @ frame.axes.T
-    lower, upper = bounding_box(local, comm)
+    lower, upper = bounding_box(corners.reshape(-1, 3) @ frame.axes.T, comm)
     upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
     flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
     lengths, off = upper[:2] - lower[:2], 0.5 * float(upper[2] - lower[2])
-    if off > max(deviation, _FLAT * float(lengths.max())) or flattest <= 0.0:
+    if off > max(deviation, FLAT_IN_FILES * float(lengths.max())) or flattest <= 0.0:
         angle = np.degrees(np.arccos(np.clip(flattest, -1.0, 1.0)))
-        limit = f"at most {deviation:.4g} mm" if deviation else "a planar face"
-        raise told.error(
+        raise refused(
             f"is not planar: its nodes are up to {off:.4g} mm off the plane through it, and its "
             f"facets up to {angle:.2g}° from it",
-            allowed=limit,
+            f"at most {deviation:.4g} mm" if deviation else "a planar face",
         )
     return PlanarFace(
         frame=FaceFrame.through(np.stack([lower, upper]) @ frame.axes, total),
         lengths=(float(lengths[0]), float(lengths[1])),
         area=area,
-        facets=count,
         deviation=off,
-        steepest=float(np.sqrt(1.0 - min(flattest, 1.0) ** 2) / flattest),
     )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Words:
-    """How errors name the face."""
-
-    name: str
-    key: str | None
-
-    def error(self, problem: str, allowed: str | None = None) -> InputError:
-        return InputError(f"the surface {self.name!r} {problem}", key=self.key, allowed=allowed)
 
 
 def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
@@ -234,15 +209,12 @@ def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
         Their corners, shape (n, 3 or 4, 3) [mm]; outward vectors as long as their areas, shape
         (n, 3) [mm²]; the number of facets between two cells, each counted on one rank.
     """
-    mesh = tagged.mesh
-    topology = mesh.topology
-    facets = np.asarray(tagged.facet_tags.find(tag))
-    outer = np.isin(facets, dmesh.exterior_facet_indices(topology))
-    own = facets < topology.index_map(2).size_local
+    mesh, facets = tagged.mesh, np.asarray(tagged.facet_tags.find(tag))
+    outer = np.isin(facets, exterior_facets(mesh))
+    own = facets < mesh.topology.index_map(2).size_local
     nodes = facet_nodes(mesh, facets[outer])
-    owned = nodes.cell < topology.index_map(3).size_local
-    corners = mesh.geometry.x[nodes.corners[owned]]
-    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell[owned]]].mean(axis=1)
+    corners = mesh.geometry.x[nodes.corners]
+    middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell]].mean(axis=1)
     # half the product of the diagonals of a quadrilateral
     ends = (1, 0, 2, 0) if corners.shape[1] == 3 else (3, 0, 2, 1)
     u, v = (corners[:, ends[k]] - corners[:, ends[k + 1]] for k in (0, 2))

@@ -68,7 +68,7 @@ def read_xdmf(path: Path, comm: Any) -> TaggedMesh:
     names = layout.names
     return TaggedMesh(
         mesh=mesh,
-        facet_tags=_of_owned_cells(mesh, facets),
+        facet_tags=facets,
         cell_tags=cells,
         facet_names=names.get("facets") or _numbers(facets, comm),
         cell_names=names.get("cells") or ({} if cells is None else _numbers(cells, comm)),
@@ -102,17 +102,21 @@ def _layout(path: Path) -> _Layout:
             f"the mesh has cells that do not fit{flat}", value=kinds[mesh], allowed=_ALLOWED
         )
     _check_data(uniform[mesh], path)
-    tagged = {
-        name: kinds[name] for name, grid in uniform.items() if grid.find("Attribute") is not None
-    }
-    of_facets = [name for name, kind in tagged.items() if kind == _CELLS[kinds[mesh]]]
-    of_cells = [name for name, kind in tagged.items() if kind == kinds[mesh]]
-    for several, what in ((of_facets, "facets"), (of_cells, "cells")):
+
+    def tags_of(what: str, kind: str) -> str | None:
+        """Return the name of the one set of tags on cells of a kind."""
+        several = [
+            name
+            for name, grid in uniform.items()
+            if kinds[name] == kind and grid.find("Attribute") is not None
+        ]
         if len(several) > 1:
             raise InputError(
                 f"the file has several sets of tags of {what}", value=several, allowed="one"
             )
-    facets, cells = (next(iter(found), None) for found in (of_facets, of_cells))
+        return several[0] if several else None
+
+    facets, cells = tags_of("facets", _CELLS[kinds[mesh]]), tags_of("cells", kinds[mesh])
     return _Layout(mesh=mesh, facets=facets, cells=cells, names=_names(root))
 
 
@@ -172,7 +176,7 @@ def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
         raise InputError(
             "meshes are not written in this format", value=path.suffix, allowed=".xdmf"
         )
-    tags = {"facets": tagged.facet_tags, "cells": _owned(tagged)}
+    tags = {"facets": tagged.facet_tags, "cells": tagged.cell_tags}
     with compat.quiet_compiler(), io.XDMFFile(tagged.comm, str(path), "w") as file:
         file.write_mesh(tagged.mesh)
         for name, each in tags.items():
@@ -180,17 +184,6 @@ def write_mesh(tagged: TaggedMesh, path: str | Path) -> None:
                 each.name = name
                 compat.write_tags(file, each, tagged.mesh)
     on_root(tagged.comm, lambda: _add_names(path, tagged))
-
-
-def _owned(tagged: TaggedMesh) -> Any:
-    """Return the tags of the cells that this rank owns; None where there are none."""
-    if tagged.cell_tags is None:
-        return None
-    own = tagged.cell_tags.indices < tagged.mesh.topology.index_map(3).size_local
-    indices, values = (
-        np.asarray(part)[own] for part in (tagged.cell_tags.indices, tagged.cell_tags.values)
-    )
-    return dmesh.meshtags(tagged.mesh, 3, indices, values)
 
 
 def _add_names(path: Path, tagged: TaggedMesh) -> None:
@@ -213,19 +206,3 @@ def _filled(mesh: Any, tags: Any) -> Any:
     values = np.full(cells.size_local + cells.num_ghosts, NO_GROUP, np.int32)
     values[tags.indices] = tags.values
     return dmesh.meshtags(mesh, 3, np.arange(len(values), dtype=np.int32), values)
-
-
-def _of_owned_cells(mesh: Any, tags: Any) -> Any:
-    """Return tags of facets without those facets that belong to ghost cells alone.
-
-    Args:
-        mesh: dolfinx mesh.
-        tags: Tags of its facets.
-    """
-    mesh.topology.create_connectivity(2, 3)
-    cells = mesh.topology.connectivity(2, 3)
-    owned = mesh.topology.index_map(3).size_local
-    indices = np.asarray(tags.indices)
-    ends = cells.offsets[indices], cells.offsets[indices + 1] - 1  # a facet has one cell or two
-    kept = np.minimum(*(cells.array[end] for end in ends)) < owned
-    return dmesh.meshtags(mesh, 2, indices[kept], np.asarray(tags.values)[kept])

@@ -1,19 +1,28 @@
-"""The contacts of given summits under a rigid plane, and how they resist its motions.
+"""The contacts of given summits under a rigid plane, how they resist its motions, its equilibrium.
 
 A rigid plane that has approached by δ interferes with every summit by d_k = <δ(x_k) − (z_M − z_k)>.
 Without interaction each contact makes this displacement alone, w_k = d_k. With interaction the
 displacements by all contacts add up to w_k (`micro.asperities.summit_problem`).
+
+The search for the plane's equilibrium is that of `geometry.plane_equilibrium`. Contacts are few and
+cheap alone, so that contacts that do not displace each other give a start close to the solution.
 
 Theory: docs/theory.md, sections 8 and 9.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from types import MappingProxyType
+from typing import TypeVar
 
 import numpy as np
+from scipy.optimize import brentq, linprog
 
+from geometry import Control
+from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
+from geometry.rigid_plane import PlaneLevers, RigidPlane, plane_failure
 from micro.asperities.hertz_pairs import HertzPairs
 from micro.asperities.summit_problem import (
     BYTES_PER_PAIR,
@@ -27,6 +36,8 @@ from micro.asperities.summit_problem import (
 from micro.asperities.truncated_newton import truncated_newton
 from support.arrays import Array
 
+T = TypeVar("T")
+
 SOLVERS: Mapping[str, Method] = MappingProxyType(
     {"active-set": active_set, "truncated-newton": truncated_newton}
 )
@@ -37,8 +48,7 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
     """Solve for the summits above the plane.
 
     These are the undisplaced summits above it, and those that the body raises above it. The
-    displacements of all others stay 0. The interaction is summed over all pairs: time and memory
-    grow with the square of their number.
+    interaction is summed over all pairs: time and memory grow with the square of their number.
 
     Args:
         pairs: The n asperities.
@@ -52,12 +62,11 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
         NotConverged: When the contact conditions cannot be met to 1e-10.
     """
     if not pairs.interact:
-        alone = np.maximum(interference, 0.0)
-        return Solution(alone, alone, 0, 0.0, 0)
+        return Solution(np.maximum(interference, 0.0), 0, 0.0, 0)
     above = np.flatnonzero(interference > 0.0)
-    own, displacement, spent = np.zeros_like(interference), np.zeros_like(interference), 0
+    own, spent = np.zeros_like(interference), 0
     if above.size == 0:
-        return Solution(own, displacement, 0, 0.0, 0)
+        return Solution(own, 0, 0.0, 0)
     size = BYTES_PER_PAIR * (2.0 if solver == "truncated-newton" else 1.0)
     while True:
         check_pairs(len(above), size)
@@ -65,7 +74,7 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
             interaction=pairs.subset(above).evaluate, interference=interference[above]
         )
         solved = solve(problem, SOLVERS[solver], start[above])
-        own[above], displacement[above] = solved.indentation, solved.displacement
+        own[above] = solved.indentation
         spent += solved.iterations
         if pairs.body is None:
             break
@@ -75,7 +84,7 @@ def solve_summits(pairs: HertzPairs, interference: Array, start: Array, solver: 
         if not raised.any():
             break
         above, start = np.sort(np.append(above, np.flatnonzero(raised))), own
-    return solved._replace(indentation=own, displacement=displacement, iterations=spent)
+    return solved._replace(indentation=own, iterations=spent)
 
 
 def plane_stiffness(pairs: HertzPairs, indentation: Array, modes: Array) -> Array:
@@ -92,3 +101,100 @@ def plane_stiffness(pairs: HertzPairs, indentation: Array, modes: Array) -> Arra
     if pairs.interact:
         own = np.linalg.solve(np.eye(len(active)) + touching.evaluate(t).derivative, moved)
     return np.asarray(moved.T @ (rate[:, None] * own))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Peaks:
+    """Points that a rigid plane can touch, each by Hertz's law, without displacing the others.
+
+    Args:
+        modes: Rigid-body modes of the plane at the n points.
+        depth: Depths below the height that approaches count from, shape (n,) [mm].
+        force: Forces of the points alone, indented by 1 mm, shape (n,) [N].
+    """
+
+    modes: PlaneLevers
+    depth: Array
+    force: Array
+
+    def equilibrium(
+        self,
+        respond: Callable[[Array], PlaneResponse[T]],
+        control: Control,
+        near: RigidPlane | None = None,
+    ) -> tuple[Array, T]:
+        """Find the plane in equilibrium with contacts on these points.
+
+        Args:
+            respond: Returns what the contacts do to a plane (3,), and their state.
+            control: What is prescribed.
+            near: A plane in equilibrium nearby.
+
+        Returns:
+            The plane, shape (3,), and the state of the contacts.
+
+        Raises:
+            NotConverged: When no plane is in equilibrium, or ``respond`` fails at first touch.
+        """
+        start = self._first_plane(control, near)
+        touch = self.modes.first_touch(self.depth, start[1:])
+        half = self.modes.half
+        # the contact conditions themselves are met to 1e-10
+        return find_equilibrium(respond, control, start, half, aim=1e-9, first_touch=touch)
+
+    def _first_plane(self, control: Control, near: RigidPlane | None) -> Array:
+        """Return a plane to start from: one near, or one that suits contacts that stand alone.
+
+        It is approach and slopes, shape (3,).
+        """
+        tilt = control.tilt
+        if tilt is None and near is not None:
+            nearer = (control.approach or np.inf) >= near.approach
+            tilt = near.tilt if nearer or control.force == 0.0 else None
+        if tilt is None:
+            tilt = (0.0, 0.0) if control.force == 0.0 else self._resting(control)
+        if control.approach is not None:
+            return np.array([control.approach, *tilt])
+        touch = self.modes.first_touch(self.depth, tilt)
+        if not np.isfinite(touch):
+            raise plane_failure(control, "NO_CONTACT")
+        if near is not None and control.force and near.approach > touch:
+            return np.array([near.approach, *tilt])
+        return np.array([touch + self._depth(control.force or 0.0, tilt), *tilt])
+
+    def _depth(self, force: float, tilt: tuple[float, float]) -> float:
+        """Return how far a plane of given slopes moves from first touch under a force [mm]."""
+        if force == 0.0:
+            return 0.0
+        gap = self.depth - self.modes.matrix[:, 1:] @ np.asarray(tilt)
+        gap = gap - gap.min()
+
+        def residual(depth: float) -> float:
+            return float(self.force @ np.maximum(depth - gap, 0.0) ** 1.5) - force
+
+        most = 1e-6 * self.modes.half
+        while residual(most) < 0.0:
+            most *= 4.0
+        return float(brentq(residual, 0.0, most, rtol=1e-3))
+
+    def _resting(self, control: Control) -> tuple[float, float]:
+        """Return the slopes of a plane that rests on the rigid peaks under a force in the centre.
+
+        Of all planes that penetrate no peak it is the one with the largest approach, found by a
+        linear programme. Where the approach is prescribed, it need not be much larger than that.
+        """
+        if not len(self.depth):
+            return 0.0, 0.0
+        scale = float(np.ptp(self.depth)) or 1.0
+        most = None if control.approach is None else control.approach / scale + 1.0
+        programme = linprog(
+            [-1.0, 0.0, 0.0],
+            A_ub=self.modes.matrix / [1.0, self.modes.half, self.modes.half],
+            b_ub=self.depth / scale,
+            bounds=[(None, most), (None, None), (None, None)],
+            method="highs",
+        )
+        if programme.status != 0:  # the centre lies outside of the peaks' hull
+            raise plane_failure(control, "NO_EQUILIBRIUM")
+        slopes = programme.x[1:] * (scale / self.modes.half)
+        return float(slopes[0]), float(slopes[1])

@@ -5,23 +5,21 @@ Theory: docs/theory.md, sections 8 and 9.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from types import MappingProxyType
-from typing import NamedTuple, Self
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import Asperities, Control, Partition, PatchGrid
+from geometry import Asperities, Control, PatchGrid
 from geometry.contact_state import ContactState, Spots, Start
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane, normal_stiffness
-from micro.asperities.contacts import SOLVERS, plane_stiffness, solve_summits
+from micro.asperities.contacts import SOLVERS, Peaks, plane_stiffness, solve_summits
 from micro.asperities.hertz_pairs import HertzPairs
 from micro.asperities.patch_sums import patch_displacements, patch_loads
-from micro.asperities.plane_on_peaks import Peaks
 from micro.asperities.summit_problem import Solution
 from micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from micro.closed_forms.hertz import checked_modulus, shape_factors
@@ -29,31 +27,9 @@ from micro.model import Stiffness, checked_patches
 from support.arrays import Array
 from support.errors import InputError
 
-LARGEST_AREA_FRACTION = 0.1
-"""Contact area fraction up to which summits count as separate; errors may be large before."""
-
-
-class ModelKind(NamedTuple):
-    """What distinguishes the four models.
-
-    Attributes:
-        elliptic: Whether contacts are ellipses; circles of radius sqrt(R' R'') otherwise.
-        interacting: Whether contacts displace each other's summits through the half-space.
-    """
-
-    elliptic: bool
-    interacting: bool
-
-
-MODELS: Mapping[str, ModelKind] = MappingProxyType(
-    {
-        "elliptic": ModelKind(elliptic=True, interacting=True),
-        "circular": ModelKind(elliptic=False, interacting=True),
-        "elliptic-independent": ModelKind(elliptic=True, interacting=False),
-        "circular-independent": ModelKind(elliptic=False, interacting=False),
-    }
-)
-"""The models (1) to (4) of Waddad et al. 2016, section 2.2, by name."""
+MODELS = ("elliptic", "circular", "elliptic-independent", "circular-independent")
+"""The models (1) to (4) of Waddad et al. 2016, section 2.2: contacts are ellipses, or circles of
+radius sqrt(R' R''), and displace each other's summits through the half-space or not."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +81,7 @@ class AsperityModel:
     @cached_property
     def pairs(self) -> HertzPairs:
         """The contacts of the asperities, and how they displace each other's summits."""
-        a, (elliptic, interacting) = self.asperities, MODELS[self.kind]
+        a, elliptic = self.asperities, self.kind.startswith("elliptic")
         radii = (a.radius_major, a.radius_minor) if elliptic else (a.radius, a.radius)
         return HertzPairs(
             x=a.x,
@@ -114,13 +90,18 @@ class AsperityModel:
             radius=a.radius,
             shape=shape_factors(*radii),
             circular=not elliptic,
-            half_space=interacting,
+            half_space=not self.kind.endswith("-independent"),
             body=None if self.body is None else BodyPoints.at(self.body, a.x, a.y),
             contact_modulus=self.contact_modulus,
         )
 
     def of_patch(self, patches: PatchGrid, index: int) -> tuple[Self, PatchGrid]:
-        """Return the model of the summits of one patch; see `MicroModel.of_patch`."""
+        """Return the model of the summits of one patch; see `MicroModel.of_patch`.
+
+        Args:
+            patches: Patches of the surface.
+            index: Flat index of the patch.
+        """
         own = patches.index_of(self.asperities.x, self.asperities.y) == index
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
@@ -133,7 +114,7 @@ class AsperityModel:
         self,
         control: Control,
         *,
-        patches: Partition | None = None,
+        patches: PatchGrid | None = None,
         mean_heights: ArrayLike | None = None,
         start: Start | None = None,
     ) -> ContactState:
@@ -141,6 +122,12 @@ class AsperityModel:
 
         By `patch_loads` a contact that straddles borders is shared among patches. As a contact it
         counts for the patch that holds its summit. The paper assigns it whole.
+
+        Args:
+            control: What is prescribed of the plane.
+            patches: N patches that results are summed over.
+            mean_heights: Mean heights of the surface on the patches, which they need, (N,) [mm].
+            start: A solution at another load to start from.
 
         Raises:
             InputError: Also when the interaction of all contacts does not fit into the memory.
@@ -185,7 +172,12 @@ class AsperityModel:
         return replace(state, warning=self._warning(state))
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`."""
+        """Return dF/dδ by the tangent of the contacts; see `MicroModel.stiffness`.
+
+        Args:
+            state: A solution of this model.
+            turns: Whether the plane turns without moment.
+        """
         tangent = plane_stiffness(self.pairs, state.guess.values, self._peaks.modes.matrix)
         return Stiffness(normal_stiffness(tangent, turns=turns), 1)
 
@@ -231,13 +223,13 @@ class AsperityModel:
         """Return why contacts are too large to count as separate; empty while they are not."""
         # A single contact, in a small patch say, is Hertz's at any area.
         single = state.contacts + state.overlapping_contacts <= 1
-        fraction = state.contact_area_fraction
-        if fraction <= LARGEST_AREA_FRACTION or single:
+        fraction, largest = state.contact_area_fraction, 0.1  # errors may be large before
+        if fraction <= largest or single:
             return ""
         return (
             f"at an approach of {state.approach:.4g} mm the contacts cover {fraction:.1%} of the"
             f" surface: the model {self.name} of separate summits stands for up to"
-            f" {LARGEST_AREA_FRACTION:.0%}"
+            f" {largest:.0%}"
         )
 
 

@@ -29,16 +29,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import roots_jacobi
 
-from geometry import Partition
+from geometry import PatchGrid
 from micro.closed_forms.love import corner_integral
 from support.arrays import Array, Indices
-
-_RADII, _RADIUS_WEIGHTS = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
-_ANGLES = 16
-_CORNERS_AT_ONCE = 2**20
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-_PAIRS_AT_ONCE = 4096
-"""Pairs of a contact and a patch, of 60 points each."""
+from support.cores import blocks
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -86,7 +80,7 @@ class Shares(NamedTuple):
     area: Array
 
 
-def patch_loads(patches: Partition, contacts: EllipticContacts) -> tuple[Array, Array]:
+def patch_loads(patches: PatchGrid, contacts: EllipticContacts) -> tuple[Array, Array]:
     """Return the forces [N] and the contact areas [mm²] of patches, shape (N,) each.
 
     Args:
@@ -100,15 +94,12 @@ def patch_loads(patches: Partition, contacts: EllipticContacts) -> tuple[Array, 
     return np.asarray(sums[0], float), np.asarray(sums[1], float)
 
 
-def shares(
-    patches: Partition, contacts: EllipticContacts, *, at_once: int = _PAIRS_AT_ONCE
-) -> Shares:
+def shares(patches: PatchGrid, contacts: EllipticContacts) -> Shares:
     """Share contacts among patches.
 
     Args:
         patches: The N patches.
         contacts: The m contacts.
-        at_once: Pairs of a contact and a patch that are integrated at once, to bound the memory.
     """
     position, axes = contacts.position, contacts.semi_axes**2
     cos, sin = np.cos(contacts.angle), np.sin(contacts.angle)
@@ -125,8 +116,8 @@ def shares(
     place = first[contact] + np.stack(np.divmod(number, spans[contact, 1]), axis=1)
     parts = np.ones((2, len(contact)))
     cut = np.flatnonzero(count[contact] > 1)
-    for start in range(0, len(cut), at_once):
-        some = cut[start : start + at_once]
+    for block in blocks(len(cut), 4096):  # pairs of 60 points each: blocks bound the memory
+        some = cut[block]
         on = contact[some]
         low, high = (_borders(ticks, place[some] + side) - position[on] for side in (0, 1))
         parts[:, some] = _within(low, high, extent[on], cross[on])
@@ -186,9 +177,10 @@ def _rule(start: Array, end: Array, kinks: Array) -> tuple[Array, Array]:
     inner = np.clip(kinks, start[:, None], end[:, None])
     ticks = np.sort(np.concatenate([start[:, None], inner, end[:, None]], axis=1), axis=1)
     half = 0.5 * np.diff(ticks, axis=1)[:, :, None]
-    nodes = 0.5 * (ticks[:, 1:] + ticks[:, :-1])[:, :, None] + half * _NODES
+    points, weights = np.polynomial.legendre.leggauss(12)
+    nodes = 0.5 * (ticks[:, 1:] + ticks[:, :-1])[:, :, None] + half * points
     flat = len(start), nodes.shape[1] * nodes.shape[2]
-    return nodes.reshape(flat), (half * _WEIGHTS).reshape(flat)
+    return nodes.reshape(flat), (half * weights).reshape(flat)
 
 
 def _segment(t: Array) -> Array:
@@ -196,7 +188,7 @@ def _segment(t: Array) -> Array:
 
 
 def patch_displacements(
-    patches: Partition, contacts: EllipticContacts, contact_modulus: float
+    patches: PatchGrid, contacts: EllipticContacts, contact_modulus: float
 ) -> Array:
     """Return the mean normal displacement of every patch of a half-space [mm], shape (N,).
 
@@ -209,9 +201,7 @@ def patch_displacements(
     load = (contacts.force[:, None] * weight).ravel()
     ticks_x, ticks_y = patches.borders_x, patches.borders_y
     corners = np.zeros((len(ticks_x), len(ticks_y)))
-    block = max(1, _CORNERS_AT_ONCE // corners.size)
-    for first in range(0, len(load), block):  # blocks bound the memory
-        some = slice(first, first + block)
+    for some in blocks(len(load), 2**20 // corners.size):  # blocks bound the memory
         to_x, to_y = ticks_x - point[some, 0, None], ticks_y - point[some, 1, None]
         integrals = corner_integral(to_x[:, :, None], to_y[:, None, :])
         corners += np.tensordot(load[some], integrals, axes=1)
@@ -221,8 +211,9 @@ def patch_displacements(
 
 def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
     """Return points, shape (64 m, 2), and the 64 weights of every contact's mean."""
-    radius = np.sqrt(0.5 * (1.0 + _RADII))[:, None]
-    around = 2.0 * np.pi / _ANGLES * (np.arange(_ANGLES) + 0.5)
+    places, weights = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
+    radius, angles = np.sqrt(0.5 * (1.0 + places))[:, None], 16
+    around = 2.0 * np.pi / angles * (np.arange(angles) + 0.5)
     u, v = (radius * np.cos(around)).ravel(), (radius * np.sin(around)).ravel()
     # the symmetric matrix that turns the unit circle into the ellipse
     cos, sin = np.cos(contacts.angle), np.sin(contacts.angle)
@@ -231,5 +222,5 @@ def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
     xy = cos * sin * (major - minor)
     x = contacts.x[:, None] + np.outer(xx, u) + np.outer(xy, v)
     y = contacts.y[:, None] + np.outer(xy, u) + np.outer(yy, v)
-    weight = np.repeat(_RADIUS_WEIGHTS / (_RADIUS_WEIGHTS.sum() * _ANGLES), _ANGLES)
+    weight = np.repeat(weights / (weights.sum() * angles), angles)
     return np.stack([x.ravel(), y.ravel()], axis=1), weight

@@ -31,9 +31,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.checks import process_memory
 from support.errors import InputError, NotConverged
 
@@ -46,12 +45,6 @@ BYTES_PER_PAIR = 48.0
 With 2,500 asperities, 1,800 of them in contact, 27 B were measured on a half-space and 31 B on a
 finite body; the truncated Newton method took 86 B.
 """
-
-# The limits below stop searches that do not converge; ordinary problems take 4 to 7 Newton steps.
-_MOST_ITERATIONS = 40
-_SMALLEST_LOAD_STEP = 1.0 / 256.0
-_SHORTEST_STEP = 2.0**-10
-_LEAST_DECREASE = 1e-4
 
 _NEWTON = "Newton's method on the active set"
 
@@ -67,7 +60,7 @@ class InteractionDisplacement(NamedTuple):
             to summit k that its kernel is continued linearly.
     """
 
-    active: NDArray[np.intp]
+    active: Indices
     displacement: Array
     derivative: Array
     overlapping_contacts: int = 0
@@ -82,14 +75,12 @@ class Solution(NamedTuple):
 
     Attributes:
         indentation: Indentations t ≥ 0, shape (n,) [mm].
-        displacement: Total displacements w of the summits, shape (n,) [mm].
         iterations: Linear systems solved on the way.
         residual: Complementarity error relative to the largest interference.
         overlapping_contacts: See `InteractionDisplacement`.
     """
 
     indentation: Array
-    displacement: Array
     iterations: int
     residual: float
     overlapping_contacts: int
@@ -127,11 +118,16 @@ class SummitProblem:
     def solution(
         self, indentation: Array, caused: InteractionDisplacement, iterations: int
     ) -> Solution:
-        """Return the solution with given indentations, of which negative ones become 0."""
+        """Return the solution with given indentations.
+
+        Args:
+            indentation: The indentations, shape (n,) [mm]; negative ones become 0.
+            caused: The interaction displacements that they cause.
+            iterations: Linear systems solved on the way.
+        """
         own = np.maximum(indentation, 0.0)
         return Solution(
             indentation=own,
-            displacement=own + caused.displacement,
             iterations=iterations,
             residual=self.residual(own, caused.displacement),
             overlapping_contacts=caused.overlapping_contacts,
@@ -188,7 +184,7 @@ def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
             solution = method(part, indentation)
         except NotConverged as failure:
             spent, step = spent + failure.iterations, 0.5 * step
-            if step < _SMALLEST_LOAD_STEP:
+            if step < 1.0 / 256.0:
                 raise NotConverged(
                     f"the contact of {len(indentation)} interacting asperities"
                     f" (largest interference {problem.scale:.4g} mm, reached {load:.1%} of it)",
@@ -204,15 +200,13 @@ def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
         load, step, indentation = trial, 2.0 * step, solution.indentation
 
 
-def active_set(
-    problem: SummitProblem, start: Array, *, most_iterations: int = _MOST_ITERATIONS
-) -> Solution:
+def active_set(problem: SummitProblem, start: Array, *, most_iterations: int = 40) -> Solution:
     """Solve a contact problem by damped Newton steps on its normal map.
 
     Args:
         problem: The contact problem.
         start: First guess of the indentations, shape (n,) [mm].
-        most_iterations: Number of Newton steps that may be taken.
+        most_iterations: Number of Newton steps that may be taken; ordinary problems take 4 to 7.
 
     Raises:
         NotConverged: When no step lowers the error, or the iterations are used up.
@@ -246,7 +240,14 @@ def _newton_step(caused: InteractionDisplacement, error: Array) -> Array:
 
 
 def failure(what: str, reason: str, iterations: int, also: str = "") -> NotConverged:
-    """Return the error of an iteration, with what else may help beside a lower approach."""
+    """Return the error of an iteration.
+
+    Args:
+        what: Which iteration.
+        reason: The name of the reason.
+        iterations: Iterations spent.
+        also: What else may help beside a lower approach, the end of a sentence.
+    """
     remedy = f"lower load.approach{also}"
     return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)
 
@@ -273,10 +274,10 @@ def damped_step(
         NotConverged: When no step down to 1/1024 lowers the Euclidean norm of the error.
     """
     norm, length = np.linalg.norm(error), 1.0
-    while length >= _SHORTEST_STEP:
+    while length >= 2.0**-10:
         trial = point + length * step
         caused, left = evaluate(trial)
-        if np.linalg.norm(left) <= (1.0 - _LEAST_DECREASE * length) * norm:
+        if np.linalg.norm(left) <= (1.0 - 1e-4 * length) * norm:
             return trial, caused, left
         length *= 0.5
     raise failure("a damped Newton step", "LINE_SEARCH", 1)

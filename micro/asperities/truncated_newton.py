@@ -12,7 +12,6 @@ Theory: docs/theory.md, section 9.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import lsqr
 
 from micro.asperities.summit_problem import (
@@ -23,11 +22,7 @@ from micro.asperities.summit_problem import (
     damped_step,
     failure,
 )
-from support.arrays import Array, Flags
-
-_MOST_ITERATIONS = 60
-_MOST_SETS = 200
-_BLOCK_CHANGES = 5
+from support.arrays import Array, Flags, Indices
 
 _WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
 
@@ -36,8 +31,8 @@ def truncated_newton(
     problem: SummitProblem,
     start: Array,
     *,
-    most_iterations: int = _MOST_ITERATIONS,
-    most_sets: int = _MOST_SETS,
+    most_iterations: int = 60,
+    most_sets: int = 200,
 ) -> Solution:
     """Solve a contact problem by the paper's minimisation over a changing set of contacts.
 
@@ -60,7 +55,8 @@ def truncated_newton(
     contacting = start > 0.0 if np.any(start > 0.0) else np.ones(len(start), dtype=bool)
     indentation, spent = np.where(contacting, start, 0.0), 0
     slack = 0.1 * TOLERANCE * problem.scale
-    fewest, patience = len(start) + 1, _BLOCK_CHANGES
+    rounds = 5
+    fewest, patience = len(start) + 1, rounds
     for _ in range(most_sets):
         indentation, caused, inner = _minimise(problem, contacting, indentation, most_iterations)
         spent += inner
@@ -70,7 +66,7 @@ def truncated_newton(
         count = int(np.count_nonzero(wrong))
         if count == 0:
             return problem.solution(indentation, caused, spent)
-        fewest, patience = (count, _BLOCK_CHANGES) if count < fewest else (fewest, patience - 1)
+        fewest, patience = (count, rounds) if count < fewest else (fewest, patience - 1)
         if patience <= 0:
             wrong[np.flatnonzero(wrong)[:-1]] = False
         contacting = contacting ^ wrong
@@ -101,7 +97,7 @@ def _minimise(
 
 
 def _gauss_newton_step(
-    caused: InteractionDisplacement, rows: NDArray[np.intp], error: Array, forcing: float
+    caused: InteractionDisplacement, rows: Indices, error: Array, forcing: float
 ) -> Array:
     """Reduce ‖J step + error‖ by conjugate gradients to ``forcing`` times ‖error‖."""
     jacobian = np.eye(len(rows))

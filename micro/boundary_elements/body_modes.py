@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import Partition
+from geometry import PatchGrid
 from geometry.legendre_modes import mode_means, mode_values
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
@@ -77,7 +77,7 @@ class BodyModes:
         )
         return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
 
-    def patch_compliance(self, patches: Partition) -> Array:
+    def patch_compliance(self, patches: PatchGrid) -> Array:
         """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].
 
         Args:
@@ -155,7 +155,7 @@ class BodyPoints:
         """
         return np.asarray(self.values.T @ (self.body.matrix @ loaded.values))
 
-    def patch_means(self, patches: Partition, force: Array) -> Array:
+    def patch_means(self, patches: PatchGrid, force: Array) -> Array:
         """Return the mean displacements of patches, shape (N,) [mm].
 
         Args:

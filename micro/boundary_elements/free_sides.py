@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from geometry import Partition
+from geometry import PatchGrid
 from micro.boundary_elements.quarter_space import side_compliance, side_stresses
 from support.arrays import Array, Indices
 from support.errors import InputError
@@ -23,17 +23,6 @@ from support.errors import InputError
 _STEP = 0.4
 """Distance of the nodes, in the logarithm of the distance from a side; cubics between them err by
 1e-3 of 1/(x + x')."""
-_SHORTEST = 8.0
-"""Waves on the narrowest patch along a side."""
-_NEAREST = 1.0 / 256.0
-"""First node of the distance from a side, of the narrowest patch across it."""
-_STRESS_DECAY = 2.0
-"""Decay length of stresses over that of displacements.
-
-With it the first-order effect of slopes on a smooth load at or beside a side differed by −0.7 to
-2.3 % from that in meshed cubes and columns (ν 0 to 0.45), and by −2 to −6 % in blocks half or a
-fifth as high as wide. In cubes, half of it makes −10 to 1 %, no cut-off 5 to 15 %.
-"""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,7 +78,10 @@ class FreeSides:
         """Return the stresses that one side adds at distances by line loads at distances.
 
         They have twice the decay length of displacements. At the side they cancel the half-space's
-        stresses, which have no cut-off.
+        stresses, which have no cut-off. The first-order effect of slopes on a smooth load at or
+        beside a side then differed by −0.7 to 2.3 % from that in meshed cubes and columns (ν 0 to
+        0.45), and by −2 to −6 % in blocks half or a fifth as high as wide. In cubes, the decay
+        length of displacements makes −10 to 1 %, no cut-off 5 to 15 %.
 
         Args:
             axis: 0 for sides across x, 1 across y.
@@ -100,7 +92,7 @@ class FreeSides:
             Normal to the side, along it, and in shear, shape (3, w, n, n), the loads last [1/mm].
         """
         nu = self.poisson_ratio
-        numbers = self._wave_numbers(axis, waves, _STRESS_DECAY * self.decay_length)
+        numbers = self._wave_numbers(axis, waves, 2.0 * self.decay_length)
         parts = np.stack([side_stresses(nu, distances, number) for number in numbers], axis=1)
         apart = np.add.outer(distances, distances)
         cut_off, full = (
@@ -112,7 +104,7 @@ class FreeSides:
         parts[2] -= rest
         return parts
 
-    def patch_compliance(self, patches: Partition) -> Array:
+    def patch_compliance(self, patches: PatchGrid) -> Array:
         """Return the mean displacement of patches by unit pressure on patches, for E* = 1.
 
         Args:
@@ -135,8 +127,8 @@ class FreeSides:
         """Return what two opposite sides add, those that are there, by intervals."""
         length, period = self.lengths[axis], 2.0 * self.lengths[1 - axis]
         widths, middles = np.diff(along), 0.5 * (along[1:] + along[:-1])
-        waves = np.arange(int(np.ceil(_SHORTEST * period / widths.min())))
-        nodes = distance_nodes(_NEAREST * float(np.diff(across).min()), length)
+        waves = np.arange(int(np.ceil(8.0 * period / widths.min())))  # 8 on the narrowest patch
+        nodes = distance_nodes(float(np.diff(across).min()) / 256.0, length)
         compliance = self.compliance(axis, nodes, waves)
         near = means_over(nodes, across).toarray()
         far = means_over(nodes, length - across[::-1]).toarray()[::-1]

@@ -33,16 +33,12 @@ Pair = tuple[float, float]
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
-_FEW_CELLS = 2**14
-"""Cells up to which half-spaces are cached for other surfaces too, with 2 MB then."""
+# those of few cells, of 2 MB, for other surfaces too
 _half_space = cached_where_small(
-    lambda grid, spacing, *, periodic: grid[0] * grid[1] <= _FEW_CELLS, most=_MOST_GRIDS + 8
+    lambda grid, spacing, *, periodic: grid[0] * grid[1] <= 2**14, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
 _MOST_BYTES = 1e8
 """Size of the matrices of few cells that are cached [B]."""
-_DIFFERENCE = 1e-6
-"""Change of the pressures, of the largest one, that a derivative by them is taken with. Finite
-slopes are almost linear in them: the error is 1e-8 of what slopes add, and rounding no more."""
 
 
 class ComplianceTerm(Protocol):
@@ -96,7 +92,12 @@ class GridCompliance:
         return moved
 
     def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
-        """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm]."""
+        """Return roughly the displacements of some cells by pressures on them, shape (n,) [mm].
+
+        Args:
+            cells: The cells.
+            pressure: Pressures / E* on them, shape (n,).
+        """
         self.products += 1
         moved = self._half_space.rough_compliance.on_cells(cells, pressure)
         if self._terms:
@@ -108,7 +109,12 @@ class GridCompliance:
         return moved
 
     def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
-        """Return very roughly the pressures on some cells that displace them so, shape (n,)."""
+        """Return very roughly the pressures / E* on some cells that displace them, shape (n,).
+
+        Args:
+            cells: The cells.
+            displacement: Their displacements, shape (n,) [mm].
+        """
         return self._half_space.inverse.on_cells(cells, displacement)
 
     def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
@@ -247,11 +253,14 @@ class Compliance:
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
         """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).
 
+        It is a difference over a millionth of the largest pressure. Finite slopes are almost linear
+        in pressures: the error is 1e-8 of what slopes add, and rounding no more.
+
         Args:
             pressure: Pressures / E* of all cells, shape (nx, ny).
             rate: Their change by whatever the derivative is by, shape (nx, ny).
         """
-        step = _DIFFERENCE * float(pressure.max()) / float(np.abs(rate).max())
+        step = 1e-6 * float(pressure.max()) / float(np.abs(rate).max())
         moved = self._by_slopes(pressure + step * rate)
         return np.asarray((moved - self.slope_displacement(pressure)) / step)
 

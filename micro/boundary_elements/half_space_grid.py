@@ -22,12 +22,6 @@ from support.cores import BLOCK, blocks, cores, in_threads
 
 Field = NDArray[Any]
 
-_LINES = 128
-"""Bytes of a row that a block of columns holds at least: two lines of the cache."""
-_DENSE = 0.8
-"""Share of the rows between the first and the last cell from which all of them are transformed: a
-range is copied faster than rows here and there."""
-
 
 def love_kernel(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
     """Return the displacement at cell (i, j) by uniform unit pressure on cell (0, 0).
@@ -109,7 +103,8 @@ class Cells(NamedTuple):
         """Return cells of a grid (nx, ny) by their flat indices, ascending."""
         on_grid, column = np.divmod(flat, grid[1])
         rows = np.flatnonzero(np.bincount(on_grid, minlength=grid[0]))
-        if rows.size > _DENSE * (np.ptp(rows) + 1 if rows.size else 1):
+        # nearly all rows between the first and the last cell: a range is copied faster than rows
+        if rows.size > 0.8 * (np.ptp(rows) + 1 if rows.size else 1):
             rows = np.arange(rows[0], rows[-1] + 1)
         order = np.zeros(grid[0], np.intp)
         order[rows] = np.arange(len(rows))
@@ -172,7 +167,8 @@ class Convolution:
 
         size = work.itemsize
         in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
-        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, _LINES) // size))
+        # of a row two lines of the cache at least
+        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, 128) // size))
         in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
         return field
 

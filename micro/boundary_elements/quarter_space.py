@@ -47,8 +47,6 @@ from support.arrays import Array
 
 _STEP = 0.08
 """Step of the tables, in the logarithm of distances times wave number."""
-_SMALLEST, _SMALLEST_STRESS, _LARGEST = 1e-8, 1e-11, 40.0
-"""Ends of the tables of displacements and of stresses, distances times wave number."""
 
 
 def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array:
@@ -90,14 +88,14 @@ def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
 
 @cache
 def _compliance_splines(nu: float) -> list[RectBivariateSpline]:
-    logs = _logs(_SMALLEST)
+    logs = _logs(1e-8)
     return [RectBivariateSpline(logs, logs, _side_compliance(logs, nu))]
 
 
 @cache
 def _stress_splines(nu: float) -> list[RectBivariateSpline]:
     """Return splines of the stresses times x + x': so they vary little where both are short."""
-    logs = _logs(_SMALLEST_STRESS)
+    logs = _logs(1e-11)
     apart = np.add.outer(np.exp(logs), np.exp(logs))
     return [RectBivariateSpline(logs, logs, part) for part in _side_stresses(logs, nu) * apart]
 
@@ -112,7 +110,8 @@ def _values(splines: list[RectBivariateSpline], distances: Array) -> Array:
 
 
 def _logs(smallest: float) -> Array:
-    return np.arange(np.log(smallest), np.log(_LARGEST), _STEP)
+    """Return places of a table: logarithms of distances times wave number from a smallest one."""
+    return np.arange(np.log(smallest), np.log(40.0), _STEP)
 
 
 def _reflections(logs: Array, nu: float) -> tuple[Array, Array]:
@@ -171,7 +170,12 @@ def _decays(logs: Array, more: Array) -> tuple[Array, Array]:
 
 
 def side_traction(logs: Array, poisson_ratio: float) -> Array:
-    """Return A(z, x) at k = 1, compression positive, at depths and distances exp(logs)."""
+    """Return A(z, x) at k = 1, compression positive, shape (n, n).
+
+    Args:
+        logs: Logarithms of depths and distances, ascending, shape (n,).
+        poisson_ratio: ν.
+    """
     x = np.exp(logs)
     z, rho = x[:, None], np.hypot(x[:, None], x)
     direct = z * x**2 * kn(2, rho) / rho**2
@@ -181,7 +185,9 @@ def side_traction(logs: Array, poisson_ratio: float) -> Array:
 def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
     """Return σ_xx, σ_yy and σ_xy in the top by pressures on the side, at k = 1, shape (3, n, n).
 
-    Distances on the top and depths on the side, which come last, are exp(logs).
+    Args:
+        logs: Logarithms of distances on the top and of depths on the side, which come last, (n,).
+        poisson_ratio: ν.
     """
     x = np.exp(logs)[:, None]
     rho = np.hypot(x, x.T)

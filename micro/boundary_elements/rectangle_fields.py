@@ -32,37 +32,18 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
 from geometry.legendre_modes import mode_values
 from geometry.materials import Material
 from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.checks import positive_lengths
 
 Sides = tuple[bool, bool, bool, bool]
 """Low x, high x, low y and high y side of a rectangle."""
 
-_BATCH = 400_000
-"""Points of the rules that are summed at once: 3 MB for each kernel."""
 _NEAREST = 1e-9
 """Least distance, relative to the rectangle; nearer points count as so far."""
-_POINTS, _MORE = 4, 3.0
-"""Points of a rule beyond half the number of modes, and more for every factor e by which the
-rectangle is longer than the distance. They leave 1e-8 of the largest value, 4 more 1e-12."""
-_FAR, _ALONE = 1.5, 7
-"""Length over the distance below which one rule serves the whole length, and its points beyond half
-the number of modes."""
-_DEGREE = 5
-"""Degree of the pressures beyond a side."""
-_GRADED = 28
-"""Points along an axis that integrate over the rectangle what pressures beyond it do: 1e-6 are left
-of displacements and stresses."""
-_REACH = 0.5
-"""Length on which pressures vanish beyond a side, relative to the rectangle's length across it over
-the number of modes. On a cube of 12³ quadratic hexahedra with 8 modes, half of it, itself, twice
-and four times it left 0.03, 0.15, 0.2 and 0.3 per mille of the force on Set 1's recipe by
-displacements, and 0.9, 0.6, 0.8 and 2 with the stresses of finite slopes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,8 +103,14 @@ class RectangleFields:
 
     @property
     def reach(self) -> tuple[float, float]:
-        """Lengths ℓ along x and y that the pressures go on beyond sides [mm]."""
-        share = _REACH / self.count
+        """Lengths ℓ along x and y that the pressures go on beyond sides [mm].
+
+        They are half the rectangle's length over the number of modes. On a cube of 12³ quadratic
+        hexahedra with 8 modes, half of it, itself, twice and four times it left 0.03, 0.15, 0.2 and
+        0.3 per mille of the force on Set 1's recipe by displacements, and 0.9, 0.6, 0.8 and 2 with
+        the stresses of finite slopes.
+        """
+        share = 0.5 / self.count
         return share * self.lengths[0], share * self.lengths[1]
 
     def _parts(self) -> Iterator[tuple[int, int]]:
@@ -148,7 +135,8 @@ class RectangleFields:
         for size in np.unique(sizes, axis=0):
             members = np.flatnonzero((sizes == size).all(axis=1))
             many = int(np.prod(np.abs(size))) * 4
-            for some in np.array_split(members, -(-len(members) * many // _BATCH)):
+            # 3 MB for each kernel at once
+            for some in np.array_split(members, -(-len(members) * many // 400_000)):
                 rules = [
                     self._rule(axis, part, nearest[some, axis], apart[some], int(size[axis]))
                     for axis, part in enumerate(parts)
@@ -156,13 +144,17 @@ class RectangleFields:
                 kernels[some] = self._summed(points[some], *rules)
         return kernels
 
-    def _size(self, axis: int, part: int, apart: Array) -> NDArray[np.intp]:
-        """Return the points of a rule on either side of the nearest point, or −those of one."""
+    def _size(self, axis: int, part: int, apart: Array) -> Indices:
+        """Return the points of a rule on either side of the nearest point, or −those of one.
+
+        They leave 1e-8 of the largest value, with 4 more 1e-12. Where a part is not much longer
+        than the distance one rule serves all of it.
+        """
         low, high = self._interval(axis, part)
         longer = (high - low) / apart
-        least = 0.5 * (self.count if part == 0 else _DEGREE)
-        both = np.round(least + _POINTS + _MORE * np.ceil(np.log1p(longer)))
-        return np.where(longer < _FAR, -np.round(least + _ALONE), both).astype(np.intp)
+        least = 0.5 * (self.count if part == 0 else 5)  # half the degree of the pressures
+        both = np.round(least + 4.0 + 3.0 * np.ceil(np.log1p(longer)))
+        return np.where(longer < 1.5, -np.round(least + 7.0), both).astype(np.intp)
 
     def _summed(
         self, points: Array, along_x: tuple[Array, Array], along_y: tuple[Array, Array]
@@ -273,9 +265,10 @@ def _kernels(x: Array, y: Array, z: Array, nu: float) -> Array:
 def _graded(length: float, count: int) -> tuple[Array, Array]:
     """Return points that lie denser towards both ends, and the modes times their weights.
 
-    x = L (10 t³ − 15 t⁴ + 6 t⁵): a logarithm of the distance from an end becomes smooth.
+    x = L (10 t³ − 15 t⁴ + 6 t⁵): a logarithm of the distance from an end becomes smooth. The 28
+    points leave 1e-6 of displacements and stresses.
     """
-    nodes, weights = legendre.leggauss(_GRADED)
+    nodes, weights = legendre.leggauss(28)
     t = 0.5 * (1.0 + nodes)
     x = length * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
     slope = 30.0 * length * (t * (1.0 - t)) ** 2

@@ -20,27 +20,18 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 from scipy.special import spherical_jn
 
 from geometry.legendre_modes import mode_slopes, mode_values
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, gauss_points, values_at
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
 
 Part = Callable[[Array, float, int], Array]
 """Function of shifts, the length and the number of modes, with values of shape (shifts, K, K)."""
 
-_MORE = 12
-"""Points across a triangle beyond the number of modes: with v = sinh w they leave 1e-11."""
-_WAVES = 8
-"""Waves along a side, per mode: shorter ones are left out, as the cube of their length."""
-_NEAREST = 1.0 / 1024.0
-"""First node of the distance from a side, of its length over the square of the modes."""
-_FEW = 20
-"""Modes along a side up to which matrices are cached, of 1.3 or 3.8 MB then."""
-
-_of_few_modes = cached_where_small(lambda *arguments: arguments[-1] <= _FEW, most=8)
+# matrices of few modes, of 1.3 or 3.8 MB, are cached
+_of_few_modes = cached_where_small(lambda *arguments: arguments[-1] <= 20, most=8)
 
 
 @_of_few_modes
@@ -108,7 +99,8 @@ def _integrated(
         # the integrand is of degree 4 K − 2 in s
         steep = np.arcsinh(lengths[across] / lengths[along])
         s, weights = gauss_points(np.array([0.0, lengths[along]]), 2 * count)
-        w, others = gauss_points(np.array([0.0, steep]), count + _MORE)
+        # with v = sinh w so many points leave 1e-11
+        w, others = gauss_points(np.array([0.0, steep]), count + 12)
         direction = 1.0 / np.cosh(w), np.tanh(w)
         others = others * weight(*(reversed(direction) if flip else direction))
         first = _part(parts[along](s, lengths[along], count), sign) * weights[:, None, None]
@@ -196,8 +188,9 @@ def _by_two(sides: FreeSides, axis: int, count: int, *, stress: bool) -> Array:
         Displacements, or the stresses normal to the sides, along them and in shear, in front; shape
         (1 or 3, k, k', l, l').
     """
-    length, waves = sides.lengths[axis], np.arange(_WAVES * count)
-    nodes = distance_nodes(_NEAREST * length / count**2, length)
+    # waves are left out as the cube of their length
+    length, waves = sides.lengths[axis], np.arange(8 * count)
+    nodes = distance_nodes(length / 1024.0 / count**2, length)
     loads = _integrals(nodes, length, count)
     if stress:
         kernels = sides.stresses(axis, nodes, waves)
@@ -235,7 +228,7 @@ def _along(sides: FreeSides, axis: int, lines: Array, far: float) -> Array:
     return np.tensordot(lines, both, axes=(0, 0))
 
 
-def _waves(waves: NDArray[np.intp], count: int) -> Array:
+def _waves(waves: Indices, count: int) -> Array:
     """Return means of the modes times cos and sin πw(x/L − 1/2), shape (2, K, waves).
 
     ∫ P_k(t) exp(i z t) dt = 2 iᵏ j_k(z).

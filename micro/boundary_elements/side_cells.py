@@ -26,15 +26,6 @@ from support.cores import in_threads
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
-_NEAREST = 1.0 / 16.0
-"""First node of the distance from a side, in cells."""
-_NEAREST_STRESS = 1.0 / 256.0
-"""That for stresses: the mean over the cell in a corner of constant pressure then errs by 0.4 % of
-the largest stress, with 1/16 by 8 %."""
-_FEW_ROWS = 128
-"""Rows of cells up to which products with full matrices are quicker than with sparse ones."""
-_MANY_CELLS = 2**16
-"""Cells from which the sides across x and those across y gain by a thread of their own."""
 _LINES = 2**20
 """Numbers that the waves between rows of cells hold at most at a time."""
 _SWAPPED = [1, 0, 2]
@@ -72,11 +63,13 @@ class _SidePair:
         """
         length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
         step, period = length / rows, 2 * cells
-        nodes = distance_nodes((_NEAREST_STRESS if stress else _NEAREST) * step, length)
+        # with 1/16 the mean stress over the cell in a corner of constant pressure errs by 8 % of
+        # the largest one, with 1/256 by 0.4 %
+        nodes = distance_nodes(step / (256.0 if stress else 16.0), length)
         lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
         low, high = (float(there) for there in sides.pair(axis))
         both = csr_array(hstack([low * lower, high * lower[::-1]]))
-        means = both.toarray() if rows <= _FEW_ROWS else both
+        means = both.toarray() if rows <= 128 else both  # full matrices are quicker
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):
@@ -165,7 +158,7 @@ def _of_both(
     across_x: Callable[[], Array], across_y: Callable[[], Array], cells: int
 ) -> tuple[Array, Array]:
     """Return what the sides across x and those across y do, of many cells at the same time."""
-    if cells < _MANY_CELLS:
+    if cells < 2**16:  # which gain nothing by a thread of their own
         return across_x(), across_y()
     one, other = in_threads(lambda work: work(), [across_x, across_y])
     return one, other

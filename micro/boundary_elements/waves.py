@@ -24,11 +24,6 @@ from support.small_caches import cached_where_small
 Spectrum = NDArray[np.complex128]
 Around = Literal["copies", "mirrored", "nothing"]
 
-_KEPT, _DROPPED = 0.6, 0.9
-"""Of the shortest wave number of the coarse cells: kept whole below, left out above."""
-_FEW_CELLS = 2**16
-"""Coarse cells up to which what belongs to their waves is cached, with 10 MB then."""
-
 
 class Waves:
     """Waves on a torus of which a rectangle of coarse cells is the whole or a quarter.
@@ -76,10 +71,10 @@ class Waves:
         for axis, count in enumerate(self.padded):
             if count % 2 == 0:  # waves of two cells run either way
                 self.directions[2].swapaxes(0, axis)[count // 2] = 0.0
-        # falls from one to zero between two radii of the plane of wave numbers
+        # falls from one to zero between 0.6 and 0.9 of the shortest wave number of coarse cells
         x, y = (np.arange(count) / count for count in coarse)
         radius = np.hypot(x[:, None], y)
-        self._filter = np.clip((_DROPPED - radius) / (_DROPPED - _KEPT), 0.0, 1.0)
+        self._filter = np.clip((0.9 - radius) / (0.9 - 0.6), 0.0, 1.0)
 
     def coarsened(self, field: Array) -> Array:
         """Return a field on the coarse cells, without waves that are too short.
@@ -110,7 +105,7 @@ class Waves:
     @property
     def _threads(self) -> int:
         """Threads of a transform that gains by them."""
-        return cores() if self.grid[0] * self.grid[1] > _FEW_CELLS else 1
+        return cores() if self.grid[0] * self.grid[1] > 2**16 else 1
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""
@@ -166,6 +161,6 @@ class Waves:
 
 
 surface_waves = cached_where_small(
-    lambda grid, spacing, *, coarse, around: coarse[0] * coarse[1] <= _FEW_CELLS, most=8
+    lambda grid, spacing, *, coarse, around: coarse[0] * coarse[1] <= 2**16, most=8
 )(Waves)
-"""Waves on the cells of a surface, cached for the next surface of the same cells."""
+"""Waves on the cells of a surface, cached for the next surface of the same cells: 10 MB at most."""

@@ -35,10 +35,6 @@ from support.arrays import Array
 NEAREST = 30.0
 """Smallest confocal parameter v for which the series is exact to rounding."""
 
-_TERMS = 9
-_MANY = 512
-"""Points from which on the far field's series is faster than Carlson's integrals."""
-
 
 def elliptic_field(
     x_squared: Array, y_squared: Array, s: Array, beta: Array, v_min: Array | float = 0.0
@@ -53,7 +49,7 @@ def elliptic_field(
         v_min: Lower bound on v; 0 for the exact field.
     """
     v = np.maximum(confocal_parameter(x_squared / s, y_squared / s, beta), v_min)
-    if v.size < _MANY:
+    if v.size < 512:  # of few points Carlson's integrals are faster than the series
         return _carlson(x_squared, y_squared, s, beta, v)
     field, slope = far_field(x_squared, y_squared, s, beta, v)
     near = v < NEAREST
@@ -141,7 +137,7 @@ def _coefficients(beta: Array) -> tuple[list[Array], list[Array], list[Array]]:
     d1, d2, d3 = 1.0 - centre, beta - centre, -centre
     e2, e3 = d1 * d2 + d1 * d3 + d2 * d3, d1 * d2 * d3
     power = [np.ones_like(beta), np.zeros_like(beta), -0.5 * e2]
-    for n in range(3, _TERMS):
+    for n in range(3, 9):
         power.append(-((n - 1.0) * e2 * power[n - 2] + (n - 1.5) * e3 * power[n - 3]) / n)
     root = [term / (1.0 + 2.0 * n) for n, term in enumerate(power)]
     return root, _divided(power, d1), _divided(power, d2)

@@ -21,11 +21,6 @@ from scipy.linalg import toeplitz
 from geometry.patches import PatchGrid
 from support.arrays import Array
 
-_FAR = 6.0
-"""Distance over the longer side from which on Gauss' rule is the better of the two."""
-_POINTS = 6
-"""Points of Gauss' rule on a side; at the distance `_FAR` their error is rounding."""
-
 
 def love_centre(a: ArrayLike, b: ArrayLike) -> Array:
     """Return L at the centre of the rectangle [mm]; 3.5255 s for a square of side s.
@@ -98,7 +93,7 @@ def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
     """
     dx, dy = np.broadcast_arrays(np.asarray(dx, float), np.asarray(dy, float))
     result = np.asarray(love_mutual(dx, dy, a, b))
-    far = np.hypot(dx, dy) > _FAR * 2.0 * max(a, b)
+    far = np.hypot(dx, dy) > 6.0 * 2.0 * max(a, b)  # where Gauss' rule is the better of the two
     result[far] = _far_influence(dx[far], dy[far], a, b)
     return result
 
@@ -106,9 +101,10 @@ def mutual_influence(dx: ArrayLike, dy: ArrayLike, a: float, b: float) -> Array:
 def _far_influence(dx: Array, dy: Array, a: float, b: float) -> Array:
     """Return the mean from Gauss' rule over the shifts between points of the two rectangles.
 
-    The shifts along x have the density 1 − |t| at 2 a t, those along y at 2 b t.
+    From six longer sides on the error of six points on a side is rounding. The shifts along x have
+    the density 1 − |t| at 2 a t, those along y at 2 b t.
     """
-    nodes, weights = legendre.leggauss(_POINTS)
+    nodes, weights = legendre.leggauss(6)
     t, weights = 0.5 * (1.0 + nodes), 0.25 * weights * (1.0 - nodes)
     t, weights = np.concatenate([-t, t]), np.concatenate([weights, weights])
     total = np.zeros(np.shape(dx))

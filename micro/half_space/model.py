@@ -12,7 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import Control, Partition, PatchGrid, Surface
+from geometry import Control, PatchGrid, Surface
 from geometry.contact_state import ContactState, Start
 from geometry.plausibility import check_slopes
 from geometry.rigid_plane import RigidPlane, motion_units
@@ -183,7 +183,7 @@ class HalfSpaceModel:
         self,
         control: Control,
         *,
-        patches: Partition | None = None,
+        patches: PatchGrid | None = None,
         mean_heights: ArrayLike | None = None,
         start: Start | None = None,
     ) -> ContactState:

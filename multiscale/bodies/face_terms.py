@@ -165,8 +165,8 @@ class FaceTerms(ABC):
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
             half_space += self.side_term.patch_compliance(patches) / modulus
-            count = max(count, min(max(patches.shape), _MODES_OF_CORNERS))
+            count = max(count, min(max(patches.grid), _MODES_OF_CORNERS))
         else:
-            count = max(count, min(_MODES_PER_PATCH * max(patches.shape), _MOST_MODES))
+            count = max(count, min(_MODES_PER_PATCH * max(patches.grid), _MOST_MODES))
         correction = self.term(self.face(comm, modes=count))
         return np.asarray(half_space + correction.patch_compliance(patches))

@@ -22,7 +22,7 @@ from multiscale.bodies.face_terms import (
 from multiscale.bodies.scene_body import SceneBody
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactFacets, ElasticBody, FaceCompliance
+    from macro import ContactFacets, FaceCompliance, MeshedBody
     from macro.compliance.surroundings import Surroundings
 
 _SAME = 1e-9
@@ -42,14 +42,16 @@ class MeshTerms(FaceTerms):
         facets: Facets of its contact face; the frame's origin is the rectangle's lower corner.
         rectangle: The rectangle.
         around: What is around it.
+        origin: What tells the mesh from others: the digest of its file, and its size in mm.
         side_term: Free sides that are a term of their own; None where there is none.
         behind: Whether the body lies on the other side, in a frame turned about the y axis.
     """
 
-    body: ElasticBody
+    body: MeshedBody
     facets: ContactFacets
     rectangle: PatchGrid
     around: Surroundings
+    origin: tuple[object, ...]
     side_term: FreeSides | None = None
     behind: bool = False
 
@@ -97,6 +99,7 @@ class MeshTerms(FaceTerms):
             facets=facets,
             rectangle=rectangle,
             around=around,
+            origin=(scene_body.facts.digest, scene_body.facts.lengths),
             side_term=sides,
             behind=behind,
         )
@@ -134,11 +137,11 @@ class MeshTerms(FaceTerms):
         """
         from macro import FaceCompliance
         from macro.compliance.cache import cached
-        from macro.compliance.mesh_face import lowered, mesh_face_compliance, raised, turned
+        from macro.compliance.mesh_face import mesh_face_compliance, raised, turned
 
         count, body = self._count(modes), raised(self.body)
 
-        def of(one: ElasticBody) -> FaceCompliance:
+        def of(one: MeshedBody) -> FaceCompliance:
             fields = RectangleFields(
                 lengths=self.lengths,
                 count=count,
@@ -151,8 +154,7 @@ class MeshTerms(FaceTerms):
             )
 
         def compute() -> dict[str, Any]:
-            linear = lowered(body)
-            rough = None if linear is None else of(linear).normal
+            rough = of(body.linear).normal if body.degree == 2 else None
             return replace(of(body), rough=rough).arrays
 
         found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
@@ -164,13 +166,16 @@ class MeshTerms(FaceTerms):
         return count if self.around.below else min(count, _ON_MESH)
 
     def _key(self, count: int) -> tuple[object, ...]:
-        """Return what the compliance in so many modes along a side depends on; collective."""
-        from macro.compliance.cache import body_digest
+        """Return what the compliance in so many modes along a side depends on."""
         from macro.compliance.mesh_face import raised
 
-        frame = self.facets.frame
+        body, frame = raised(self.body), self.facets.frame
+        materials = body.materials
         return (
-            body_digest(raised(self.body)),
+            self.origin,
+            materials if isinstance(materials, Material) else tuple(sorted(materials.items())),
+            tuple(body.supports),
+            body.degree,
             (*frame.origin.tolist(), *frame.axes.ravel().tolist()),
             self.lengths,
             count,

@@ -6,7 +6,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody, TaggedMesh
+    from macro.mesh.tagged import PlanarFace
 
 MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
 """Units of meshes in mm."""
@@ -87,11 +88,11 @@ class _Reader:
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
         from macro import contact_facets
-        from macro.mesh.checks import check_size
+        from macro.mesh.checks import size_note
         from macro.mesh.from_file import read_mesh
 
         mesh = read_mesh(self._path, self._comm, unit=MILLIMETRES[self._section.mesh_unit])
-        check_size(mesh, key=f"{self._key}.mesh_unit")
+        note = size_note(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
         for region in regions:
             tag = mesh.facet_tag(region, key="law.regions")
@@ -109,13 +110,12 @@ class _Reader:
             for tag in tags
         )
         return SceneBody(
-            body=body, facets=facets, frame=frame, facts=self._facts(body, face, facets)
+            body=body, facets=facets, frame=frame, facts=self._facts(body, face, facets, note)
         )
 
     def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
         """Return the elastic body with its supports and loads."""
-        from macro import MeshedBody, Support, Traction
-        from macro.mesh.supports import check_supports, check_tractions
+        from macro import MeshedBody, Support, Traction, check_supports
 
         section, key = self._section, self._key
         supports = [
@@ -125,27 +125,28 @@ class _Reader:
             )
             for one in section.supports
         ]
-        for tag in contact:
-            check_supports(mesh, supports, tag, key=f"{key}.supports")
         loads = [
             Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
             for one in section.tractions
         ]
         for tag in contact:
-            check_tractions(mesh, loads, supports, tag, key=f"{key}.tractions")
+            check_supports(mesh, supports, tag, loads, key=key)
         x, y, z = map(float, frame.normal)
         order = 1 if section.element == "linear" else 2
         return MeshedBody(
             mesh, self._materials(mesh), supports, loads, normal=(x, y, z), order=order
         )
 
-    def _facts(self, body: MeshedBody, face: _Face, facets: Sequence[ContactFacets]) -> BodyFacts:
+    def _facts(
+        self,
+        body: MeshedBody,
+        face: PlanarFace,
+        facets: Sequence[ContactFacets],
+        note: str | None,
+    ) -> BodyFacts:
         """Return what is known of the body without its mesh."""
-        from macro.mesh.checks import size_note
-
         lowest, highest = self._extent(body.mesh, face.frame)
         cells = int(body.mesh.mesh.topology.index_map(3).size_global)
-        note = size_note(body.mesh)
         return BodyFacts(
             lengths=face.lengths,
             area=face.area,
@@ -160,18 +161,14 @@ class _Reader:
             notes=(*filter(None, [note]), *self._curved(face)),
         )
 
-    def _face(self, mesh: TaggedMesh, tags: Sequence[int]) -> _Face:
+    def _face(self, mesh: TaggedMesh, tags: Sequence[int]) -> PlanarFace:
         """Return the plane of the contact face with all its regions."""
-        from macro.mesh.tagged import planar_face
+        from macro.mesh.tagged import PlanarFace, planar_face
 
-        names = {tag: name for name, tag in mesh.facet_names.items()}
         curved = self._scene.law.representative
         allowed = _MOST_CURVED * self._shortest(mesh) if curved else 0.0
         faces = [
-            planar_face(
-                mesh, tag, name=names.get(tag), deviation=allowed, key=f"{self._key}.contact"
-            )
-            for tag in tags
+            planar_face(mesh, tag, deviation=allowed, key=f"{self._key}.contact") for tag in tags
         ]
         first, corners = faces[0], []
         for face, tag in zip(faces, tags, strict=True):
@@ -179,14 +176,14 @@ class _Reader:
             apart = abs(height) > max(allowed, _SAME_PLANE * max(first.lengths))
             if apart or face.frame.normal @ first.frame.normal < 1.0 - _SAME_PLANE:
                 raise InputError(
-                    f"the surface {names.get(tag, str(tag))!r} does not lie in the plane of the "
+                    f"the surface {mesh.facet_name(tag)!r} does not lie in the plane of the "
                     f"contact face: it is {height:.4g} mm above it",
                     key="law.regions",
                 )
             corners += [face.frame.in_space([[0.0, 0.0], face.lengths])]
         frame = FaceFrame.through(np.concatenate(corners), first.frame.normal)
         lengths = frame.in_plane(np.concatenate(corners)).max(axis=0)
-        return _Face(
+        return PlanarFace(
             frame=frame,
             lengths=(float(lengths[0]), float(lengths[1])),
             area=sum(face.area for face in faces),
@@ -208,14 +205,7 @@ class _Reader:
 
     def _at_face(self, body: MeshedBody, facets: ContactFacets) -> Material:
         """Return the material of the cells at a face, which must be one."""
-        materials = body.materials
-        if isinstance(materials, Material):
-            return materials
-        tags = body.mesh.cell_tags
-        of_cells = np.zeros(int(tags.indices.max(initial=-1)) + 1, dtype=np.int64)
-        of_cells[tags.indices] = tags.values
-        here = set(map(int, of_cells[facets.cell]))
-        found = {materials[tag] for part in self._comm.allgather(here) for tag in part}
+        found = body.materials_of(facets.cell)
         if len(found) > 1:
             raise InputError(
                 "the contact face has cells of several materials",
@@ -232,22 +222,12 @@ class _Reader:
         lowest, highest = zip(*parts, strict=True)
         return float(min(lowest)), float(max(highest))
 
-    def _curved(self, face: _Face) -> Iterator[str]:
+    def _curved(self, face: PlanarFace) -> Iterator[str]:
         if face.deviation > _SAME_PLANE * max(face.lengths):
             yield (
                 f"the contact face of {self._key} is up to {2.0 * face.deviation:.3g} mm below its "
                 "highest point; that gap closes before laws act there"
             )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Face:
-    """A contact face with all its regions."""
-
-    frame: FaceFrame
-    lengths: tuple[float, float]
-    area: float
-    deviation: float
 
 
 def _components(

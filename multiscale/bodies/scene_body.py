@@ -8,8 +8,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from geometry.face_frame import FaceFrame
 from multiscale.inputs.body_facts import BodyFacts
 
@@ -40,9 +38,5 @@ class SceneBody:
         Args:
             place: The point in the present coordinates [mm].
         """
-        frame = self.frame.moved(*place)
-        facets = tuple(
-            replace(part, frame=frame, corners=part.corners - np.asarray(place))
-            for part in self.facets
-        )
-        return replace(self, frame=frame, facets=facets)
+        facets = tuple(part.moved(*place) for part in self.facets)
+        return replace(self, frame=self.frame.moved(*place), facets=facets)

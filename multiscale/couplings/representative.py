@@ -297,11 +297,10 @@ class RepresentativeCoupling(LawCoupling):
         self, path: Path, states: Mapping[int, Any], steps: Sequence[LoadStep]
     ) -> None:
         """Write the fields of the body; the first body alone has the pressures."""
-        from macro import AtPoints
         from multiscale.couplings.fields import write_displaced
 
         def pressures(step: int, counter: bool) -> Any:
-            return None if counter else AtPoints(states[step][1])
+            return None if counter else states[step][1]
 
         moved = {step: state[0] for step, state in states.items()}
         write_displaced(path, self._solver.face, moved, pressures)

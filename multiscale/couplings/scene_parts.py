@@ -137,7 +137,7 @@ class SceneParts:
     @cached_property
     def asperities(self) -> Asperities:
         """The surface's summits; found when first needed, which takes seconds on 4096² heights."""
-        return find_asperities(self.surface, periodic=False)  # the block's sides are free
+        return find_asperities(self.surface)  # the block's sides are free
 
     @property
     def summits(self) -> Asperities | None:

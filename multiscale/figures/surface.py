@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
-from geometry.spectrum import Spectrum
+from geometry.spectrum import Spectrum, random_waves
 from geometry.statistics import power_spectrum, roughness
 from geometry.surface import Surface
-from geometry.synthesis import random_waves
 from multiscale.figures.maps import coarsened, colour_bar, draw_patch_borders, map_axes
 from multiscale.figures.style import (
     BLUE,

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
-from geometry.meshes.expected_contact import contact_radius
-from geometry.meshes.families import Shape, characteristic_size, reference_shapes
+from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
 from multiscale.inputs.block import block_section
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from geometry.materials import Material, PoissonRatio
@@ -18,6 +18,7 @@ from support.fields import (
     PositivePressure,
     Pressure,
     Unit,
+    changed_fields,
     part_of,
 )
 from support.quantities import example
@@ -137,14 +138,11 @@ class CounterBodySection:
 
     def _check_half_space(self) -> None:
         """Refuse what is about a mesh."""
-        for one in sorted(fields(CounterBodySection), key=lambda one: one.name):
-            default = {} if one.name == "materials" else one.default
-            constant = one.name in ("young_modulus", "poisson_ratio")
-            if not constant and getattr(self, one.name) != default:
-                raise InputError(
-                    f"'{one.name}' needs a 'mesh'",
-                    allowed="a mesh; or young_modulus and poisson_ratio alone, of a half-space",
-                )
+        for name in sorted({*changed_fields(self)} - {"young_modulus", "poisson_ratio"}):
+            raise InputError(
+                f"'{name}' needs a 'mesh'",
+                allowed="a mesh; or young_modulus and poisson_ratio alone, of a half-space",
+            )
 
     @property
     def whole_material(self) -> Material | None:
@@ -223,11 +221,11 @@ class ConductanceSection:
 
 def _check_pair(key: str, values: tuple[float, ...] | None, unit: str) -> None:
     """Refuse anything but positive values of one body or of both."""
-    if values is None:
-        return
-    allowed = f"one or two quantities > 0 such as {example(unit)}"
-    if len(values) not in (1, 2):
+    problem = ""
+    if values is not None and len(values) not in (1, 2):
         problem = "needs a value for one body or for both"
-        raise InputError(problem, key=key, value=list(values), allowed=allowed)
-    if not min(values) > 0.0:
-        raise InputError("must be greater than 0", key=key, value=list(values), allowed=allowed)
+    elif values and not min(values) > 0.0:
+        problem = "must be greater than 0"
+    if problem:
+        allowed = f"one or two quantities > 0 such as {example(unit)}"
+        raise InputError(problem, key=key, value=list(values or ()), allowed=allowed)

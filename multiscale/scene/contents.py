@@ -107,7 +107,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
     problems = chain(
         *(rule(scene) for rule in (_bodies, _surfaces, _couplings)),
         _representative_laws(scene, of_coupling),
-        *(rule(scene) for rule in (_hardness, _conductance)),
+        _micro_models(scene),
     )
     for key, problem, allowed in problems:
         raise InputError(problem, key=key, allowed=allowed or None)
@@ -146,8 +146,11 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
             "law.kind = 'representative'",
         )
     other = scene.counter_surface
-    if scene.surface.lacks_grid and (scene.accuracy is None or other is not None):
-        yield "surface", "a 'spectrum' needs 'grid' and 'lengths' beside it", ""
+    chosen = scene.accuracy is not None and other is None
+    maps = [("law.regions", region) for region in scene.law.regions]
+    for key, one in [("surface", scene.surface), ("counter_surface", other), *maps]:
+        if one is not None and one.lacks_grid and not (chosen and key == "surface"):
+            yield key, "a 'spectrum' needs 'grid' and 'lengths' beside it", ""
     if other is None:
         return
     if other.periodic != scene.surface.periodic:
@@ -157,15 +160,22 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
 
 
 def _couplings(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what a coupling has no use for, and what it leaves out."""
+    block = "which meshes a block under a rigid, smooth plane"
+    apart = "whose meshes do not tell the stiffness of the interface from that of the block"
+    for key, value, kinds, reason in (
+        ("body", scene.body, {"reference"}, block),
+        ("counter_body", scene.counter_body, {"reference"}, block),
+        ("counter_surface", scene.counter_surface, {"reference"}, block),
+        ("conductance", scene.conductance, {"reference"}, apart),
+        ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
+    ):
+        if value is not None and scene.kind in kinds:
+            others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))
+            allowed = " or ".join(one for one in others if one[1:-1] not in kinds)
+            problem = f"does not go with coupling.kind = '{scene.kind}', {reason}"
+            yield key, problem, f"coupling.kind = {allowed}"
     coupling, second = scene.coupling, scene.counter_body
-    for name in ("body", "counter_body", "counter_surface"):
-        if coupling.kind == "reference" and getattr(scene, name) is not None:
-            yield (
-                "coupling.kind",
-                f"reference does not go with [{name}]: what is meshed is a block under a rigid, "
-                "smooth plane",
-                "'concurrent', 'consistent', 'isolated'",
-            )
     on_mesh = coupling.newton == "full" or coupling.interface == "pointwise"
     if second is not None and second.mesh is None and coupling.kind == "isolated" and on_mesh:
         yield (
@@ -210,52 +220,28 @@ def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> It
         yield "body.place", f"does not go with {law}, whose sample has no place", out
 
 
-def _hardness(scene: SceneSections) -> Iterator[Problem]:
-    """Yield what has no plastic depth, or forgets it."""
-    if scene.micro.hardness is None:
-        return
-    if scene.micro.model != "half-space":
-        yield (
-            "micro.hardness",
-            f"does not go with micro.model = '{scene.micro.model}', which has no cells to yield",
-            "micro.model = 'half-space'",
-        )
-    if scene.kind in ("isolated", "reference"):
-        yield (
-            "micro.hardness",
-            f"does not go with coupling.kind = '{scene.kind}', which is elastic",
-            "coupling.kind = 'concurrent', 'consistent' or 'analytic'",
-        )
-    if scene.kind in ("consistent", "representative", "auto") and scene.loading.unloads:
+def _micro_models(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what micro models, and patch laws that stand for them, do not know."""
+    cells, concurrent = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
+    model, by_laws = scene.micro.model, scene.kind in ("consistent", "isolated", "representative")
+    yields, conducts = scene.micro.hardness is not None, scene.conductance is not None
+    if yields and model != "half-space":
+        problem = f"does not go with micro.model = '{model}', which has no cells to yield"
+        yield "micro.hardness", problem, cells
+    if yields and scene.loading.unloads and (by_laws or scene.kind == "auto"):
         yield (
             "micro.hardness",
             "does not go with a load that turns back where patch laws stand for the contact: "
             "they are those of rising loads and have no plastic depth",
-            "coupling.kind = 'concurrent'",
+            concurrent,
         )
-
-
-def _conductance(scene: SceneSections) -> Iterator[Problem]:
-    """Yield what does not know the stiffness of the interface alone."""
-    if scene.conductance is None:
-        return
-    if scene.kind == "reference":
-        yield (
-            "conductance",
-            "does not go with coupling.kind = 'reference', whose meshes do not tell the stiffness "
-            "of the interface from that of the block",
-            "coupling.kind = 'concurrent', 'consistent', 'isolated' or 'analytic'",
-        )
-    if scene.micro.hardness is not None and scene.kind not in ("concurrent", "analytic"):
+    if conducts and yields and (by_laws or scene.kind == "auto"):
         yield (
             "conductance",
             "does not go with micro.hardness where patch laws stand for the contact: their "
             "stiffness is that of contacts that yield, which conduct all the same",
-            "coupling.kind = 'concurrent'",
+            concurrent,
         )
-    if scene.kind in ("concurrent", "analytic", "auto") and scene.micro.model != "half-space":
-        yield (
-            "conductance",
-            f"does not go with micro.model = '{scene.micro.model}' without laws",
-            "micro.model = 'half-space'; or coupling.kind = 'consistent' or 'isolated'",
-        )
+    if conducts and model != "half-space" and not by_laws:
+        problem = f"does not go with micro.model = '{model}' without laws"
+        yield "conductance", problem, f"{cells}; or coupling.kind = 'consistent' or 'isolated'"

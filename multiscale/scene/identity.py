@@ -18,8 +18,6 @@ from multiscale.scene.scene import Scene
 VERSION = "version of patchlaw"
 CONTENT = "content of "
 _DRAWN = ("output.figures", "output.report", "output.fields")
-_DIGITS = 20  # of a SHA-256 that are kept
-_MOST_SHOWN = 3  # keys that differ
 
 _ARRAYS = re.compile(rb"[^\s<>\"':]+\.h5(?=:)")
 """Names of HDF5 files in an XDMF file, relative to its folder."""
@@ -34,7 +32,7 @@ def identity(scene: Scene) -> dict[str, Any]:
     Args:
         scene: The scene; what it wants drawn is left out.
     """
-    digests = {key: content_digest(path)[:_DIGITS] for key, path in scene.files().items()}
+    digests = {key: content_digest(path)[:20] for key, path in scene.files().items()}
     return flat_identity(scene.to_dict(), digests, version("patchlaw"))
 
 
@@ -73,8 +71,8 @@ def changes(now: Mapping[str, Any], then: Mapping[str, Any]) -> Iterator[Change]
 
 def told(differing: list[Change]) -> str:
     """Return the first changes as the end of a sentence that begins with "where"."""
-    shown = ", ".join(f"{key} was {old!r}" for key, _, old in differing[:_MOST_SHOWN])
-    return shown + f" and {len(differing) - _MOST_SHOWN} more" * (len(differing) > _MOST_SHOWN)
+    shown = ", ".join(f"{key} was {old!r}" for key, _, old in differing[:3])
+    return shown + f" and {len(differing) - 3} more" * (len(differing) > 3)
 
 
 def content_digest(path: Path) -> str:

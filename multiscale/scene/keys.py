@@ -14,9 +14,6 @@ from typing import Any
 from multiscale.scene.contents import SceneSections
 from multiscale.scene.reader import model_of
 
-_ANY = 1e9
-"""A bound from here on is none that a user meets."""
-
 
 @dataclass(frozen=True, slots=True)
 class Key:
@@ -112,8 +109,9 @@ def _values(schema: Mapping[str, Any]) -> str:
 
 def _bounds(schema: Mapping[str, Any]) -> str:
     signs = {"minimum": "≥", "exclusiveMinimum": ">", "maximum": "≤", "exclusiveMaximum": "<"}
+    # a bound of 10⁹ is none that a user meets
     stated = {sign: schema[name] for name, sign in signs.items() if name in schema}
-    bounds = [f"{sign} {bound:g}" for sign, bound in stated.items() if bound < _ANY]
+    bounds = [f"{sign} {bound:g}" for sign, bound in stated.items() if bound < 1e9]
     return f" {' and '.join(bounds)}" if bounds else ""
 
 

@@ -6,11 +6,8 @@ meanings in the section ``Args`` of its docstring.
 
 from __future__ import annotations
 
-import ast
 import inspect
 import re
-import sys
-import textwrap
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
 from functools import cache
@@ -89,8 +86,8 @@ def model_of(record: Any) -> type[BaseModel]:
     hints, (summary, meanings) = get_type_hints(record, include_extras=True), described(record)
     keys = {field.name: field for field in fields(record) if key_of(field)}
     stated: dict[str, Any] = {
-        name: (_readable(hints[name]), _stated(keys[name], meaning))
-        for name, meaning in meanings.items()
+        name: (_readable(hints[name]), _stated(keys[name], meanings.get(name, "")))
+        for name in meanings or keys  # Python may be told to drop docstrings
         if name in keys
     }
     return pydantic.create_model(record.__name__, __config__=_CONFIG, __doc__=summary, **stated)
@@ -104,19 +101,11 @@ def described(record: Any) -> tuple[str, dict[str, str]]:
     """
     meanings: dict[str, str] = {}
     for base in filter(is_dataclass, record.__mro__):
-        _, _, rest = _docstring(base).partition("\n\nArgs:\n")
+        _, _, rest = (inspect.getdoc(base) or "").partition("\n\nArgs:\n")
         _, *parts = _ARGUMENT.split(rest.partition("\n\n")[0])
         for name, text in zip(parts[::2], parts[1::2], strict=True):
             meanings.setdefault(name, _OF_NUMBERS.sub("", inspect.cleandoc(text)))
-    return _docstring(record).partition("\n\nArgs:\n")[0], meanings
-
-
-def _docstring(record: Any) -> str:
-    """Return the docstring of a record, from its source where Python was told to drop it."""
-    if sys.flags.optimize < 2:
-        return inspect.getdoc(record) or ""
-    (definition,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
-    return ast.get_docstring(cast(ast.ClassDef, definition)) or ""
+    return (inspect.getdoc(record) or "").partition("\n\nArgs:\n")[0], meanings
 
 
 def _stated(field: Field[Any], meaning: str) -> Any:

@@ -12,7 +12,7 @@ from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.bodies import Cells
 from multiscale.scene.surface import Auto, RegionSection
 from support.errors import InputError
-from support.fields import Count, Limits, PositiveLength, PositivePressure
+from support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
@@ -208,9 +208,8 @@ class LawSection:
     crown: tuple[Radius, Radius] | None = None
 
     def __post_init__(self) -> None:
-        for key in ("seeds", "largest_pressure", "regions", "crown"):
-            if self.kind == "patch" and getattr(self, key):
-                raise InputError(f"'{key}' needs kind = 'representative'", allowed="leave it out")
+        for key in changed_fields(self) if self.kind == "patch" else ():
+            raise InputError(f"'{key}' needs kind = 'representative'", allowed="leave it out")
         if len(set(self.seeds)) < len(self.seeds):
             raise InputError(f"seeds = {list(self.seeds)} has one twice", allowed="different seeds")
         names = [region.surface for region in self.regions]

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, InstanceOf
 from pydantic.json_schema import SkipJsonSchema
 
-from geometry.files.content import LENGTH_UNITS, length_unit
+from geometry.files.content import length_unit
 from geometry.preparation import Preparation
 from geometry.spectrum import Spectrum
 from support.checks import real_array
-from support.errors import InputError, did_you_mean
-from support.fields import Heights, Length, Limits, PositiveLength, Unit
+from support.errors import InputError
+from support.fields import Heights, Length, Limits, PositiveLength, Unit, changed_fields
 
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
@@ -90,9 +90,6 @@ class SurfaceSection(Preparation):
             ``coupling.kind = "analytic"`` alone.
     """
 
-    grid_is_open: ClassVar[bool] = True
-    """Whether a spectrum may be without a grid, for an accuracy to choose it."""
-
     spectrum: Spectrum | None = None
     file: Annotated[str, NAMES_A_FILE] | None = None
     heights: HeightsInMemory = None
@@ -110,13 +107,11 @@ class SurfaceSection(Preparation):
             )
         if self.heights is not None and self.lengths is None:
             raise InputError("'heights' need 'lengths' beside them")
-        without_grid = self.grid is None and not self.grid_is_open
-        if self.spectrum is not None and (without_grid or self.lengths is None):
+        if self.spectrum is not None and self.lengths is None:
             raise InputError("a 'spectrum' needs 'grid' and 'lengths' beside it")
         maps = ("height_unit", "channel", "swap_xy", "crop", "missing", "outliers", "resample")
-        defaults = {field.name: field.default for field in fields(self)}
         for key in maps:
-            if self.spectrum is not None and getattr(self, key) != defaults[key]:
+            if self.spectrum is not None and key in changed_fields(self):
                 raise InputError(f"'{key}' needs a 'file'", allowed="leave it out")
         if self.heights is not None and (self.grid, self.channel) != (None, None):
             raise InputError("'heights' have their own grid, and no channel", allowed="neither")
@@ -126,22 +121,12 @@ class SurfaceSection(Preparation):
                 allowed="the grid of the file, or leave it out",
             )
         if self.height_unit is not None:
-            _check_unit(self.height_unit)
+            length_unit(self.height_unit)
 
     @property
     def lacks_grid(self) -> bool:
-        """Whether a spectrum is sampled on a grid that only an accuracy decides."""
+        """Whether a spectrum is without a grid, which only an accuracy may choose."""
         return self.spectrum is not None and self.grid is None
-
-
-def _check_unit(unit: str) -> None:
-    try:
-        length_unit(unit)
-    except InputError:
-        hint = did_you_mean(unit, LENGTH_UNITS, cutoff=1.0)
-        raise InputError(
-            f"height_unit = '{unit}' is no unit of heights{hint}", allowed=", ".join(LENGTH_UNITS)
-        ) from None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -157,8 +142,6 @@ class CounterSurfaceSection(SurfaceSection):
             before it is moved. Quarters of a turn are exact; others interpolate, on a periodic or
             larger map.
     """
-
-    grid_is_open: ClassVar[bool] = False
 
     shift: tuple[Length, Length] = (0.0, 0.0)
     rotation: Annotated[float, Unit("deg")] = 0.0
@@ -178,7 +161,5 @@ class RegionSection(SurfaceSection):
     Args:
         surface: Physical name or number of the face.
     """
-
-    grid_is_open: ClassVar[bool] = False
 
     surface: Tag

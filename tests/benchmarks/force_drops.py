@@ -23,7 +23,7 @@ PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 def models(seed):
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=seed)
     surface = synthesise(spectrum, grid=(128, 128), lengths=(1.0, 1.0))
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     for kind in MODELS:
         yield kind, AsperityModel(kind, asperities, contact_modulus=4000.0)
 

@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import Material, Partition
+from geometry import Material, PatchGrid
 from micro.closed_forms.love import corner_integral
 from support.errors import InputError
 
@@ -50,7 +50,7 @@ def love_integral(x: ArrayLike, y: ArrayLike, a: ArrayLike, b: ArrayLike) -> Arr
 
 
 def displacements(
-    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid
 ) -> Array:
     """Return displacements of a half-space by unit pressure on each rectangle alone.
 
@@ -82,7 +82,7 @@ def displacements(
 
 
 def stresses(
-    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+    material: Material, x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid
 ) -> Array:
     """Return stresses in a half-space by unit pressure on each rectangle alone, tension positive.
 
@@ -121,7 +121,7 @@ def stresses(
 
 
 def _corners(
-    x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: Partition
+    x: ArrayLike, y: ArrayLike, depth: ArrayLike, loads: PatchGrid
 ) -> tuple[Array, Array, Array, Array]:
     """Measure from the crossings of the loads' borders to points.
 
@@ -157,7 +157,7 @@ def _angle(along: Array, across: Array, z: Array, r: Array) -> Array:
     return np.asarray(np.arctan2(both, along * along * r + across * across * z))
 
 
-def _differences(parts: tuple[Array, ...], loads: Partition, divisor: float) -> Array:
+def _differences(parts: tuple[Array, ...], loads: PatchGrid, divisor: float) -> Array:
     """Difference corner terms to rectangles and divide them, shape (parts, n, M).
 
     Distances to the lower border are the longer ones: it counts positive.

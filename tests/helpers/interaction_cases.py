@@ -7,8 +7,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq, root
 
 from geometry import Asperities, Material, PatchGrid, find_asperities, patch_means
-from geometry.spectrum import Spectrum
-from geometry.synthesis import synthesise
+from geometry.spectrum import Spectrum, synthesise
 
 E_STAR = Material(young_modulus=4000.0, poisson_ratio=0.15).contact_modulus
 PATCHES = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))
@@ -38,7 +37,7 @@ def set_1(seed, grid=128):
     """Return a surface of the paper's Set 1, its asperities and its patches' mean heights."""
     spectrum = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=seed)
     surface = synthesise(spectrum, grid=(grid, grid), lengths=(1.0, 1.0))
-    return surface, find_asperities(surface, periodic=False), patch_means(surface, PATCHES)
+    return surface, find_asperities(surface), patch_means(surface, PATCHES)
 
 
 @dataclass

@@ -14,8 +14,8 @@ from mpi4py import MPI
 from scipy.spatial import cKDTree
 
 from geometry import Control, RefinedShape, Surface, reference_shapes
-from geometry.meshes.expected_contact import contact_radius
-from geometry.meshes.stepped import SteppedShape
+from geometry.meshes.families import contact_radius
+from helpers.stepped import SteppedShape, rough_stepped_mesh
 from macro import (
     Material,
     MeshedBody,
@@ -23,7 +23,6 @@ from macro import (
     Support,
     UnilateralContactProblem,
     nodal_contact,
-    rough_stepped_mesh,
 )
 from multiscale import Scene, extrapolated
 
@@ -142,7 +141,7 @@ class Reference:
         mesh, _ = rough_stepped_mesh(shape, HELD, self.surface, comm)
         supports = [Support(tag=mesh.facet_names["held"])]
         body = MeshedBody(mesh, Material(**ELASTIC), supports, order=shape.degree)
-        face = RoughFace.of_body(body, mesh.facet_names["rough"], LENGTHS)
+        face = RoughFace(body, mesh.facet_names["rough"], LENGTHS)
         problem = UnilateralContactProblem(face, top)
         states = [problem.solve(Control(approach=approach)) for approach in self.approaches]
         nodes = nodal_contact(problem, states[-1])

@@ -8,7 +8,7 @@ from dolfinx import mesh as dmesh
 from helpers.block_cases import block_of, interface_of
 
 from macro import Material, compat
-from macro.elasticity import stiffness_form, stress
+from macro.elastic_body import stiffness_form, stress
 from macro.linear_solvers.solvers import linear_solver, solve_linear
 
 MATERIAL = Material(young_modulus=2.0, poisson_ratio=0.3)

@@ -142,8 +142,11 @@ def test_measured_parts_are_mirrored():
     """
     spectrum = Spectrum(hurst=0.8, waves=(4, 12), rms_slope=0.1, seed=1)
     whole = synthesise(spectrum, grid=(64, 64), lengths=(2.0, 2.0))
-    corners = [((i, i + 1.0), (j, j + 1.0)) for i in (0.0, 1.0) for j in (0.0, 1.0)]
-    quarters = [whole.cropped(x=x, y=y) for x, y in corners]
+    quarters = [
+        Surface(heights=part, lengths=(1.0, 1.0))
+        for half in np.split(whole.heights, 2)
+        for part in np.split(half, 2, axis=1)
+    ]
 
     def separation(samples):
         law = representative_law(samples, 1.0, largest_pressure=0.05, tolerance=0.01)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Spectrum, Surface, find_asperities, synthesise
-from geometry.synthesis import random_waves
+from geometry.spectrum import random_waves
 
 GRIDS = (48, 96, 192)
 

@@ -61,19 +61,7 @@ def test_climbs_slopes_and_oblique_ridges_to_their_end():
     assert len(np.unique(coincident(ridge, starts))) == 2
 
 
-def test_goes_on_across_the_border_where_that_does_not_end_the_surface():
-    x = (np.arange(N) + 0.5) / N
-    waves = np.cos(2.0 * np.pi * (x - 0.01))
-    surface = Surface(heights=np.add.outer(waves, waves), lengths=(1.0, 1.0), periodic=True)
-    start = np.array([[0.975, 0.025]])
-    # the spline through 20 samples of a wave misses the place by 4e-5
-    free = constrained_summits(surface, start, bounded=False)
-    np.testing.assert_allclose(free, [[1.01, 0.01]], atol=1e-4)
-    held = constrained_summits(surface, start)
-    assert held[0] == pytest.approx((1.0, 0.01), abs=1e-4)
-
-
-def flooded(heights, periodic):
+def flooded(heights):
     """Flood every plateau and look at all its neighbours: slow and obviously right."""
     nx, ny = heights.shape
     seen, found = set(), []
@@ -82,9 +70,7 @@ def flooded(heights, periodic):
         for di in (-1, 0, 1):
             for dj in (-1, 0, 1):
                 i, j = cell[0] + di, cell[1] + dj
-                if periodic:
-                    yield i % nx, j % ny
-                elif 0 <= i < nx and 0 <= j < ny:
+                if 0 <= i < nx and 0 <= j < ny:
                     yield i, j
 
     for start in np.ndindex(nx, ny):
@@ -101,17 +87,16 @@ def flooded(heights, periodic):
         seen |= plateau
         edge = any(i in (0, nx - 1) or j in (0, ny - 1) for i, j in plateau)
         if highest:
-            found.append((start, len(plateau), edge and not periodic))
+            found.append((start, len(plateau), edge))
     return found
 
 
-@pytest.mark.parametrize("periodic", [False, True])
 @pytest.mark.parametrize("levels", [2, 3, 6, 1000])
 @pytest.mark.parametrize("seed", range(3))
-def test_maxima_and_plateaus_against_flooding(levels, seed, periodic):
+def test_maxima_and_plateaus_against_flooding(levels, seed):
     heights = np.random.default_rng(seed).integers(0, levels, (11, 8)).astype(float)
-    expected = flooded(heights, periodic)
-    maxima = grid_maxima(heights, periodic=periodic)
+    expected = flooded(heights)
+    maxima = grid_maxima(heights)
     assert len(maxima.height) == len(expected) > 0
     np.testing.assert_array_equal(maxima.height, [heights[start] for start, _, _ in expected])
     np.testing.assert_array_equal(maxima.on_border, [edge for _, _, edge in expected])
@@ -123,27 +108,17 @@ def test_maxima_and_plateaus_against_flooding(levels, seed, periodic):
 def test_a_plateau_counts_once_in_its_middle():
     heights = np.zeros((8, 9))
     heights[2:4, 3:6] = 1.0
-    maxima = grid_maxima(heights, periodic=False)
+    maxima = grid_maxima(heights)
     np.testing.assert_allclose(maxima.position, [[2.5, 4.0]])
-
-
-def test_a_plateau_across_a_periodic_border_counts_once():
-    heights = np.zeros((8, 9))
-    heights[[0, 0, -1, -1], [0, -1, 0, -1]] = 1.0
-    maxima = grid_maxima(heights, periodic=True)
-    assert maxima.position.shape == (1, 2) and not maxima.on_border[0]
-    np.testing.assert_allclose(np.mod(maxima.position, (8, 9)), [[7.5, 8.5]])
-    assert grid_maxima(heights, periodic=False).on_border.sum() == 4
 
 
 def test_a_shoulder_is_no_maximum():
     heights = np.zeros((7, 7))
     heights[2:5, 2:5] = 1.0
     heights[4, 5] = 2.0  # touches the plateau's corner only
-    assert grid_maxima(heights, periodic=False).height.tolist() == [2.0]
+    assert grid_maxima(heights).height.tolist() == [2.0]
 
 
 def test_a_flat_map_is_one_plateau():
-    maxima = grid_maxima(np.zeros((6, 5)), periodic=False)
+    maxima = grid_maxima(np.zeros((6, 5)))
     assert maxima.height.tolist() == [0.0] and maxima.on_border.tolist() == [True]
-    assert grid_maxima(np.zeros((6, 5)), periodic=True).on_border.tolist() == [False]

@@ -72,7 +72,7 @@ def test_points_outside_are_refused_with_their_number():
     with pytest.raises(InputError, match=r"2\.5: 1 points lie outside the surface.*≤ x ≤ 2\.0"):
         plane().height_at([0.0, 2.5], 1.0)
     with pytest.raises(InputError, match="≤ y ≤"):
-        plane().gradient_at(1.0, -1e-9)
+        plane().interpolant(1.0, -1e-9, dx=1)
     with pytest.raises(InputError, match="outside"):
         plane().height_at(np.nan, 1.0)
 
@@ -80,7 +80,7 @@ def test_points_outside_are_refused_with_their_number():
 def test_evaluation_broadcasts():
     surface = plane()
     assert surface.height_at(np.zeros((3, 1)), np.zeros(4)).shape == (3, 4)
-    assert surface.gradient_at(np.zeros((3, 1)), np.zeros(4)).shape == (3, 4, 2)
+    assert surface.interpolant(np.zeros((3, 1)), np.zeros(4), dx=1).shape == (3, 4)
     assert surface.height_at(1.0, 1.0).shape == ()
     assert surface.height_at([], []).shape == (0,)
 
@@ -106,24 +106,6 @@ def test_detrending_beyond_the_mean_ends_periodicity():
     assert not surface.detrended(1).periodic
     with pytest.raises(InputError, match=r"3: this order of detrending.*0, 1, 2"):
         surface.detrended(3)
-
-
-def test_crop_keeps_whole_cells():
-    surface = plane(periodic=True)
-    part = surface.cropped(x=(0.5, 1.52))  # cells are 0.25 mm wide
-    assert part.grid == (4, 6) and part.lengths == (1.0, 3.0) and not part.periodic
-    np.testing.assert_array_equal(part.heights, surface.heights[2:6])
-    both = surface.cropped(x=(0.0, 1.0), y=(1.0, 3.0))
-    np.testing.assert_array_equal(both.heights, surface.heights[:4, 2:])
-
-
-@pytest.mark.parametrize("interval", [(1.0, 1.0), (1.5, 1.0), (-1.0, 1.0), (0.0, 2.5)])
-def test_crop_must_lie_within(interval):
-    with pytest.raises(
-        InputError,
-        match=r"crop along x does not lie within the surface or keeps no.*0 ≤ lo < hi ≤ 2\.0 mm",
-    ):
-        plane().cropped(x=interval)
 
 
 @pytest.mark.parametrize("periodic", [False, True])

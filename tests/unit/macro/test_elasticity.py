@@ -6,7 +6,7 @@ from mpi4py import MPI
 
 from geometry.meshes.block import BlockShape
 from macro import Block, Material, block_mesh, compat
-from macro.elasticity import rigid_body_modes
+from macro.elastic_body import rigid_body_modes
 
 
 @pytest.mark.parametrize("element", ["Q1", "Q2", "P1", "P2"])

@@ -23,7 +23,7 @@ PATCHES = PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
 
 def models(surface):
     """Return every model of asperities on a surface."""
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     for kind in MODELS:
         for solver in SOLVERS:
             yield AsperityModel(kind, asperities, contact_modulus=1.0, solver=solver)
@@ -89,7 +89,7 @@ def test_nan_is_refused_where_it_enters(surface):
     heights[3, 5] = np.nan
     with pytest.raises(InputError, match=r"1 of 1600 heights are masked.*index \(3, 5\)"):
         Surface(heights=heights, lengths=(1.0, 1.0))
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     for name in ("x", "z", "angle", "border_z"):
         values = getattr(asperities, name).copy()
         values[1] = np.nan
@@ -157,7 +157,7 @@ def test_one_contact_alone_stands_for_itself():
     x = (np.arange(41) + 0.5) / 41
     dome = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2) / 2.0
     surface = Surface(heights=dome, lengths=(1.0, 1.0))
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     model = AsperityModel("circular", asperities, contact_modulus=1.0)
     response = curve(model, surface, [5e-2])
     assert response.contact_area_fraction[0] == pytest.approx(0.05 * np.pi)  # π R δ, R = 1 mm

@@ -1,6 +1,7 @@
 """Errors say where and what, and arrive whole on other ranks."""
 
 import pickle
+import re
 
 import pytest
 
@@ -44,10 +45,12 @@ class Odd:
 
 
 @pytest.mark.parametrize(
-    "value", [Mute(), Odd(), [Mute()], 10**5000], ids=["mute", "odd", "inside", "long"]
+    ("value", "text"),
+    [(Mute(), r"<Mute "), (Odd(), "<Odd "), ([Mute()], r"\[<Mute "), (10**5000, "<int>: is wrong")],
+    ids=["mute", "odd", "inside", "long"],
 )
-def test_values_without_a_text_are_named_by_their_type(value):
-    assert str(InputError("is wrong", value=value)) == f"<{type(value).__name__}>: is wrong"
+def test_values_without_a_text_are_named_by_their_type(value, text):
+    assert re.match(text, str(InputError("is wrong", value=value)))
 
 
 class Counted:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Spectrum, Surface, suggested_fine, synthesise
-from geometry.meshes.expected_contact import contact_radius
+from geometry.meshes.families import contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

@@ -13,8 +13,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from geometry.meshes.expected_contact import contact_radius
-from geometry.meshes.families import EDGES
+from geometry.meshes.families import EDGES, contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),

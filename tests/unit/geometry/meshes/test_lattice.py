@@ -103,5 +103,6 @@ def test_segments_grow_geometrically(cells, growth):
     sizes = np.diff(segment.ticks)
     assert segment.ticks[0] == -1.0 and segment.ticks[-1] == 3.0 and len(sizes) == cells
     assert sizes[-1] / sizes[0] == pytest.approx(growth if cells > 1 else 1.0, rel=1e-12)
-    np.testing.assert_allclose(sizes[1:] / sizes[:-1], segment.ratio, rtol=1e-12)
+    ratio = growth ** (1.0 / max(cells - 1, 1))
+    np.testing.assert_allclose(sizes[1:] / sizes[:-1], ratio, rtol=1e-12)
     assert segment.narrowest == pytest.approx(sizes.min(), rel=1e-12)

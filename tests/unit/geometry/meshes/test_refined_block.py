@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Surface
-from geometry.meshes.expected_contact import depth_below_plane, places_in_reach
+from geometry.meshes.families import depth_below_plane, places_in_reach
 from geometry.meshes.refined_block import RefinedShape
 
 

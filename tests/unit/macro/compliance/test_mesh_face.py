@@ -21,7 +21,6 @@ from macro import (
     contact_facets,
     face_compliance,
 )
-from macro.compliance.cache import body_digest
 from macro.compliance.mesh_face import from_outside, mesh_face_compliance, raised, turned
 from macro.compliance.surroundings import surroundings
 from micro import RectangleFields
@@ -170,12 +169,3 @@ def test_a_rectangle_beyond_the_face_is_refused(cube):
         InputError, match=r"0.3 of 0.36 mm² on the face.*reaches beyond the contact face"
     ):
         surroundings(*cube, beyond)
-
-
-def test_digests_tell_bodies_apart(cube):
-    body, _ = cube
-    other = replace(body, materials=replace(MATERIAL, poisson_ratio=0.21))
-    held = replace(body, supports=(Support(tag=BOTTOM, displacement=(None, 0.0, 0.0)),))
-    digests = [body_digest(one) for one in (body, other, held, raised(body), meshed(5)[0])]
-    assert len(set(digests)) == len(digests)
-    assert body_digest(meshed()[0]) == digests[0]

@@ -308,11 +308,11 @@ def test_problems_that_do_not_fit(body):
 
 
 def test_linear_bodies_keep_their_matrix(body, monkeypatch):
-    made = []
-    monkeypatch.setattr(compat, "assemble_matrix_into", lambda *_: made.append(1))
     space, u = body.space, fem.Function(body.space)
     rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)
     problem = ContactProblem(elastic(u), u, [clamped(space, body.tags)], rough)
+    made = []
+    monkeypatch.setattr(compat, "assemble_matrix_into", lambda *_: made.append(1))
     for approach in (4e-3, 6e-3):
         rough.indenter = RigidPlane(approach=approach)
         problem.solve()

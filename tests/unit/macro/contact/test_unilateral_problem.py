@@ -11,7 +11,7 @@ from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, Sur
 from geometry.meshes.block import BlockShape
 from macro import Block, Material, block_mesh
 from macro.contact.unilateral_problem import UnilateralContactProblem
-from macro.mesh.rough_surface import rough_block_mesh
+from macro.mesh.block import rough_block_mesh
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
 SURFACE = synthesise(

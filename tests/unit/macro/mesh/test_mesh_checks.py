@@ -18,7 +18,7 @@ FIVE = [(0, 1, 2, 4), (1, 3, 2, 7), (1, 5, 4, 7), (2, 6, 7, 4), (1, 2, 4, 7)]
 
 
 def tagged(points, cells):
-    mesh = compat.partitioned_mesh(np.array(cells, np.int64), np.array(points, float), COMM)
+    mesh = compat.mesh_from_cells(np.array(cells, np.int64), np.array(points, float), None, COMM)
     none = np.empty(0, np.int32)
     return TaggedMesh(mesh=mesh, facet_tags=dmesh.meshtags(mesh, 2, none, none))
 

@@ -1,14 +1,12 @@
-"""Meshes of blocks on boxes: marked planes, and roughness that stays in the block."""
+"""Roughness on a body that is no block below the depth that it decays in."""
 
 import numpy as np
 import pytest
+from helpers.stepped import SteppedShape, rough_stepped_mesh, stepped_mesh
 from mpi4py import MPI
 
 from geometry import InputError, RefinedShape, Spectrum, Surface, synthesise
-from geometry.face_frame import FaceFrame
-from geometry.meshes.stepped import SteppedShape
-from macro import contact_facets, rough_stepped_mesh, stepped_mesh
-from macro.mesh.rough_surface import move_onto
+from macro.mesh.block import move_onto
 
 COMM = MPI.COMM_SELF
 SHAPE = SteppedShape(
@@ -26,21 +24,6 @@ PLANES = {"held": (0, 1.5), "below": (2, -1.5)}
 ROUGH = synthesise(
     Spectrum(hurst=0.9, waves=(2, 4), rms_slope=0.2, seed=2), grid=(64, 64), lengths=(1.0, 1.0)
 )
-
-
-def test_planes_are_marked_by_name():
-    mesh = stepped_mesh(SHAPE, PLANES, COMM)
-    assert mesh.facet_names == {"rough": 1, "held": 2, "below": 3}
-    for name, normal, area in (
-        ("rough", (0, 0, 1), 1.0),
-        ("held", (1, 0, 0), 0.75),
-        ("below", (0, 0, -1), 1.5),
-    ):
-        found = mesh.facet_tags.find(mesh.facet_names[name])
-        frame = FaceFrame(origin=np.zeros(3), axes=FaceFrame.through(np.zeros((1, 3)), normal).axes)
-        assert contact_facets(mesh.mesh, found, frame).area.sum() == pytest.approx(area, rel=1e-9)
-    with pytest.raises(InputError, match="no outer facet lies in the plane 'held'"):
-        stepped_mesh(SHAPE, {"held": (0, 1.4)}, COMM)
 
 
 def test_roughness_moves_the_block_alone():
@@ -64,5 +47,3 @@ def test_bodies_that_are_no_block_below_their_face_are_refused():
     narrow = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 0.9))
     with pytest.raises(InputError, match="wider than its rough face"):
         move_onto(mesh, narrow, 0.5)
-    with pytest.raises(InputError, match="must cover the block's top"):
-        rough_stepped_mesh(SHAPE, PLANES, narrow, COMM)

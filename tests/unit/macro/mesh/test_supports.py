@@ -9,7 +9,7 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from macro import compat
-from macro.mesh.supports import check_supports, check_tractions, free_motions
+from macro.mesh.supports import check_supports, free_motions
 from support.errors import InputError
 
 COMM = MPI.COMM_SELF
@@ -67,7 +67,7 @@ def test_rotation_about_a_slanted_line():
 def test_stiffness_agrees():
     """The motions left are as many as the singular directions of the stiffness."""
     from geometry.materials import Material
-    from macro.elasticity import stiffness_form
+    from macro.elastic_body import stiffness_form
 
     box = tagged_box(COMM, cells=(2, 2, 1))
     space = compat.vector_space(box.mesh, 1)
@@ -97,7 +97,7 @@ def test_supports_are_checked():
         r"body\.supports: the supports leave the body free to move: translation along x \(allowed"
     )
     with pytest.raises(InputError, match=match):
-        check_supports(box, held(below="yz", left="z"), SIDES["above"], key="body.supports")
+        check_supports(box, held(below="yz", left="z"), SIDES["above"], key="body")
     with pytest.raises(InputError, match="the surface 'below' is the contact face and cannot be"):
         check_supports(box, held(below="xyz"), SIDES["below"])
     twice = [*held(below="xyz"), SimpleNamespace(tag=5, displacement=(None, 0.1, None))]
@@ -129,11 +129,11 @@ def test_tractions_are_loads():
     def refused(side, stress, match):
         load = [SimpleNamespace(tag=SIDES.get(side, 9), stress=stress)]
         with pytest.raises(InputError, match=match):
-            check_tractions(box, load, supports, contact, key="body.tractions")
+            check_supports(box, supports, contact, load, key="body")
 
     refused("above", (0, 0, 1), r"body\.tractions: .*'above' is the contact face and cannot be lo")
     refused("below", (0, 0, 1), "'below' is held along z, where a traction of 1 MPa does nothing")
     refused("left", (2, 1, 1), "'left' is held along x")
     refused("nowhere", (1, 0, 0), "'9' has no facets")
     fine = [SimpleNamespace(tag=SIDES[side], stress=(0, 1, 1)) for side in ("left", "right")]
-    check_tractions(box, fine, supports, contact)
+    check_supports(box, supports, contact, fine)

@@ -12,12 +12,12 @@ from micro.asperities.patch_sums import EllipticContacts, shares
 GRID = PatchGrid(grid=(4, 5), lengths=(1.0, 1.2))
 
 
-def _shares(patches, position, semi_axes, angle, **options):
+def _shares(patches, position, semi_axes, angle):
     x, y = np.reshape(position, (-1, 2)).T
     contacts = EllipticContacts(
         x=x, y=y, angle=angle, semi_axes=semi_axes, force=np.ones(len(position))
     )
-    return shares(patches, contacts, **options)
+    return shares(patches, contacts)
 
 
 def _table(position, semi_axes, angle, patches=GRID):
@@ -131,12 +131,14 @@ def test_no_contact_has_no_share():
 
 
 def test_shares_do_not_depend_on_how_many_are_integrated_at_once():
-    """Contacts larger than the surface reach into every patch."""
+    """Contacts larger than the surface reach into every patch: more pairs than go into a block."""
     patches = PatchGrid(grid=(16, 16), lengths=(1.0, 1.2))
     position, _, angle = _random_contacts(20)
     axes = np.full((20, 2), [9.0, 5.0])
-    whole, parts = (_shares(patches, position, axes, angle, at_once=n) for n in (4096, 7))
-    np.testing.assert_array_equal(parts[:2], whole[:2])
-    np.testing.assert_allclose(parts.force, whole.force, rtol=1e-13)
-    np.testing.assert_allclose(parts.area, whole.area, rtol=1e-13)
-    assert len(whole.contact) == 20 * 256
+    whole = _shares(patches, position, axes, angle)
+    assert len(whole.contact) == 20 * 256 > 4096
+    for k in range(20):
+        alone, own = _shares(patches, position[[k]], axes[[k]], angle[[k]]), whole.contact == k
+        np.testing.assert_array_equal(alone.patch, whole.patch[own])
+        np.testing.assert_allclose(alone.force, whole.force[own], rtol=1e-13)
+        np.testing.assert_allclose(alone.area, whole.area[own], rtol=1e-13)

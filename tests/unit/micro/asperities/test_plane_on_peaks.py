@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 from geometry import Control, NotConverged
 from geometry.plane_equilibrium import PlaneResponse
 from geometry.rigid_plane import PlaneLevers, RigidPlane
-from micro.asperities.plane_on_peaks import Peaks
+from micro.asperities.contacts import Peaks
 
 X = np.array([-0.4, 0.3, 0.1, -0.2, 0.45])
 Y = np.array([-0.3, -0.4, 0.35, 0.4, 0.05])

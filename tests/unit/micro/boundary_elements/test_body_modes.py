@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from helpers.uneven_grid import uneven_grid
 
-from geometry import PatchGrid, UnevenPartition
+from geometry import PatchGrid
 from geometry.legendre_modes import mode_values
 from micro.boundary_elements.body_modes import BodyModes, BodyPoints
 from support.errors import InputError
@@ -63,13 +64,13 @@ def test_some_cells_are_those_of_the_grid(body):
 
 
 def test_patches_are_cells(body):
-    patches = UnevenPartition(ticks_x=(0.0, 0.3, 1.2), ticks_y=(0.0, 0.1, 0.5, 0.8))
+    patches = uneven_grid(ticks_x=(0.0, 0.3, 1.2), ticks_y=(0.0, 0.1, 0.5, 0.8))
     cells = body.on(patches.borders_x, patches.borders_y)
     found = body.patch_compliance(patches)
     for j in range(patches.count):
         pressure = np.zeros(patches.count)
         pressure[j] = 1.0
-        displaced = cells.displacement(pressure.reshape(patches.shape))
+        displaced = cells.displacement(pressure.reshape(patches.grid))
         np.testing.assert_allclose(found[:, j], displaced.ravel(), rtol=1e-12, atol=1e-12)
 
 

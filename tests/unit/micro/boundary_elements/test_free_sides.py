@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
+from helpers.uneven_grid import uneven_grid
 
-from geometry import Control, Surface, UnevenPartition
+from geometry import Control, Surface
 from micro import (
     FreeSides,
     HalfSpaceModel,
@@ -65,7 +66,7 @@ def test_cells_and_rectangles_tell_the_same(cells):
     p[:4, 12:16] = 1.0
     x, y = (np.arange(n) * 0.05 + 0.025 for n in GRID)
     ticks = (0.0, 0.2, 1.0), (0.0, 0.6, 0.8, 1.5)
-    loads = UnevenPartition(ticks_x=ticks[0], ticks_y=ticks[1])
+    loads = uneven_grid(ticks_x=ticks[0], ticks_y=ticks[1])
     found, points = whole(cells, p), side_displacements(SIDES, x, y, loads)[:, :, 1]
     # means over cells against their middles: 2.2 % of the largest next to the side, then 0.3 %
     assert np.abs(found - points).max() < 0.03 * points.max()
@@ -126,7 +127,7 @@ def test_sides_of_another_surface_are_refused():
 
 def test_sides_add_up():
     """Each of the four alone, and all: displacements of cells, of patches, in modes; stresses."""
-    patches = UnevenPartition(ticks_x=(0.0, 0.3, 1.0), ticks_y=(0.0, 0.5, 1.5))
+    patches = uneven_grid(ticks_x=(0.0, 0.3, 1.0), ticks_y=(0.0, 0.5, 1.5))
     single = [replace(SIDES, present=tuple((np.arange(4) == k).tolist())) for k in range(4)]
     pressure = random(8)
     for evaluate in (

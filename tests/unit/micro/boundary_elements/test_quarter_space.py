@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import stresses
+from helpers.uneven_grid import uneven_grid
 
-from geometry import Material, UnevenPartition
+from geometry import Material
 from micro.boundary_elements.quarter_space import side_compliance, side_traction
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
@@ -48,7 +49,7 @@ def test_traction_on_the_side_is_that_of_the_half_space(nu):
     logs = np.sort(np.concatenate([np.linspace(-12.0, 3.6, 200), logs]))
     table = side_traction(logs, nu)
     half, depth, place = 1e-3, 0.4, 1.0
-    loads = UnevenPartition(ticks_x=(place - half, place + half), ticks_y=(-half, half))
+    loads = uneven_grid(ticks_x=(place - half, place + half), ticks_y=(-half, half))
     y, step = np.linspace(-200.0, 200.0, 80001, retstep=True)
     point = np.zeros_like(y), y, np.full_like(y, depth)
     stress = (

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from helpers.boussinesq import stresses
+from helpers.uneven_grid import uneven_grid
 
-from geometry import Material, UnevenPartition
+from geometry import Material
 from micro.boundary_elements.quarter_space import side_pressure_stresses, side_stresses
 
 RATIOS = [-0.5, 0.0, 0.15, 0.45]
@@ -51,7 +52,7 @@ def test_stresses_by_pressure_on_the_side_are_those_of_the_half_space(nu):
     row, column = np.searchsorted(logs, np.log([0.4, 1.0]) - 1e-12)
     table = side_pressure_stresses(logs, nu)[:, row, column]
     half, depth, place = 1e-3, 0.4, 1.0  # depth below the side is distance on the top
-    loads = UnevenPartition(ticks_x=(place - half, place + half), ticks_y=(-half, half))
+    loads = uneven_grid(ticks_x=(place - half, place + half), ticks_y=(-half, half))
     y, step = np.linspace(-200.0, 200.0, 80001, retstep=True)
     points = np.zeros_like(y), y, np.full_like(y, depth)
     # xx, yy, zz, yz, zx, xy about the side's surface: its z is the top's x

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 from helpers.free_side_points import side_displacements
+from helpers.uneven_grid import uneven_grid
 
-from geometry import PatchGrid, UnevenPartition
+from geometry import PatchGrid
 from geometry.legendre_modes import mode_means
 from micro import FreeSides, influence_matrix
 from micro.boundary_elements.rectangle_modes import half_space_modes, side_modes
@@ -76,7 +77,7 @@ def test_sides_in_modes_are_those_of_cells(lengths):
 def test_sides_on_patches_are_those_of_points():
     lengths = (1.0, 1.5)
     sides = FreeSides(lengths=lengths, poisson_ratio=0.15, decay_length=0.25)
-    patches = UnevenPartition(ticks_x=(0.0, 0.1, 0.5, 1.0), ticks_y=(0.0, 0.6, 1.5))
+    patches = uneven_grid(ticks_x=(0.0, 0.1, 0.5, 1.0), ticks_y=(0.0, 0.6, 1.5))
     found = sides.patch_compliance(patches)
     nodes, weights = np.polynomial.legendre.leggauss(12)
     places = [

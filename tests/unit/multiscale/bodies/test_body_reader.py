@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from helpers.box_msh import write_box
 
+from multiscale.bodies.mesh import MeshTerms
 from multiscale.bodies.reader import read_bodies
 from multiscale.scene.scene import Scene
+from support.checked_store import fingerprint
 from support.errors import InputError
 
 SAMPLE = {"spectrum": {"hurst": 0.8, "waves": [2, 4], "rms_slope": 0.1}, "grid": [16, 16]}
@@ -70,3 +72,16 @@ def test_what_fits_is_read(read):
     found = read(law=law, tractions=loads)[0]
     assert len(found.facets) == 2
     assert found.facts.area == pytest.approx(100.0, rel=1e-12)
+
+
+def test_what_a_compliance_in_the_cache_depends_on(read):
+    def key(**body):
+        first, _ = read(**body)
+        terms = MeshTerms.of(first, (1.0, 1.0), side_term=False)
+        return fingerprint(terms._key(2))
+
+    usual = key()
+    assert key() == usual
+    sliding = [{"surface": "bottom"}, {"surface": "left", "displacement": [0.0, "free", "free"]}]
+    others = {"poisson_ratio": 0.31}, {"size": 9.0}, {"mesh_unit": "inch"}, {"supports": sliding}
+    assert len({usual, *(key(**other) for other in others)}) == 1 + len(others)

@@ -25,7 +25,7 @@ def surface():
 
 @pytest.fixture(scope="module")
 def model(surface):
-    asperities = find_asperities(surface, periodic=False)
+    asperities = find_asperities(surface)
     return AsperityModel("circular", asperities, contact_modulus=MODULUS)
 
 

@@ -208,7 +208,7 @@ def test_a_table_of_regions_survives_a_file(table):
         _ = back.grid
     with pytest.raises(InputError, match="there is no such region") as caught:
         back["outer rings"]
-    assert "nearest: outer ring" in str(caught.value)
+    assert "did you mean 'outer ring'" in str(caught.value)
 
 
 def test_regions_are_exported_by_name(table):

@@ -8,8 +8,7 @@ from matplotlib.figure import Figure
 
 from geometry.asperities import Asperities, find_asperities
 from geometry.patches import PatchGrid
-from geometry.spectrum import Spectrum
-from geometry.synthesis import synthesise
+from geometry.spectrum import Spectrum, synthesise
 from multiscale.figures.contact import contact_figure
 from multiscale.figures.maps import draw_pressures
 from multiscale.figures.surface import MOST_SUMMITS, surface_figure

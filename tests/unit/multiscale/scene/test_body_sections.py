@@ -79,11 +79,11 @@ REFUSED = {
     ),
     "reference": (
         {"counter_body": STEEL, "coupling": {"kind": "reference"}},
-        "coupling.kind: reference does not go with [counter_body]",
+        "counter_body: does not go with coupling.kind = 'reference', which meshes a block",
     ),
     "meshed roughness on a mesh": (
         {"body": BODY, "coupling": {"kind": "reference"}},
-        "coupling.kind: reference does not go with [body]",
+        "body: does not go with coupling.kind = 'reference', which meshes a block under",
     ),
     "isolated on the mesh": (
         {"counter_body": STEEL, "coupling": {"kind": "isolated", "newton": "full"}},
