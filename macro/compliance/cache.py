@@ -12,7 +12,7 @@ import os
 import stat
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -77,20 +77,6 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         Collective.
     """
     words = fingerprint((sources_digest(), kind, key))  # a wrong key raises on every rank
-    memory = _memory(comm.py2f(), words)
-    if "arrays" not in memory:
-        memory["arrays"] = _from_disk_or_made(kind, words, compute, comm)
-    return memory["arrays"]
-
-
-@lru_cache(maxsize=8)
-def _memory(comm: int, words: str) -> dict[str, Arrays]:
-    """Return where the ranks of a communicator keep arrays for the rest of a run."""
-    return {}
-
-
-def _from_disk_or_made(kind: str, words: str, compute: Callable[[], Arrays], comm: Any) -> Arrays:
-    """Return arrays from the cache on disk, or compute and cache them there; collective."""
     path = _file(kind, words) if comm.rank == 0 else None
     large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
     arrays: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)

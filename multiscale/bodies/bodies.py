@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -195,7 +196,7 @@ class Bodies:
         Note:
             Collective.
         """
-        first, second = self._of_first(), self.materials.second
+        first, second = self._of_first, self.materials.second
         # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
         meshed_together = self.facts[1] is not None and not self.scene.decomposed
         if second is None or meshed_together:
@@ -203,6 +204,7 @@ class Bodies:
         half_space = influence_matrix(self.patches) * second.surface_compliance / np.pi
         return np.asarray(first + half_space)
 
+    @cached_property
     def _of_first(self) -> Array:
         """Return the compliance of the meshes under the patches, of the first body or of both."""
         if self.scene.decomposed:
