@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from importlib import import_module
 from types import FrameType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from support.packages import LazyPackage
 
 # ruff: noqa: F401
-if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
+if TYPE_CHECKING:  # the names that this module has, see `LazyPackage`
     from geometry import (
         Control,
         InputError,
@@ -45,31 +46,6 @@ if TYPE_CHECKING:  # what `_HOMES` says, for editors and type checkers
         sweep,
     )
 
-_NAMES = {
-    "geometry": "Control InputError NotConverged NotInstalled PatchGrid RigidPlane Spectrum "
-    "Surface read_surface synthesise",
-    "macro": "ContactProblem Interface LawOperator vector_space",
-    "micro": "HalfSpaceModel",
-    "multiscale": "Comparison History LawTable LoadStep Run Scene compare export_laws make_setup "
-    "read_history read_laws representative_law run sweep",
-}
-_HOMES = {name: package for package, names in _NAMES.items() for name in names.split()}
-
-__all__ = ["main", *_HOMES]
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        from support.packages import optional_packages  # loads numpy
-
-        with optional_packages():
-            return getattr(import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'patchlaw' has no attribute '{name}'")
-
-
-def __dir__() -> list[str]:
-    return sorted(__all__)
-
 
 def main() -> int:
     """Run the command line; see `multiscale.cli.command_line.main`.
@@ -90,6 +66,8 @@ def main() -> int:
 def _end(number: int, frame: FrameType | None) -> None:
     os._exit(128 + number)
 
+
+sys.modules[__name__].__class__ = LazyPackage
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -80,7 +80,6 @@ problem = LawContactProblem(
     "pointwise",
     crown=lambda x, y: ((x - 0.5 * FACE) ** 2 + (y - 0.5 * FACE) ** 2) / (2.0 * RADIUS),
 )
-problem.start_from(np.ones(CELLS))  # a first guess for the steep law: uniform pressure
 found = []
 print("| force [N] | α | effective radius over Hertz' | middle line over Hertz' | Newton |")
 print("|---|---|---|---|---|")

@@ -6,11 +6,8 @@ import math
 from functools import partial
 
 import numpy as np
-import scipy.fft
+import scipy
 from numpy.typing import ArrayLike
-from scipy.ndimage import uniform_filter
-from scipy.sparse import coo_matrix
-from scipy.sparse.linalg import spsolve
 
 from geometry.interpolant import Interpolant, cell_centres
 from support.arrays import Array, Flags
@@ -116,7 +113,7 @@ def _lonely_spikes(heights: Array, spacing: tuple[float, float]) -> Flags:
     """Find heights among missing ones that are far from the membrane between all others."""
     known = np.isfinite(heights)
     near, cells = (
-        uniform_filter(part.astype(float), 5, mode="constant")
+        scipy.ndimage.uniform_filter(part.astype(float), 5, mode="constant")
         for part in (known, np.ones_like(known))
     )
     lonely = known & (near < 0.5 * cells)
@@ -191,7 +188,9 @@ def _membrane(heights: Array, missing: Flags, spacing: tuple[float, float]) -> A
     entries = np.concatenate((-weight[inside], diagonal))
     rows = np.concatenate((row[inside], np.arange(count)))
     columns = np.concatenate((column[inside], np.arange(count)))
-    matrix = coo_matrix((entries, (rows, columns)), shape=(count, count)).tocsc()
+    matrix = scipy.sparse.coo_matrix((entries, (rows, columns)), shape=(count, count)).tocsc()
+    from scipy.sparse.linalg import spsolve  # few maps need it
+
     return np.asarray(spsolve(matrix, right))
 
 

@@ -6,9 +6,8 @@ import copy
 from typing import Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import BivariateSpline, RectBivariateSpline
-from scipy.optimize import minimize
 
 from support.arrays import Array, Indices
 from support.cores import blocks
@@ -57,8 +56,8 @@ class Interpolant:
             places.append((np.arange(-padding, count + padding) + 0.5) * step)
             if not periodic:
                 places[-1][[0, -1]] = 0.0, length
-        self._spline = RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
-        self._derivatives: dict[tuple[int, int], BivariateSpline] = {}
+        self._spline = scipy.interpolate.RectBivariateSpline(*places, samples, kx=3, ky=3, s=0)
+        self._derivatives: dict[tuple[int, int], Any] = {}
 
     def window(self, corner: tuple[float, float], lengths: tuple[float, float]) -> Self:
         """Return the same spline on a rectangle within, whose lower corner is its origin.
@@ -112,7 +111,7 @@ class Interpolant:
         x_m, y_m, z_m = max(points, key=lambda point: point[2])
         return x_m - self._corner[0], y_m - self._corner[1], z_m + self._lowest
 
-    def _derivative(self, dx: int, dy: int) -> BivariateSpline:
+    def _derivative(self, dx: int, dy: int) -> Any:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
         if (dx, dy) not in self._derivatives:
             whole = self._spline
@@ -190,12 +189,12 @@ class Interpolant:
         low, high = np.transpose([self._box(axis) for axis in range(2)])
         limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
         options = {"ftol": 1e-16, "gtol": 1e-12}
-        top = minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
+        top = scipy.optimize.minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
         px, py = np.clip(origin + top.x * (dx, dy), low, high)
         return float(px), float(py), float(at_points(value, px, py))
 
 
-def at_points(spline: BivariateSpline, x: ArrayLike, y: ArrayLike) -> Array:
+def at_points(spline: Any, x: ArrayLike, y: ArrayLike) -> Array:
     """Evaluate a spline at scattered points.
 
     FITPACK looks for the span of every point from the first knot on: 1000 points on 4 × 200 000

@@ -9,7 +9,7 @@ from numbers import Integral
 from typing import Annotated, Any
 
 import numpy as np
-import scipy.fft
+import scipy
 
 from geometry.surface import Surface
 from support.arrays import Array, Counts, Flags

@@ -5,10 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import maximum_filter
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+import scipy
 
 from geometry.surface import Surface
 from support.arrays import Array, Flags, Indices
@@ -39,11 +36,13 @@ def grid_maxima(heights: Array) -> GridMaxima:
     Args:
         heights: Heights, shape (nx, ny) [mm].
     """
-    candidate = heights == maximum_filter(heights, size=3, mode="nearest")
+    candidate = heights == scipy.ndimage.maximum_filter(heights, size=3, mode="nearest")
     cells = np.argwhere(candidate)
     label = _plateaus(candidate, cells)
     # a plateau is no maximum where an equal cell beside it has a higher neighbour
-    others = maximum_filter(np.where(candidate, -np.inf, heights), size=3, mode="nearest")
+    others = scipy.ndimage.maximum_filter(
+        np.where(candidate, -np.inf, heights), size=3, mode="nearest"
+    )
     shoulder = np.bincount(label, weights=(others == heights)[candidate]) > 0
     outer = np.any((cells == 0) | (cells == np.array(heights.shape) - 1), axis=1)
     on_border = np.bincount(label, weights=outer) > 0
@@ -69,8 +68,8 @@ def _plateaus(candidate: Flags, cells: Indices) -> Indices:
         other = number[tuple(neighbour[inside].T)]
         pairs.append(np.stack([np.flatnonzero(inside)[other >= 0], other[other >= 0]]))
     row, column = np.concatenate(pairs, axis=1)
-    graph = coo_array((np.ones(len(row)), (row, column)), shape=2 * (len(cells),))
-    _, label = connected_components(graph, directed=False)
+    graph = scipy.sparse.coo_array((np.ones(len(row)), (row, column)), shape=2 * (len(cells),))
+    _, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     _, first, inverse = np.unique(label, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse]
 
@@ -138,9 +137,13 @@ def coincident(surface: Surface, point: Array) -> Indices:
         surface: The surface; points less than a thousandth of its cells apart are at one place.
         point: Points, shape (n, 2) [mm].
     """
-    pairs = cKDTree(point / surface.spacing).query_pairs(_COINCIDENT, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=2 * (len(point),))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.intp)
+    pairs = scipy.spatial.cKDTree(point / surface.spacing).query_pairs(
+        _COINCIDENT, output_type="ndarray"
+    )
+    links = scipy.sparse.coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=2 * (len(point),))
+    return np.asarray(
+        scipy.sparse.csgraph.connected_components(links, directed=False)[1], dtype=np.intp
+    )
 
 
 def _moved_uphill(surface: Surface, point: Array, longest: Array) -> Array:

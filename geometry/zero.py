@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import Akima1DInterpolator, RectBivariateSpline
+import scipy
 
 from geometry.interpolant import bordered
 from geometry.surface import Surface
@@ -114,14 +114,14 @@ def _error_of_top(surface: Surface) -> float:
         (rows, columns), (u, v), (x, y) = zip(*axes, strict=True)
         window = samples[np.ix_(rows, columns)] - surface.highest
         degrees = {"kx": min(5, len(u) - 1), "ky": min(5, len(v) - 1)}
-        quintic = RectBivariateSpline(u, v, window, s=0, **degrees)(x, y)
+        quintic = scipy.interpolate.RectBivariateSpline(u, v, window, s=0, **degrees)(x, y)
         if not surface.periodic:
             (ins, u, x), (within, v, y) = (
                 _without_border(surface, axis, one) for axis, one in enumerate(axes)
             )
             window = window[np.ix_(ins, within)]
-        lines = Akima1DInterpolator(u, window)(x)
-        local = Akima1DInterpolator(v, lines, axis=1)(y)
+        lines = scipy.interpolate.Akima1DInterpolator(u, window)(x)
+        local = scipy.interpolate.Akima1DInterpolator(v, lines, axis=1)(y)
         tops.append((float(quintic.max()), float(local.max())))
     quintic, akima = np.max(tops, axis=0)
     # Beyond 1.5 times this error are one of 24 plateau-honed surfaces of 8 to 16 heights per wave,

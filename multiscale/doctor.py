@@ -1,7 +1,7 @@
 """Checks whether runs work here: versions, MPI, threads, memory, and a scene with a known answer.
 
-Each check takes the MPI communicator, or None, and is called on all ranks. That of the compiled
-forms is in `multiscale.compiled_forms`.
+Each check takes the MPI communicator, or None, and is called on all ranks. The forms of finite
+elements, whose cache one of them checks, are compiled ahead of runs by `warm`.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ import os
 import platform
 import re
 import shutil
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -21,8 +23,9 @@ import numpy as np
 import threadpoolctl
 
 from multiscale.machine import cluster_nodes, cores_statement, detached_processes
+from support.collective import on_root
 from support.cores import node_cores
-from support.errors import PatchlawError
+from support.errors import InputError, PatchlawError
 from support.packages import optional_packages, removal, shadows
 
 _OLDEST = {
@@ -30,11 +33,6 @@ _OLDEST = {
     "h5py": (3, 7), "gmsh": (4, 8), "pydantic": (2, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
 }  # fmt: skip
 """The oldest release of every package that patchlaw is tested with."""
-
-_SEVERITY = {"ok": 0, "warning": 1, "fail": 2}
-_LEAST_MEMORY = 1e9  # per rank, below which a warning is given [B]
-_LARGEST_ERROR = 1e-8
-"""Relative error of the force in the test solve; residuals are driven to 1e-9 of the load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +77,7 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> Iterator[tuple[str, Check
             text = f"{type(failure).__name__}: {failure}"
             result = CheckResult("fail", text, "please report this with the lines above")
         everywhere = [result] if comm is None else comm.allgather(result)
-        yield topic, max(everywhere, key=lambda each: _SEVERITY[each.state])
+        yield topic, max(everywhere, key=lambda each: ("ok", "warning", "fail").index(each.state))
 
 
 def packages(comm: Any, load: Callable[[str], Any] = import_module) -> CheckResult:
@@ -158,7 +156,7 @@ def ranks(comm: Any) -> CheckResult:
     places = ", ".join(f"{count} on {host}" for host, count in hosts.items())
     nodes = cluster_nodes(comm)
     each = nodes.memory / max(nodes.ranks)
-    remedy = "take fewer ranks per node or a larger node" if each < _LEAST_MEMORY else ""
+    remedy = "take fewer ranks per node or a larger node" if each < 1e9 else ""
     text = f"{hosts.total()}: {places}, {each / 1e9:.1f} GB of memory for each"
     return CheckResult("warning" if remedy else "ok", text, remedy)
 
@@ -209,6 +207,105 @@ def known_solve(comm: Any) -> CheckResult:
     confined = modulus * (1.0 - ratio) / ((1.0 + ratio) * (1.0 - 2.0 * ratio))
     error = abs(step.force_N / (confined * approach) - 1.0)
     text = f"{step.linear_iterations} iterations, force off by {error:.0e}, {step.wall_s:.1f} s"
-    if error > _LARGEST_ERROR:
+    if error > 1e-8:  # residuals are driven to 1e-9 of the load
         return CheckResult("fail", text, "please report this: numbers are wrong")
     return CheckResult("ok", text)
+
+
+def form_cache(comm: Any, folder: Path | None = None) -> CheckResult:
+    """Check the compiler of forms and the cache of compiled ones.
+
+    Args:
+        comm: MPI communicator, or None.
+        folder: Folder of the cache; by default dolfinx's.
+    """
+    from macro import form_cache as jit
+    from macro.compat import form_folder
+
+    folder = folder or form_folder()
+    text = f"{folder}, {_compiled(folder)} compiled"
+    if left := jit.stale_locks(folder):
+        text = f"{text}; {len(left)} compilation(s) cut short, such as {left[0].name}"
+        return CheckResult("fail", text, "clear them with: patchlaw warm")
+    if not jit.writable(folder):
+        remedy = "set XDG_CACHE_HOME to a folder that can, unless patchlaw warm filled this one"
+        return CheckResult("warning", f"{text}; cannot be written to", remedy)
+    if jit.compiler() is None:
+        remedy = "apt-get install gcc libc6-dev; or run patchlaw warm where there is one"
+        return CheckResult("warning", f"{text}; no C compiler on PATH", remedy)
+    return CheckResult("ok", text)
+
+
+def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
+    """Compile every form that scenes with these elements use.
+
+    Compilations that were cut short more than two minutes ago are cleared first.
+
+    Args:
+        elements: Elements of blocks, ``Q1``, ``Q2``, ``P1``, ``P2``; all of them when empty.
+        comm: MPI communicator; rank 0 compiles. None for a process on its own.
+
+    Returns:
+        The folder of the compiled forms, and how many are in it.
+
+    Raises:
+        InputError: When an element is unknown, or forms cannot be compiled or stored.
+
+    Note:
+        Collective.
+    """
+    from geometry.meshes.block import ELEMENTS
+
+    if unknown := set(elements) - set(ELEMENTS):
+        raise InputError(
+            "this element is unknown", key="--element", value=min(unknown),
+            allowed=", ".join(ELEMENTS),
+        )  # fmt: skip
+    if comm is not None:  # PETSc starts on all ranks together; one rank alone must not
+        import macro  # noqa: F401
+
+    def compile_all() -> tuple[Path, int]:
+        from macro import form_cache as jit
+        from macro.compat import form_folder
+
+        folder = form_folder()
+        if jit.writable(folder):
+            for source in jit.stale_locks(folder):
+                source.unlink(missing_ok=True)
+        for element in elements or ELEMENTS:
+            _use_all_forms(element)
+        return folder, _compiled(folder)
+
+    return on_root(comm, compile_all)
+
+
+def _compiled(folder: Path) -> int:
+    """Count the compiled forms."""
+    with suppress(PermissionError):  # a folder on the way that this user may not enter
+        return len(list(folder.glob("libffcx_*.c.cached")))
+    return 0
+
+
+def _use_all_forms(element: str) -> None:
+    """Do on a tiny block whatever compiles a form: make its problems and write its fields."""
+    from mpi4py import MPI
+
+    from geometry.meshes.block import BlockShape
+    from geometry.patches import PatchGrid
+    from macro import (
+        Block,
+        LoadedFace,
+        Material,
+        UnilateralContactProblem,
+        block_mesh,
+        write_fields,
+    )
+
+    shape = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(2, 2, 2), element=element)
+    block = Block(block_mesh(shape, MPI.COMM_SELF), Material(young_modulus=1.0, poisson_ratio=0.3))
+    UnilateralContactProblem(block, 0.0)
+    rest = block.stiffness.createVecRight()
+    block.reaction(rest)
+    face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    with tempfile.TemporaryDirectory() as folder:
+        write_fields(Path(folder) / "fields.xdmf", face, [(0, rest.array_r, np.zeros(1))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import resource
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
@@ -24,6 +25,9 @@ _SIZES = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS", "SLURM_STEP_NUM
 """Variables by which launchers tell processes how many they are. The first that is set counts.
 They belong to Open MPI's mpirun; to Hydra (MPICH, Intel MPI) and others that use PMI; to Hydra on
 one node; to Slurm's srun, inside which the others may have been started."""
+
+_LAUNCHED = re.compile("RANK|PMI|PROCID|ALPS_APP_PE")
+"""Parts of the variables by which every launcher tells a process which of its ranks it is."""
 
 
 def keep_petsc_from_signals() -> None:
@@ -61,6 +65,9 @@ def check_address_space() -> None:
 def world() -> Any:
     """Return the communicator of an MPI job, or None for a process on its own.
 
+    MPI takes half a second to start, which a process that no launcher started is spared until it
+    needs finite elements. Alone it starts no daemon for processes to come.
+
     Raises:
         InputError: When this user has no home, without which neither Open MPI nor dolfinx starts.
     """
@@ -72,6 +79,9 @@ def world() -> Any:
             key="HOME",
             allowed="set it to any folder",
         ) from None
+    if not any(map(_LAUNCHED.search, os.environ)):
+        os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+        return None
     try:
         from mpi4py import MPI
     except ModuleNotFoundError:  # scenes without finite elements need none

@@ -30,7 +30,7 @@ from typing import Any
 
 from geometry import Control
 from micro import BodyModes, ContactState, HalfSpaceModel
-from multiscale.bodies.on_body import SLOPES, OnBody
+from multiscale.bodies.bodies import SLOPES, OnBody
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent, quantity
@@ -39,26 +39,9 @@ from support.errors import InputError
 
 ZERO = "zero"
 """Name of the error by the height that approaches count from."""
-_FINER, _COARSER, _TWICE = 1.5, 1 / 8, 1 / 30
-"""Error of the grid over its difference from a grid twice as fine, over that from one twice as
-coarse, and over the difference of this one from one twice as coarse again; the largest counts."""
-_COARSER_ALONE = 8.0
-"""Factor of the error from coarser grids where the finer grid is not solved."""
-_MATTERS = 0.5
-"""Share of the other causes above which the error of the grid is worth the finer grid."""
 MOST_CHECKED_CELLS, _FEWEST_CELLS = 2**20, 32
 """Cells of the finer grid at most, and cells along a side below which coarser grids do not show the
 error."""
-_FEWER_MODES = 0.75
-"""Modes of the body along a side that it is compared with, relative to those it has."""
-_LINEAR = 0.15
-"""Error by quadratic elements of a meshed body over what linear ones on the same mesh change. On
-cubes of 6³ hexahedra, and of as many cut into tetrahedra, it was 0.03 to 0.11 of that."""
-_ON_BODY = 0.1
-"""Error by finite slopes over what they add on the body instead of on a half-space, where free
-sides cut contacts."""
-_RESIDUAL = 1e-6
-"""Residual of the contact problems here, whose forces are then right to 1e-5 and better."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,13 +144,15 @@ class _Problems:
         model, known = self._model(self._others, 0), self._state(self._others, 0)
         if not isinstance(model.body, BodyModes):
             return {}
-        fewer = model.body.fewer(math.ceil(_FEWER_MODES * model.body.count))
+        fewer = model.body.fewer(math.ceil(0.75 * model.body.count))
         found = replace(model, body=fewer).press(self._control, start=known.guess)
         error = abs(found.force - known.force)
         coarser = model.body.coarser()
         if coarser is not None:
             found = replace(model, body=coarser).press(self._control, start=known.guess)
-            error += _LINEAR * abs(found.force - known.force)
+            # What quadratic elements leave was 0.03 to 0.11 of what linear ones change, on cubes of
+            # 6³ hexahedra, and of as many cut into tetrahedra.
+            error += 0.15 * abs(found.force - known.force)
         return {"body": error}
 
     def zero_error(self, zero: float) -> float:
@@ -204,7 +189,8 @@ class _Problems:
             return error
         alone = replace(flat, slopes=tuple(each.on_half_space() for each in model.slopes))
         found = alone.press(self._control, start=known.guess)
-        return error + _ON_BODY * abs(known.force - found.force)
+        # free sides cut contacts
+        return error + 0.1 * abs(known.force - found.force)
 
     def grid_error(self, force: float, others: float) -> float:
         """Return the error by the cells [N].
@@ -215,14 +201,17 @@ class _Problems:
                 grid matters beside it.
         """
         nx, ny = self._grid
+        # The largest counts: by a grid twice as fine, by one twice as coarse, and by that and one
+        # twice as coarse again. Without the finer grid coarser ones tell an eighth of the error. It
+        # matters from half of the other causes on.
         coarser = abs(force - self._force(self._half, self._probe.order))
         twice = abs(self._force(self._half, 0) - self._force(self._quarter, 0))
-        error = max(_COARSER * coarser, _TWICE * twice)
-        needed = min(nx, ny) < _FEWEST_CELLS or _COARSER_ALONE * error > _MATTERS * others
+        error = max(coarser / 8, twice / 30)
+        needed = min(nx, ny) < _FEWEST_CELLS or 8.0 * error > 0.5 * others
         if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
-            return _COARSER_ALONE * error
+            return 8.0 * error
         finer = abs(self._force((2 * nx, 2 * ny), 0) - self._force((nx, ny), 0))
-        return max(_FINER * finer, error)
+        return max(1.5 * finer, error)
 
     def stiffness(self) -> float:
         """Return the change of the force with the approach, without finite slopes [N/mm]."""
@@ -244,7 +233,7 @@ class _Problems:
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
         model = self._probe.model.resampled(grid)
-        return replace(self._probe.on_body(model, order), tolerance=_RESIDUAL)
+        return replace(self._probe.on_body(model, order), tolerance=1e-6)  # forces right to 1e-5
 
 
 def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: Any) -> LoadStep:

@@ -16,19 +16,21 @@ from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.clock import Clock
-from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
 from multiscale.measured_errors import error_notes
-from multiscale.observers.contacts import ContactRecorder, StiffnessObserver
-from multiscale.observers.error_check import ErrorCheck
-from multiscale.observers.fields import FieldRecorder
-from multiscale.observers.observer import StepObserver
-from multiscale.results.accuracy_verdict import verdict
+from multiscale.observers.step_observers import (
+    ContactRecorder,
+    ErrorCheck,
+    FieldRecorder,
+    StepObserver,
+    StiffnessObserver,
+    WorkObserver,
+)
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.yielding_notes import energy_notes, yielding_notes
+from multiscale.results.notes import energy_notes, verdict, yielding_notes
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
@@ -79,7 +81,7 @@ class Run:
         self._observers: list[StepObserver] = [self.fields]
         if self.scene.output.contact != "none":
             self._observers.append(StiffnessObserver(self.coupling))
-        self._observers.append(WorkObserver())
+        self._observers.append(WorkObserver(self.coupling))
         if self.scene.conductance is not None:
             from multiscale.observers.conductance import ConductanceObserver  # others do without
 
@@ -100,9 +102,9 @@ class Run:
 
     def prepare(self) -> None:
         """Make what load steps need, once: laws, bodies, a start from the steps so far."""
-        self.coupling.prepare()
+        solver = self.coupling.solver
         if self._start is not None:
-            self.coupling.restore(self._start)
+            solver.restore(self._start)
             self._start = None
 
     def load_steps(self) -> Iterator[LoadStep]:
@@ -112,7 +114,7 @@ class Run:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
         self.prepare()
-        stepper = LoadStepper(self.coupling, self.coupling.load_history, self.position)
+        stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
         with self.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
@@ -155,7 +157,7 @@ class Run:
         Note:
             Collective.
         """
-        return self.coupling.state() if self._start is None else self._start
+        return self.coupling.solver.state() if self._start is None else self._start
 
     def resume(
         self,
@@ -260,14 +262,6 @@ class Run:
         for observer in self._observers:
             observer.release()
         self.coupling.release()
-
-
-class WorkObserver(StepObserver):
-    """Adds the work of the plane since the start to load steps."""
-
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
-        """Return the load step with the work of the plane."""
-        return with_work(step, before)
 
 
 @optional_packages()

@@ -36,7 +36,6 @@ from support.errors import InputError
 from support.whole_files import write_bytes, written
 
 _HEAD = re.compile(rb"([0-9a-f]{64}) (\d{1,18})\n")
-_LONGEST_HEAD = 84  # bytes
 _STORED = "biufcSU"  # kinds of arrays whose bytes are their values
 _PLAIN = (float, int, str)  # what JSON knows, and most of a value
 _KIND = "="  # key of JSON objects that stand for what JSON does not know
@@ -106,7 +105,7 @@ def unsealed(content: bytes, kinds: Iterable[type] = ()) -> Iterator[tuple[Any, 
         head = _HEAD.match(content, mark.size)
         if head is None:
             rest = content[mark.size :]
-            if len(rest) < _LONGEST_HEAD and b"\n" not in rest:
+            if len(rest) < 84 and b"\n" not in rest:
                 return  # the head itself is not whole
             raise _damaged(mark)
         end = head.end() + int(head[2])

@@ -135,7 +135,7 @@ def shared(
     Note:
         Collective.
     """
-    rank, size = (0, 1) if comm is None else (comm.rank, comm.size)
+    rank, size = place_in(comm)
     parts = distributed(count, size, costs)
 
     def work_off() -> list[T]:
@@ -160,6 +160,11 @@ def shared(
         gathered = [result for result, _ in outcomes]
     results = dict(zip(chain(*parts), chain(*gathered), strict=True))
     return [results[index] for index in range(count)]
+
+
+def place_in(comm: Any) -> tuple[int, int]:
+    """Return rank and size of a communicator; None is one of a process on its own."""
+    return (0, 1) if comm is None else (comm.rank, comm.size)
 
 
 def distributed(count: int, ranks: int, costs: Sequence[float] | None = None) -> list[list[int]]:

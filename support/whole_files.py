@@ -79,7 +79,7 @@ def write_csv(path: Path, header: Sequence[str], rows: Iterable[Sequence[Any]]) 
     text = StringIO(newline="")
     writer = csv.writer(text)
     writer.writerow(header)
-    writer.writerows([_plain(value) for value in row] for row in rows)
+    writer.writerows([_cell(value) for value in row] for row in rows)
     return write_text(path, text.getvalue())
 
 
@@ -108,10 +108,12 @@ def remove_partial(folder: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _plain(value: Any) -> Any:
-    """Return what stands in a cell: numpy's scalars as Python's own, nothing for NaN.
+def plain(value: Any) -> Any:
+    """Return numpy's scalars as Python's own, whose text is the same on every numpy release."""
+    return value.item() if getattr(value, "ndim", 1) == 0 else value
 
-    The text of Python's numbers is the same on every numpy release.
-    """
-    plain = value.item() if hasattr(value, "item") else value
-    return None if plain != plain else plain
+
+def _cell(value: Any) -> Any:
+    """Return what stands in a cell: nothing for NaN."""
+    value = plain(value)
+    return None if value != value else value

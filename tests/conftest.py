@@ -1,4 +1,4 @@
-"""What several folders of tests share: starting a command under MPI, counting iterations."""
+"""What folders of tests share: bodies solved for once, commands under MPI, counted iterations."""
 
 import os
 import subprocess
@@ -11,10 +11,25 @@ import pytest
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
-from helpers.mpi_environment import MPI_ENVIRONMENT
+from helpers.mpi_environment import BESIDE_OTHERS
+from helpers.waiting_ranks import WaitingRanks
 
-# a test computes what it tests, and leaves nothing in the home of who runs it
+# nothing is left in the home of who runs the tests
 os.environ["PATCHLAW_CACHE"] = "off"
+SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
+"""Where the compliance of a body is itself what is tested."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def shared_bodies(request, tmp_path_factory):
+    """Let the other tests of a session read the compliance of a block that one has solved for."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not request.node.nodeid.startswith(SOLVED_ANEW):
+            folder = tmp_path_factory.getbasetemp()
+            if "PYTEST_XDIST_WORKER" in os.environ:  # beside the folders of all workers
+                folder = folder.parent
+            patch.setenv("PATCHLAW_CACHE", str(folder / "bodies"))
+        yield
 
 
 @pytest.fixture(scope="session")
@@ -32,7 +47,7 @@ def mpirun(root):
         return subprocess.run(
             command,
             cwd=root,
-            env=os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(root)},
+            env=os.environ | BESIDE_OTHERS | {"PYTHONPATH": str(root)},
             capture_output=True,
             text=True,
             timeout=timeout,  # a hang is a failure, not a wait
@@ -40,6 +55,22 @@ def mpirun(root):
         )
 
     return start
+
+
+@pytest.fixture(scope="session")
+def waiting_ranks(root, tmp_path_factory):
+    """Return what `mpirun` returns, but from ranks that wait for the next command."""
+    started = {}
+
+    def run(ranks, *words, timeout=240):
+        if ranks not in started or not started[ranks].are_waiting:
+            folder = tmp_path_factory.mktemp(f"{ranks}_ranks")
+            started[ranks] = WaitingRanks(ranks, root, folder)
+        return started[ranks].run(list(map(str, words)), timeout)
+
+    yield run
+    for each in started.values():
+        each.end()
 
 
 @pytest.fixture(scope="session")

@@ -149,6 +149,31 @@ class ContactForces:
         self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
         return closed
 
+    def closure_on_lines(
+        self, displacement: Array, pressure: Callable[[Array], Array], stiffness: Array
+    ) -> Array:
+        """Bring the plane into equilibrium on laws that are lines, and return the closures.
+
+        Args:
+            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+            pressure: Pressures of the samples [MPa] as linear functions of closures.
+            stiffness: Their stiffnesses, shape (n,) [MPa/mm].
+        """
+        levers, free, weight = self.levers, self.control.free, self._sampling.weight
+        closure = levers.matrix @ self.plane - self._gap - displacement
+        if not free.any():
+            return closure
+        missing = np.array([self.control.force or 0.0, 0.0, 0.0])
+        missing -= levers.loads(weight * pressure(closure))
+        unit = levers.unit[free]
+        resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
+        scaled = np.linalg.lstsq(
+            resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED
+        )
+        self.plane = self.plane.copy()
+        self.plane[free] += unit * scaled[0]
+        return levers.matrix @ self.plane - self._gap - displacement
+
     def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
         """Write the forces B p(c(u)) at a displacement u.
 
@@ -162,7 +187,10 @@ class ContactForces:
 
     def update(self, displacement: PETSc.Vec) -> None:
         """Move the derivative to a displacement."""
-        stiffness = self.stiffness(self.closure(displacement))
+        self.linearise(self.stiffness(self.closure(displacement)))
+
+    def linearise(self, stiffness: Array) -> None:
+        """Move the derivative to stiffnesses of this rank's samples, shape (n,) [MPa/mm]."""
         self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
+from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
 
 Array = NDArray[np.float64]
@@ -24,8 +25,11 @@ Array = NDArray[np.float64]
 _ROUNDING = 1e-7
 """Smallest part of a displacement that must be new to the basis; less only adds rounding."""
 
-_STEPS, _HALVINGS = 30, 10
-"""Newton steps in the basis, and halvings of each."""
+_STEPS = 10
+"""Steps in the basis."""
+
+_CLOSE = 1e-3
+"""Last step in the basis, relative to the guess."""
 
 
 class DisplacementBasis:
@@ -55,24 +59,39 @@ class DisplacementBasis:
         self._comm = equilibrium.body.comm
         self.vectors: list[Array] = []
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
+        self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
+        self._last: Array = np.empty(0)  # the latest solution in the basis
 
     def __len__(self) -> int:
         return len(self.vectors)
 
-    def add(self, displacement: PETSc.Vec) -> None:
-        """Add the part of a displacement that is new to the basis; collective."""
+    def add(self, displacement: PETSc.Vec, pressure: Array, *, solved: bool = True) -> None:
+        """Add the part of a displacement that is new to the basis.
+
+        Args:
+            displacement: The displacement [mm].
+            pressure: Pressures of this rank's samples that it follows from, shape (n,) [MPa].
+            solved: Whether it is a solution, from which the next guess is looked for.
+
+        Note:
+            Collective.
+        """
         stiffness = self._equilibrium.body.stiffness
         work, force = displacement.copy(), displacement.duplicate()
-        vector, before = work.array, 0.0
+        vector, before, last = work.array, 0.0, np.zeros(len(self))
         for _ in range(2):  # a second pass removes what rounding left
             stiffness.mult(work, force)
             before = before or self._sum(vector @ force.array_r)
             shares = self._sum(np.array([each @ force.array_r for each in self.vectors]))
             for share, each in zip(shares, self.vectors, strict=True):
                 vector -= share * each
+            pressure, last = pressure - shares @ self._pressures, last + shares
         stiffness.mult(work, force)
         square = self._sum(vector @ force.array_r)
-        if not square > _ROUNDING**2 * before:
+        is_new = square > _ROUNDING**2 * before
+        last = np.append(last, square**0.5) if is_new else last
+        self._last = last if solved else np.zeros_like(last)
+        if not is_new:
             return
         vector /= square**0.5
         sampled = self._sampling.operator.createVecRight()
@@ -80,45 +99,59 @@ class DisplacementBasis:
         first = max(0, len(self) + 1 - self._size)
         self.vectors = [*self.vectors, vector.copy()][first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
+        self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
+        self._last = self._last[first:]
 
-    def write_guess(self, into: PETSc.Vec) -> None:
+    @property
+    def stiffness(self) -> float:
+        """Stiffness of the body under the latest pressures, or any of the basis [MPa/mm]."""
+        y = self._last if self._last.any() else np.eye(1, len(self))[0]
+        pressure = y @ self._pressures
+        square = self._sum((self._sampling.weight * pressure) @ pressure)
+        return float(square / self._sum(pressure @ (y @ self._sampled)))
+
+    def write_guess(self, into: PETSc.Vec) -> Lines:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
-        It solves y = Wᵀ B p(closure(W y)) by damped Newton steps, which need not converge.
+        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution.
+
+        Returns:
+            The lines of the next step from there.
         """
-        y = np.zeros(len(self))
-        value, slope = self._projected(y)
-        first = float(np.linalg.norm(value))
+        forces, stiffness = self._equilibrium.forces, self.stiffness
+        y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
+        pressure = y @ self._pressures
+        closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
+        lines = law_lines(forces, closure, pressure, stiffness)
         for _ in range(_STEPS):
-            if np.linalg.norm(value) <= _ROUNDING**2 * first:
+            change = self._step(y, lines)
+            y = y - change
+            closure = self._closure_on(lines, y)
+            lines = law_lines(forces, closure, lines.at(closure), stiffness)
+            if np.linalg.norm(change) <= _CLOSE * np.linalg.norm(y):
                 break
-            step = np.linalg.solve(slope, value)
-            for share in 0.5 ** np.arange(_HALVINGS):
-                trial = y - share * step
-                trial_value, trial_slope = self._projected(trial)
-                if np.linalg.norm(trial_value) < np.linalg.norm(value):
-                    break
-            else:
-                break
-            y, value, slope = trial, trial_value, trial_slope
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
+        return law_lines(forces, closure, y @ self._pressures, stiffness)
 
-    def _projected(self, y: Array) -> tuple[Array, Array]:
-        """Return the equilibrium's residual and tangent in the basis."""
-        equations, weight = self._equilibrium.forces, self._sampling.weight
-        columns = self._sampled
-        closure = equations.closure_of((y @ columns) / weight)
-        pressure, stiffness = equations.pressure(closure), equations.stiffness(closure)
+    def _closure_on(self, lines: Lines, y: Array) -> Array:
+        """Bring the plane into equilibrium on linearised laws, and return the closures."""
+        displaced = (y @ self._sampled) / self._sampling.weight
+        return self._equilibrium.forces.closure_on_lines(displaced, lines.at, lines.stiffness)
+
+    def _step(self, y: Array, lines: Lines) -> Array:
+        """Return the step to the solution in the basis with linearised laws."""
+        forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
+        pressure = lines.at(self._closure_on(lines, y))
         parts = np.vstack([
             -columns @ pressure,
-            (columns * (stiffness / weight)) @ columns.T,
-            (columns @ equations.border(stiffness)).T,
+            (columns * (lines.stiffness / weight)) @ columns.T,
+            (columns @ forces.border(lines.stiffness)).T,
         ])  # fmt: skip
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
-        return y + parts[0], np.eye(len(y)) + stiff - border.T @ border
+        return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

@@ -19,6 +19,7 @@ from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.equations import Equilibrium
 from macro.contact.face_contact_state import FaceContactState
+from macro.contact.first_steps import FirstSteps
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
 from macro.contact.newton import Newton
@@ -30,13 +31,18 @@ from support.errors import InputError
 Array = NDArray[np.float64]
 
 
+_ROUGHLY = 1e-3
+"""Relative residual of the displacements under a uniform pressure, the first initial guess."""
+
+
 class LawContactProblem:
     """A body with contact laws under a rigid plane, solved by Newton's method.
 
     Each load step prescribes the plane's approach or force, and its tilt or zero moment. All take
     the same Newton's method in the displacements, and about as many linear solves. The tangent is
-    the exact derivative. Conjugate gradients are preconditioned by the multigrid of the body
-    alone, which is made once. The initial guess is the best combination of earlier solutions.
+    the exact derivative, and conjugate gradients are preconditioned by the body's multigrid. The
+    initial guess is the best combination of earlier solutions; far from the equilibrium
+    `FirstSteps` come before Newton's method.
 
     Args:
         face: Patches on the contact face of an elastic body.
@@ -78,6 +84,8 @@ class LawContactProblem:
             self.equilibrium, face if mode == "pointwise" else None, body.solver
         )
         self.newton = Newton(self.equilibrium, self._preconditioner)
+        update = self._preconditioner.update
+        self._first_steps = FirstSteps(self.equilibrium, sampling, update)
         condensed = " or, on a very soft body, coupling.newton = 'condensed'"
         steps = "take more load steps (load.steps)"
         self._remedies = {"": steps + condensed if mode == "patchwise" else steps}
@@ -100,26 +108,27 @@ class LawContactProblem:
         """
         equilibrium = self.equilibrium
         self.forces.prescribe(control, self._plane)
+        started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
-        self.basis.write_guess(solution)
+        residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
-        self.basis.add(solution)
         self._closure, body = self.forces.closure(solution), equilibrium.body
+        self.basis.add(solution, self.forces.pressure(self._closure))
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
             displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
             reaction=body.reaction(solution),
-            iterations=report.iterations,
-            linear_iterations=report.linear_iterations,
-            residuals=report.residuals,
+            iterations=len(residuals) + report.iterations,
+            linear_iterations=started + spent + report.linear_iterations,
+            residuals=np.concatenate([residuals, report.residuals]),
             reason=report.reason,
         )
         compat.collect_garbage(solution.comm)
         return state
 
     def start_from(self, pressure: Array) -> None:
-        """Add the displacements by mean pressures of the patches to the initial guesses.
+        """Take the displacements by mean pressures of the patches for the latest solution.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
@@ -127,12 +136,27 @@ class LawContactProblem:
         Note:
             Collective; one linear solve.
         """
-        if not pressure.any():
-            return
-        body = self.equilibrium.body
-        displacement = body.stiffness.createVecRight()
-        solve_linear(body.solver, self._face.load(pressure), displacement)
-        self.basis.add(displacement)
+        if pressure.any():
+            samples = pressure[self._sampling.patch]
+            self.basis.add(self._displacement(samples)[0], samples)
+
+    def _start(self) -> int:
+        """Add the displacement by a uniform pressure to the basis, and return the iterations."""
+        samples = np.ones(len(self._sampling.weight))
+        displacement, iterations = self._displacement(samples, _ROUGHLY)
+        self.basis.add(displacement, samples, solved=False)
+        return iterations
+
+    def _displacement(
+        self, pressure: Array, tolerance: float | None = None
+    ) -> tuple[PETSc.Vec, int]:
+        """Solve for the displacement by pressures of this rank's samples."""
+        body, sampling = self.equilibrium.body, self._sampling
+        load = body.stiffness.createVecLeft()
+        sampling.values.array[:] = pressure
+        sampling.operator.mult(sampling.values, load)
+        displacement = load.duplicate()
+        return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
     def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
         """Average functions of closure over the patches, at the latest equilibrium.
@@ -170,22 +194,19 @@ class LawContactProblem:
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
 
-_STIFF = 1.0
-"""Stiffness of laws over that of the elements, at the node where it is largest, from which on the
-preconditioner has it."""
 _MOVED = 0.5
 """Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
 """
 
 
 class ContactPreconditioner:
-    """The preconditioner of a body's tangents: with the stiffness of the laws where that matters.
+    """The preconditioner of a body's tangents, with the stiffness of laws at points.
 
-    The preconditioner of the body alone serves every tangent as long as the laws are softer than
-    the elements under them. Stiffer laws hold the nodes of the face, which it knows nothing of:
-    iterations grow to ten times as many and more. Laws at points couple no other nodes than the
-    elements do, so that their stiffness fits into the matrix, and multigrid is set up with it. On
-    quadratic elements that takes no second matrix: only the coarser grid has the sum's entries.
+    Laws hold the nodes of the face, which the preconditioner of the body alone knows nothing of:
+    iterations grow with the root of the laws' stiffness over the elements'. Laws at points couple
+    no other nodes than the elements do, so that their stiffness fits into the matrix, and multigrid
+    is set up with it. On quadratic elements that takes no second matrix: only the coarser grid has
+    the sum's entries.
 
     Args:
         equilibrium: The equations.
@@ -208,21 +229,21 @@ class ContactPreconditioner:
         self._slope: Array | None = None
 
     def update(self) -> None:
-        """Follow the tangent, where the laws are stiff."""
+        """Follow the tangent."""
         body, slope = self._body, self._equilibrium.forces.slope
         if body is None:
             return
         comm = self._face.comm
-        if self._slope is not None:
-            both = (np.abs(slope - self._slope).max(initial=0.0), slope.max(initial=0.0))
-            change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
-            if change <= _MOVED * largest:
-                return
+        known = np.zeros_like(slope) if self._slope is None else self._slope
+        both = (np.abs(slope - known).max(initial=0.0), slope.max(initial=0.0))
+        change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
+        if change <= _MOVED * largest:
+            return
         self._slope = slope.copy()
         if self._with_laws is not None:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
-        if self._largest(slope) > _STIFF:
+        if largest:
             springs = springs_at(self._face.points_by_dofs, slope)
             self._stiffened = Stiffened(body.stiffness, springs)
             self._with_laws = body.solver_of(self._stiffened)
@@ -231,14 +252,3 @@ class ContactPreconditioner:
     def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x; PETSc calls this."""
         (self._with_laws or self._alone).pc.apply(x, y)
-
-    def _largest(self, slope: Array) -> float:
-        """Return the largest ratio of the laws' to the body's stiffness at an unknown."""
-        own = self._equilibrium.body.stiffness.getDiagonal()
-        starts, columns, entries = self._face.points_by_dofs.getValuesCSR()
-        springs = own.duplicate()
-        springs.set(0.0)
-        springs.setValues(columns, np.repeat(slope, np.diff(starts)) * entries**2, addv=True)
-        springs.assemble()
-        springs.pointwiseDivide(springs, own)
-        return float(springs.max()[1])

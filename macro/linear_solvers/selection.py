@@ -9,8 +9,9 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
 
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,
-                    the supports and the jump of the moduli; 31 on tetrahedra of 8 : 1 and 16 : 1,
-                    28 to 43 on hexahedra of 8 : 1 and 20 : 1
+                    the supports and the jump of the moduli; with their slow modes solved for
+                    (`slow_modes`) 14 to 18 on flat tetrahedra, 19 to 21 on flat hexahedra, 26 to 31
+                    on a quadratic brake pad held at the rim of its piston
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Without a lattice hypre's BoomerAMG coarsens linear elements.
@@ -48,7 +49,7 @@ from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
 from macro.linear_solvers.node_matrices import Stiffened, for_displacements
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
-from macro.linear_solvers.solvers import CoarserGrid, linear_solver
+from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -118,13 +119,13 @@ _SMOOTHING_FLAT: Mapping[str, object] = {
 as long as high. The vertices do not see bending within a cell, which is soft there."""
 
 
-def body_solver(body: Any, stiffened: Stiffened | None = None) -> PETSc.KSP:
+def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
     """Return a solver for a body's stiffness; PETSc's options of the user win.
 
     Args:
         body: The `ElasticBody`.
         stiffened: The stiffness with springs, which the preconditioner is to know where there is no
-            lattice; None: no springs.
+            lattice; it must be kept as long as the solver. None: no springs.
 
     Note:
         Collective.
@@ -138,14 +139,21 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> PETSc.KSP:
     if lattice is not None and requested in ("", "mg"):
         smoother = smoothing(ratio, hexahedral=compat.is_hexahedral(mesh))
         return linear_solver(matrix, coarser_grids(lattice, matrix, body.free), smoother)
+    modes = None if stiffened is None else body.solver.modes
     if lattice is None and body.degree == 2 and requested in ("", "mg"):
         springs, finest = None, None
         if stiffened is not None:
             springs, finest = stiffened.springs, (stiffened.product, stiffened.diagonal_blocks())
         grid = vertex_grid(body.space, body.linear, body.free, springs)
-        return linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
+        solver = linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
+        if not PETSc.Options(PREFIX).hasName("mg_coarse_pc_type"):
+            solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
+        return solver
     whole = None if stiffened is None else stiffened.assembled()
-    return linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
+    solver = linear_solver(matrix, preconditioner=algebraic_options(mesh), whole=whole)
+    if not requested:
+        solver.solve_slow_modes(solver, stiffened.product if stiffened else None, modes)
+    return solver
 
 
 def algebraic_options(mesh: Any) -> Mapping[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,11 @@ from macro.linear_solvers.options import (
     GEOMETRIC_DEFAULTS,
     KRYLOV_DEFAULTS,
     PREFIX,
+    WeakContext,
     default_options,
     reason_name,
 )
+from macro.linear_solvers.slow_modes import Balanced, slow_modes
 from support.errors import NotConverged
 
 MARGINS = (50, 200, 800, 3200)
@@ -41,6 +44,52 @@ class CoarserGrid:
     matrix: PETSc.Mat
 
 
+class LinearSolver(PETSc.KSP):
+    """PETSc's solver, with what its preconditioner needs in Python.
+
+    Attributes:
+        modes: This rank's rows of the modes that `solve_slow_modes` added; None before.
+    """
+
+    modes: NDArray[np.float64] | None = None
+    _balanced: Any = None
+    _inner: PETSc.PC | None = None
+
+    @property
+    def method(self) -> str:
+        """PETSc's name of the preconditioner, that beside slow modes included."""
+        return str((self._inner or self.pc).getType())
+
+    def solve_slow_modes(
+        self,
+        grid: PETSc.KSP,
+        matrix: PETSc.Mat | None = None,
+        modes: NDArray[np.float64] | None = None,
+    ) -> None:
+        """Solve for modes that the preconditioner of a grid misses; see `slow_modes`.
+
+        Args:
+            grid: This solver, or that of the coarsest grid of its multigrid; set up.
+            matrix: The grid's matrix, which must be kept as long as this; None: its operator.
+            modes: The modes; None: they are found, where there are some.
+
+        Note:
+            Collective.
+        """
+        matrix, inner = matrix or grid.getOperators()[0], grid.pc
+        self.modes = slow_modes(matrix, inner) if modes is None else modes
+        if not self.modes.shape[1]:
+            return
+        self._balanced = Balanced(matrix, inner, self.modes)
+        self._inner = inner if grid is self else None
+        outer = PETSc.PC().create(self.comm)
+        outer.setOperators(*grid.getOperators())
+        outer.setType("python")
+        outer.setPythonContext(WeakContext(self._balanced))
+        outer.setUp()
+        grid.setPC(outer)
+
+
 def linear_solver(
     matrix: PETSc.Mat,
     coarser: Sequence[CoarserGrid] | None = None,
@@ -49,7 +98,7 @@ def linear_solver(
     finest: tuple[PETSc.Mat, PETSc.Mat] | None = None,
     whole: PETSc.Mat | None = None,
     prefix: str = PREFIX,
-) -> PETSc.KSP:
+) -> LinearSolver:
     """Return a solver for a symmetric positive definite matrix, its preconditioner set up.
 
     Args:
@@ -66,7 +115,7 @@ def linear_solver(
     Note:
         Collective.
     """
-    solver = PETSc.KSP().create(matrix.comm)
+    solver: LinearSolver = LinearSolver().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
     made_of = _pointwise(whole or matrix) if coarser is None else matrix
     solver.setOperators(matrix, made_of)
@@ -100,13 +149,16 @@ def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
     return copy
 
 
-def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int:
+def solve_linear(
+    solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec, *, tolerance: float | None = None
+) -> int:
     """Solve and return the number of iterations.
 
     Args:
         solver: The solver.
         load: Right-hand side.
         solution: Receives the solution.
+        tolerance: Largest residual relative to the load, if that is more than the solver's own.
 
     Raises:
         NotConverged: With the name of PETSc's reason.
@@ -114,7 +166,10 @@ def solve_linear(solver: PETSc.KSP, load: PETSc.Vec, solution: PETSc.Vec) -> int
     Note:
         Collective.
     """
+    own = solver.getTolerances()[0]
+    solver.setTolerances(rtol=max(own, tolerance or 0.0))
     solver.solve(load, solution)
+    solver.setTolerances(rtol=own)
     if solver.reason < 0:
         raise NotConverged(
             "the linear solve of the block",

@@ -11,24 +11,19 @@ from typing import Any
 import numpy as np
 
 from geometry.surface import Surface
+from multiscale.couplings.cost import SOLUTIONS_OF_LAWS
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
-from multiscale.couplings.work import SOLUTIONS_OF_LAWS
 from multiscale.inputs.loads import PROVISIONAL_PATCHES
-from multiscale.inputs.spectrum import most_waves
+from multiscale.inputs.surfaces import most_waves
 from multiscale.loading.stepper import step_count
 from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene import Scene
 from multiscale.scene.sections import CouplingSection
 from support.errors import InputError
 
-DEFAULT_ACCURACY = 0.02
-"""Relative error of the force that is kept unless the scene says."""
-PATCHES_ACROSS = 8
-"""Patches along the shorter side, enough for a map."""
-LEAST_HEIGHTS, MOST_HEIGHTS = 32, 2048
-"""Heights along a side of grids that are chosen."""
-
+MOST_HEIGHTS = 2048
+"""Heights along a side of grids that are chosen, at most."""
 _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
 
 
@@ -57,15 +52,6 @@ def auto_keys(scene: Scene) -> frozenset[str]:
     return frozenset(open_keys if scene.on_mesh else open_keys - {"block.cells"})
 
 
-def accuracy_of(scene: Scene) -> float:
-    """Return the relative error of the force that a scene may be left with.
-
-    Args:
-        scene: The scene.
-    """
-    return scene.accuracy or DEFAULT_ACCURACY
-
-
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
@@ -77,7 +63,7 @@ def is_measured(scene: Scene) -> bool:
     """
     opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
     sized = scene.accuracy is None or not scene.reference.sizes_are_open
-    return opened or (scene.kind == "reference" and not sized)
+    return opened or (coupling_class(scene).meshes_roughness and not sized)
 
 
 def provisional(scene: Scene, auto: frozenset[str]) -> Scene:
@@ -179,6 +165,8 @@ def chosen_coupling(scene: Scene) -> tuple[CouplingSection, str]:
 def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
     """Return nearly square patches that make a map, no more than heights or elements below.
 
+    There are 8 along the shorter side.
+
     Args:
         scene: The scene.
         surface: Its surface.
@@ -186,7 +174,7 @@ def map_grid(scene: Scene, surface: Surface) -> tuple[int, int]:
     shorter = min(surface.lengths)
     most = np.min(list(coupling_class(scene).patch_limits(scene, surface).values()), axis=0)
     x, y = (
-        min(max(round(PATCHES_ACROSS * length / shorter), 1), int(limit))
+        min(max(round(8 * length / shorter), 1), int(limit))
         for length, limit in zip(surface.lengths, most, strict=True)
     )
     return x, y
@@ -203,5 +191,5 @@ def on_waves(scene: Scene, count: int) -> Scene:
     if section.spectrum is None or section.lengths is None:  # refused when the scene was read
         return scene
     waves = most_waves(section.spectrum, section.lengths)
-    grid = tuple(min(max(8 * math.ceil(count * k / 8), LEAST_HEIGHTS), MOST_HEIGHTS) for k in waves)
+    grid = tuple(min(max(8 * math.ceil(count * k / 8), 32), MOST_HEIGHTS) for k in waves)
     return with_value(scene, "surface.grid", grid)

@@ -11,7 +11,9 @@ is refused where their memory is missing. The rule in words: docs/choosing.md.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import cast
 
 from geometry.zero import Zero
 from micro import HalfSpaceModel
@@ -23,34 +25,57 @@ from multiscale.auto.keys import (
     on_waves,
     with_value,
 )
-from multiscale.auto.mesh_search import Build, Errors, MeshError, MeshSearch, refinement
 from multiscale.couplings.coupling import Coupling
+from multiscale.couplings.dispatch import coupling_class
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.couplings.scene_parts import Decision
 from multiscale.inputs.loads import load_history_on
 from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.measured_errors import ZERO, ErrorProbe
+from multiscale.results.notes import relative_error
 from multiscale.scene.scene import Scene
 from support.errors import InputError, NotConverged
 
+Build = Callable[[Scene], Coupling]
+MeshError = Callable[[ReferenceCoupling], float]
+Errors = Mapping[str, float]
+
 _TRIALS = 6
-"""Most trials of a grid."""
-_SPARE = 0.8
-"""Share of the accuracy that errors at the largest load may take; errors at other loads differ."""
-_ORDER = 1.5
-"""Order of the force in the size of the cells, for the next grid to try."""
-_COARSE, _FINE = 8, 16
-"""Heights along the shortest wave that are tried first, and that are enough for summits and for
-meshes."""
-_FIRST_CELLS = 4
-"""Coarsening of a given grid for the first trial, along a side."""
-_LEAST_CELLS = 48
-"""Cells along a side at least."""
-_LAWS = 0.1
-"""Interpolation error of laws over the accuracy."""
+"""Most trials of a grid, or of the size of meshes."""
+_MOST_UNKNOWNS = 1_000_000
+"""Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
+
+
+def refinement(excess: float, order: float) -> float:
+    """Return the refinement for the next trial.
+
+    Args:
+        excess: Error over allowed error.
+        order: Known order of the error in the size.
+    """
+    return min(max(excess ** (1.0 / order), 1.3), 2.0)
+
+
+def measured_mesh_error(coupling: ReferenceCoupling) -> float:
+    """Return the relative error of the force by the meshes of a reference at the largest load.
+
+    Args:
+        coupling: The reference, with several meshes.
+
+    Raises:
+        NotConverged: When the contact problem cannot be solved.
+    """
+    history = coupling.load_history
+    step = coupling.press(history.control(history.largest))
+    (with_error,), _ = coupling.with_mesh_errors([step])
+    coupling.release()
+    if not step.force_N > 0.0:
+        return 0.0
+    error = relative_error(with_error, by_force=history.quantity == "force")
+    return 1.0 if error is None else error
 
 
 def coupling_by_accuracy(
@@ -68,24 +93,37 @@ def coupling_by_accuracy(
         InputError: When nothing that the scene allows can be made, or the memory is missing.
         NotConverged: When a contact problem cannot be solved.
     """
-    search, auto = _Search(given, build, mesh_error), auto_keys(given)
+    search, auto, kind = _Search(given, build, mesh_error), auto_keys(given), coupling_class(start)
     if "surface.grid" in auto:
-        on_cells = start.micro.model == "half-space" and start.coupling.kind != "reference"
-        start = on_waves(start, _COARSE if on_cells else _FINE)
-    if start.coupling.kind == "consistent" and start.coupling.table_tolerance is None:
-        start = with_value(start, "coupling.table_tolerance", _LAWS * search.accuracy)
+        on_cells = start.micro.model == "half-space" and not kind.meshes_roughness
+        # heights along the shortest wave: what is tried first, and enough for summits and meshes
+        start = on_waves(start, 8 if on_cells else 16)
+    if kind.tolerance_by_accuracy and start.coupling.table_tolerance is None:
+        start = with_value(start, "coupling.table_tolerance", 0.1 * search.accuracy)
     coupling = build(start)
     if "patches.grid" in auto:
         coupling = build(with_value(start, "patches.grid", map_grid(start, coupling.surface)))
-    if isinstance(coupling, ReferenceCoupling):
-        return search.decided(*search.with_refined_meshes(coupling))
-    if isinstance(coupling, MicroCoupling) and isinstance(coupling.micro, HalfSpaceModel):
-        return search.kept_or_meshed(*search.refined_cells(coupling, coupling.micro))
+    if kind.meshes_roughness:
+        return search.decided(*search.with_refined_meshes(cast(ReferenceCoupling, coupling)))
+    if isinstance(coupling.micro, HalfSpaceModel):
+        return search.kept_or_meshed(
+            *search.refined_cells(cast(MicroCoupling, coupling), coupling.micro)
+        )
     return search.decided(coupling, {})
 
 
-class _Search(MeshSearch):
+@dataclass(frozen=True)
+class _Search:
     """The search for auto values of one scene; see `coupling_by_accuracy`."""
+
+    given: Scene
+    build: Build
+    mesh_error: MeshError
+
+    @property
+    def accuracy(self) -> float:
+        """Relative error of the force that may be left, 2 % by default."""
+        return self.given.accuracy or 0.02
 
     def refined_cells(
         self, coupling: MicroCoupling, model: HalfSpaceModel
@@ -95,7 +133,7 @@ class _Search(MeshSearch):
         new_surface = "surface.grid" in auto
         may_refine = new_surface or "micro.model" in auto
         if may_refine and not new_surface:
-            cells = _scaled(cells, 1.0 / _FIRST_CELLS)
+            cells = _scaled(cells, 0.25)
         probe, history = replace(coupling.error_probe(), by_laws=False), coupling.load_history
         for trial in range(_TRIALS):
             if new_surface:
@@ -108,16 +146,50 @@ class _Search(MeshSearch):
             errors = _measured(replace(probe, model=model), history)
             by_cells = errors["grid"] + (errors.get(ZERO, 0.0) if new_surface else 0.0)
             others = sum(errors.values()) - by_cells
-            allowed = max(_SPARE * self.accuracy - others, 0.5 * others)
+            # at other loads errors differ: this one may take 0.8 of the accuracy
+            allowed = max(0.8 * self.accuracy - others, 0.5 * others)
             last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
             if not may_refine or last or by_cells <= allowed:
                 break
-            cells = _scaled(cells, refinement(by_cells / allowed, _ORDER))
+            cells = _scaled(cells, refinement(by_cells / allowed, order=1.5))
         if new_surface:
             made = self.build(with_value(scene, "surface.grid", model.surface.grid))
-            assert isinstance(made, MicroCoupling)
-            coupling = made
+            coupling = cast(MicroCoupling, made)
         return replace(coupling, micro=model), errors
+
+    def with_refined_meshes(self, coupling: ReferenceCoupling) -> tuple[ReferenceCoupling, Errors]:
+        """Refine the meshes of a reference until their error keeps the accuracy."""
+        coupling = self._with_first_meshes(coupling)
+        if len(coupling.rough_meshes.shapes) == 1:  # one mesh does not show its error
+            return coupling, {}
+        for _ in range(_TRIALS):
+            error, fine = self.mesh_error(coupling), coupling.scene.reference.fine
+            if error <= self.accuracy or not self._may_refine(coupling) or fine is None:
+                break
+            finer = refinement(error / self.accuracy, coupling.rough_meshes.force_order)
+            refined = self._with_fine(coupling, fine / finer)
+            if not _is_small(refined):
+                break
+            coupling = refined
+        return coupling, {"mesh": error}
+
+    def _may_refine(self, coupling: ReferenceCoupling) -> bool:
+        """Tell whether the scene leaves the size of tetrahedra open."""
+        return self.given.reference.fine is None and not coupling.rough_meshes.hexahedral
+
+    def _with_first_meshes(self, coupling: ReferenceCoupling) -> ReferenceCoupling:
+        """Return a reference with the meshes to try first, coarser for a lower accuracy."""
+        if not self._may_refine(coupling) or coupling.scene.reference.fine is not None:
+            return coupling
+        # the default meshes are off by some 0.005
+        coarser = min(max((self.accuracy / 0.005) ** 0.5, 1.0), 1.8)
+        return self._with_fine(coupling, coarser * float(coupling.rough_meshes.sizes[-1]))
+
+    def _with_fine(self, coupling: ReferenceCoupling, fine: float) -> ReferenceCoupling:
+        return self._reference(with_value(coupling.scene, "reference.fine", fine))
+
+    def _reference(self, scene: Scene) -> ReferenceCoupling:
+        return cast(ReferenceCoupling, self.build(scene))
 
     def kept_or_meshed(self, coupling: MicroCoupling, errors: Errors) -> Coupling:
         """Return the coupling, or a reference where the errors exceed the accuracy.
@@ -133,8 +205,8 @@ class _Search(MeshSearch):
         section = type(coupling.scene.coupling)(kind="reference")
         scene = replace(coupling.scene, coupling=section)
         try:
-            meshed = self.with_first_meshes(self.reference(scene))
-            if not self.is_small(meshed):
+            meshed = self._with_first_meshes(self._reference(scene))
+            if not _is_small(meshed):
                 return self.decided(coupling, errors)
             meshed, mesh_errors = self.with_refined_meshes(meshed)
         except MemoryLacking:  # another machine would take the reference
@@ -168,6 +240,11 @@ class _Search(MeshSearch):
         return replace(coupling, decision=decision)
 
 
+def _is_small(coupling: ReferenceCoupling) -> bool:
+    """Tell whether the meshes of a reference have no more unknowns than are chosen."""
+    return sum(coupling.rough_meshes.unknowns) <= _MOST_UNKNOWNS
+
+
 def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
     """Return the errors relative to the force, at the load where their sum is largest."""
     worst: Errors = {"grid": 0.0}
@@ -184,8 +261,5 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
 
 def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
     """Return cells along the sides times a factor, as multiples of 8 within the limits."""
-    x, y = (
-        min(max(8 * math.ceil(factor * count / 8 - 1e-9), _LEAST_CELLS), MOST_HEIGHTS)
-        for count in cells
-    )
+    x, y = (min(max(8 * math.ceil(factor * count / 8 - 1e-9), 48), MOST_HEIGHTS) for count in cells)
     return x, y

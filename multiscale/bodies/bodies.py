@@ -1,36 +1,50 @@
-"""The bodies of a scene: their contact face, their compliance under patches, and their terms.
+"""The bodies of a scene: contact face, compliance, contact models on them, fields.
 
 One rule holds for a counter-body that is a half-space. A compliance of the patches as a matrix is
 that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain those of the half-space.
+
+Fields are those of a body that was pressed as a mesh, whose displacements are kept. Elsewhere a
+body with a flat top is meshed after the load, and loaded by the contact pressures: by those of the
+cells or asperities, summed over the facets of the mesh, or with laws by the means of the patches.
 
 Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import gc
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import InputError, MaterialPair, PatchGrid
-from micro import influence_matrix
-from multiscale.bodies.block import block_terms
-from multiscale.bodies.face_terms import FaceTerms
+from geometry import InputError, MaterialPair, PatchGrid, Surface
+from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
+from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
-from multiscale.bodies.scene_body import SceneBody
-from multiscale.inputs.block import block_section
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import SceneBody, block_section
+from multiscale.inputs.scene_parts import SceneParts
 from multiscale.laws.consistent import Displacements
-from multiscale.scene.scene import Scene
+from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FacePair, LoadedFace
+    from macro import ElasticBody, FacePair, LoadedFace
+    from macro.fields import Pressures
 
-Array = NDArray[np.float64]
+Field = tuple[int, Array, "Pressures"]
+"""Number of the load step, this rank's displacements [mm], and the pressures [MPa]."""
+OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
+"""Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
+
+SLOPES = 2
+"""Order of finite slopes where they are taken into account."""
+_RESIDUAL = 1e-10
+"""Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
+of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,25 +52,14 @@ class Bodies:
     """The bodies of a scene, on every rank.
 
     Args:
-        scene: The scene.
+        parts: What is known of the scene.
         comm: MPI communicator; None for this process alone.
-        facts: What is known of the body below the surface and of a counter-body on a mesh.
-        materials: The materials on both sides of the interface.
-        lengths: Sides of the surface [mm].
-        patches: Partition of the interface.
-        regions: Whether the contact face is divided by its regions, as under laws of samples,
-            instead of by patches.
         first: The body below the surface where it is a mesh; None for a block.
         counter: The counter-body where it is a mesh.
     """
 
-    scene: Scene
+    parts: SceneParts
     comm: Any
-    facts: tuple[BodyFacts, BodyFacts | None]
-    materials: MaterialPair
-    lengths: tuple[float, float]
-    patches: PatchGrid
-    regions: bool = False
     first: SceneBody | None = None
     counter: SceneBody | None = None
 
@@ -68,16 +71,12 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import FacePair, LoadedFace
+        from macro import FacePair
 
         first = self._first_face()
         if self.counter is None:
             return first
-        second = LoadedFace(self.counter.body, self.counter.facets[0], self.patches)
-        if self.regions:
-            lengths = self.facts[0].lengths
-            second = LoadedFace.of_regions(self.counter.body, self.counter.facets, lengths)
-        return FacePair(first, second)
+        return FacePair(first, self._on_mesh(self.counter))
 
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
@@ -86,20 +85,23 @@ class Bodies:
         from macro import Block, LoadedFace, block_mesh
         from macro.mesh.contact_face import top_facets
 
-        body: Any
-        shape = self.facts[0].shape
+        parts, shape = self.parts, self.parts.body.shape
         if self.first is not None:
-            body, facets = self.first.body, self.first.facets
-        else:
-            assert shape is not None
-            mesh = block_mesh(shape, self.comm or MPI.COMM_SELF)
-            body = Block(mesh, self.materials.first, sides=block_section(self.scene).sides)
-            if not self.regions:
-                return LoadedFace.of_block(body, self.patches)
-            facets = (top_facets(mesh),)
-        if self.regions:
-            return LoadedFace.of_regions(body, facets, self.facts[0].lengths)
-        return LoadedFace(body, facets[0], self.patches)
+            return self._on_mesh(self.first)
+        assert shape is not None
+        mesh = block_mesh(shape, self.comm or MPI.COMM_SELF)
+        body = Block(mesh, parts.materials.first, sides=block_section(parts.scene).sides)
+        if parts.regions is None:
+            return LoadedFace.of_block(body, parts.patches)
+        return LoadedFace.of_regions(body, (top_facets(mesh),), parts.body.lengths)
+
+    def _on_mesh(self, mesh: SceneBody) -> LoadedFace:
+        """Return the patches or regions on a body that is a mesh of its own."""
+        from macro import LoadedFace
+
+        if self.parts.regions is None:
+            return LoadedFace(mesh.body, mesh.facets[0], self.parts.patches)
+        return LoadedFace.of_regions(mesh.body, mesh.facets, self.parts.body.lengths)
 
     def terms(self, *, side_term: bool) -> FaceTerms:
         """Return the terms of the bodies in contact problems of the whole surface.
@@ -114,13 +116,14 @@ class Bodies:
             Collective where a body is a mesh.
         """
         first: FaceTerms
-        shape = self.facts[0].shape
+        parts, shape = self.parts, self.parts.body.shape
+        lengths = parts.surface.lengths
         if self.first is not None:
-            first = MeshTerms.of(self.first, self.lengths, side_term=side_term)
+            first = MeshTerms.of(self.first, lengths, side_term=side_term)
         else:
             assert shape is not None
-            sides = block_section(self.scene).sides
-            first = block_terms(shape, self.materials.first, sides, side_term=side_term)
+            sides = block_section(parts.scene).sides
+            first = BlockTerms.of(shape, parts.materials.first, sides, side_term=side_term)
         if self.counter is None:
             return first
         if first.margin:
@@ -130,7 +133,7 @@ class Bodies:
                 value=first.margin,
                 allowed="0; or both bodies from meshes",
             )
-        second = MeshTerms.of(self.counter, self.lengths, side_term=False, behind=True)
+        second = MeshTerms.of(self.counter, lengths, side_term=False, behind=True)
         return PairTerms(first=first, second=second)
 
     def patch_displacements(self, *, dense: bool, solutions: int) -> Displacements:
@@ -164,7 +167,7 @@ class Bodies:
         from macro.compliance.cache import cached
         from macro.linear_solvers.options import users_options
 
-        key = (*self._as_text(), self.patches, users_options())
+        key = (*self._as_text(), self.parts.patches, users_options())
         faces: list[Any] = []  # meshed when a column is missing
         columns: dict[int, Array] = {}
 
@@ -174,7 +177,7 @@ class Bodies:
             return displacements_under(faces[0], pressures)
 
         def by_unit_load(patch: int) -> Array:
-            one = np.eye(1, self.patches.count, patch)
+            one = np.eye(1, self.parts.patches.count, patch)
             comm = self.comm or MPI.COMM_SELF
             return cached("column", (*key, patch), lambda: {"column": under(one)}, comm)["column"]
 
@@ -196,19 +199,19 @@ class Bodies:
         Note:
             Collective.
         """
-        first, second = self._of_first, self.materials.second
+        parts, first, second = self.parts, self._of_first, self.parts.materials.second
         # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
-        meshed_together = self.facts[1] is not None and not self.scene.decomposed
+        meshed_together = parts.counter is not None and not parts.scene.decomposed
         if second is None or meshed_together:
             return first
-        half_space = influence_matrix(self.patches) * second.surface_compliance / np.pi
+        half_space = influence_matrix(parts.patches) * second.surface_compliance / np.pi
         return np.asarray(first + half_space)
 
     @cached_property
     def _of_first(self) -> Array:
         """Return the compliance of the meshes under the patches, of the first body or of both."""
-        if self.scene.decomposed:
-            return self.terms(side_term=True).patch_compliance(self.patches, self.comm)
+        if self.parts.scene.decomposed:
+            return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
         from mpi4py import MPI
 
         from macro import patch_compliance_matrix
@@ -218,15 +221,180 @@ class Bodies:
         def compute() -> dict[str, Array]:
             return {"compliance": patch_compliance_matrix(self.contact_face())}
 
-        key = (*self._as_text(), self.patches, users_options())
+        key = (*self._as_text(), self.parts.patches, users_options())
         return cached("plain", key, compute, self.comm or MPI.COMM_SELF)["compliance"]
+
+    def mean_compliance(self) -> float:
+        """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
+
+        Note:
+            Collective.
+        """
+        from macro import FacePair, displacements_under
+
+        face, total = self.contact_face(), 0.0
+        for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
+            moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
+            total += float(moved @ one.areas / one.areas.sum())
+        return total
 
     def _as_text(self) -> tuple[Any, ...]:
         """Return all that the compliance of the meshes depends on, besides the patches."""
-        scene, parts, shape = self.scene, [], self.facts[0].shape
-        if shape is not None:
-            parts += [shape, self.materials.first, block_section(scene).sides]
-        for section, facts in zip((scene.body, scene.counter_body), self.facts, strict=True):
+        parts, scene, found = self.parts, self.parts.scene, list[Any]()
+        if parts.body.shape is not None:
+            found += [parts.body.shape, parts.materials.first, block_section(scene).sides]
+        sections = (scene.body, parts.body), (scene.counter_body, parts.counter)
+        for section, facts in sections:
             if section is not None and facts is not None:
-                parts += [section, facts.digest]
-        return tuple(parts)
+                found += [section, facts.digest]
+        return tuple(found)
+
+
+def on_body(
+    bodies: Bodies | None,
+    materials: MaterialPair,
+    counter: Surface | None,
+    *,
+    more_modes: int = 0,
+) -> OnBody:
+    """Return what puts half-space models on the bodies of a scene, which are solved for once.
+
+    Theory: docs/theory.md, sections 3 and 7.
+
+    Args:
+        bodies: The bodies; None for half-spaces.
+        materials: The materials on both sides.
+        counter: What of the surface is the counter-body's; None where that is smooth.
+        more_modes: Modes of the body along a side beyond those that its shape needs.
+
+    Returns:
+        A function from a model and the order of finite slopes, 0 for none, to the model on the
+        body. It is not collective.
+
+    Note:
+        Collective.
+    """
+    terms = None if bodies is None else bodies.terms(side_term=True)
+    face = None
+    if bodies is not None and terms is not None:
+        modes = terms.modes + more_modes if more_modes else None
+        face = terms.face(bodies.comm, modes=modes)
+
+    def put(model: HalfSpaceModel, order: int) -> HalfSpaceModel:
+        model, above = replace(model, tolerance=_RESIDUAL), None
+        surface = model.surface
+        if counter is not None:  # each body has slopes of its own
+            above = counter.on_grid(surface.grid)
+            surface = replace(surface, heights=surface.heights - above.heights)
+        # With finite slopes heights count from the highest point, near the loads, where slopes add
+        # least. The flat body then ends at it, while the block's height is that of the mean plane.
+        higher = surface.highest - surface.mean_height if order else 0.0
+        if terms is not None and face is not None:
+            model = replace(model, body=terms.term(face, higher=higher))
+            if terms.side_term is not None:
+                share = terms.side_share(model.contact_modulus)
+                model = replace(model, sides=replace(terms.side_term, share=share))
+        if not order:
+            return model
+        stresses = [] if terms is None or face is None else terms.stresses(face, surface)
+        plane = surface.highest if stresses else None
+        slopes = FiniteSlopes(
+            surface,
+            materials.first,
+            periodic=model.periodic,
+            plane=plane,
+            edge_stresses=stresses,
+        )
+        if above is None or materials.second is None:
+            return replace(model, slopes=(slopes,))
+        others = FiniteSlopes(above, materials.second, periodic=model.periodic)
+        return replace(model, slopes=(slopes, others))
+
+    return put
+
+
+def write_solved(path: Path, bodies: Bodies, parts: PatchGrid, states: Mapping[int, Array]) -> None:
+    """Write the fields of bodies under pressures of parts of their contact face.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        bodies: The bodies, meshed where they were not yet.
+        parts: The N parts.
+        states: Pressures by number of the load step, shape (N,) each [MPa].
+
+    Note:
+        Collective.
+    """
+    whole = bodies.contact_face()
+
+    def solved(face: LoadedFace) -> Iterator[Field]:
+        for number, pressure in sorted(states.items()):
+            solution = face.body.solve(face.load(pressure))
+            yield number, solution.x.array[: face.body.owned_dofs].copy(), pressure
+
+    _write(path, whole, solved, parts=parts)
+
+
+def write_displaced(
+    path: Path,
+    face: LoadedFace | FacePair,
+    states: Mapping[int, Array],
+    pressures: Callable[[int, bool], Pressures],
+) -> None:
+    """Write the fields of bodies whose displacements are known.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        face: The contact face of the body, or of both.
+        states: This rank's displacements by number of the load step [mm].
+        pressures: What is shown as pressure, by load step and whether it is on the counter-body.
+
+    Note:
+        Collective.
+    """
+    from macro import FacePair
+
+    def halves(counter: bool) -> Iterator[Field]:
+        for number, moved in sorted(states.items()):
+            own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
+            yield number, own, pressures(number, counter)
+
+    _write(path, face, lambda one: halves(one is getattr(face, "second", None)))
+
+
+def _write(
+    path: Path,
+    whole: LoadedFace | FacePair,
+    fields: Callable[[LoadedFace], Iterator[Field]],
+    parts: PatchGrid | None = None,
+) -> None:
+    import macro
+
+    both: list[Any] = [whole.first, whole.second] if isinstance(whole, macro.FacePair) else [whole]
+    for one, name in zip(both, (path.name, f"counter_{path.name}"), strict=False):
+        face = one if parts is None else replace(one, patches=parts)
+        macro.write_fields(path.with_name(name), face, fields(face))
+
+
+def free_bodies(bodies: list[ElasticBody]) -> None:
+    """Free bodies that nothing else refers to any more.
+
+    PETSc keeps objects that Python drops until it is asked on their own communicator. Without this
+    a program that makes many runs would grow by a block with each.
+
+    Args:
+        bodies: The bodies; the list is emptied.
+
+    Note:
+        Collective.
+    """
+    if not bodies:
+        return
+    from macro.compat import collect_garbage
+
+    comms = [body.stiffness.comm.duplicate() for body in bodies]  # these outlive their bodies
+    bodies.clear()
+    gc.collect()  # a body and its contact problem refer to each other
+    for comm in comms:
+        collect_garbage(comm)
+        comm.destroy()

@@ -9,13 +9,14 @@ Theory: docs/theory.md, sections 5, 6 and 11.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import Material, Surface
+from geometry import InputError, Material, Surface
 from micro import (
     BodyModes,
     BodyStresses,
@@ -29,24 +30,22 @@ from micro import (
     side_stress_modes,
     side_stresses,
 )
+from support.arrays import Array
+from support.checks import process_memory
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from geometry import PatchGrid
+    from geometry import BlockShape, PatchGrid
     from macro import FaceCompliance
+    from macro.bodies import Sides
 
-Array = NDArray[np.float64]
 
-DECAY_LENGTH = 0.25
-"""Decay length of the effect of free sides in the micro model, relative to the shortest side of
-the block."""
-
-CUBE_MODES = 8
+_CUBE_MODES = 8
 """Modes along a side of a cube whose free sides are a term of their own. On Set 1's recipe (seed 1,
 8 µm) the force with 6, 8, 10 and 14 differs by 0.04, 0.012, 0.009 and 0.005 % from that with 20. On
 a ball in the middle, near a side, cut by a side and by a corner 8 are within 0.003, 0.002, 0.02 and
 0.1 %, 6 within 3 %."""
 
-FLATNESS_POWER = 0.42
+_FLATNESS_POWER = 0.42
 """Power of the shape's width by its depth that modes grow with: a block 0.3, 0.1 and 0.05 mm high
 and 1 mm wide needs 13, 21 and 28 for 0.1 to 0.2 %."""
 
@@ -58,14 +57,32 @@ LEAST_WITH_MARGIN = 12
 """Modes at least where the block is wider than the contact: with a margin of 0.05 mm on a cube 8
 are up to 1.2 % off, 12 up to 0.1 %; a corner 0.7 %."""
 
-_MODES_OF_CORNERS = 12
-"""Modes for many patches where free sides are a term of their own: of 16 × 16 patches the one in
-the corner is 0.3 % off with 8 and less than 0.1 % with 12."""
 
-_MODES_PER_PATCH, _MOST_MODES = 2, 32
-"""Modes per patch along a side where they describe free sides too, and their largest number. Of
-4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 % of the largest
-entry."""
+_BYTES = 190.0
+"""Memory of solving for K × K modes over K⁴: free blocks 100 and 200 times as wide as high, with 56
+and 75 modes, take 1.8 and 5.8 GB (and 15 and 48 s)."""
+
+
+def free_sides(
+    lengths: tuple[float, float],
+    material: Material,
+    depth: float,
+    present: tuple[bool, bool, bool, bool] = (True, True, True, True),
+) -> FreeSides:
+    """Return free sides of a body that are a term of their own.
+
+    Args:
+        lengths: Sides of the contact [mm].
+        material: Elastic constants of the body.
+        depth: Its extent below the contact [mm].
+        present: Which sides are free.
+    """
+    return FreeSides(
+        lengths=lengths,
+        poisson_ratio=material.poisson_ratio,
+        decay_length=0.25 * min(*lengths, depth),
+        present=present,
+    )
 
 
 class FaceTerms(ABC):
@@ -101,6 +118,17 @@ class FaceTerms(ABC):
         Note:
             Collective.
         """
+
+    def resolving_modes(self, depth: float, least: int) -> int:
+        """Return the modes along a side that resolve the body correction; see the constants above.
+
+        Args:
+            depth: Extent of the body below the contact [mm].
+            least: Their least number.
+        """
+        flatness = max(self.lengths) / min(*self.lengths, depth)
+        count = max(_CUBE_MODES * flatness**_FLATNESS_POWER, least)
+        return math.ceil(round(count, 6))
 
     @property
     def margin(self) -> float:
@@ -165,8 +193,89 @@ class FaceTerms(ABC):
         half_space = influence_matrix(patches) / (np.pi * modulus)
         if self.side_term is not None:
             half_space += self.side_term.patch_compliance(patches) / modulus
-            count = max(count, min(max(patches.grid), _MODES_OF_CORNERS))
+            # of 16 × 16 patches the one in the corner is 0.3 % off with 8 modes, < 0.1 % with 12
+            count = max(count, min(max(patches.grid), 12))
         else:
-            count = max(count, min(_MODES_PER_PATCH * max(patches.grid), _MOST_MODES))
+            # of 4 × 4, 8 × 8 and 16 × 16 patches 16, 16 and 24 modes leave 0.01, 0.07 and 0.3 %
+            count = max(count, min(2 * max(patches.grid), 32))
         correction = self.term(self.face(comm, modes=count))
         return np.asarray(half_space + correction.patch_compliance(patches))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockTerms(FaceTerms):
+    """An elastic block under a contact.
+
+    Args:
+        shape: Size of the block; its cells do not matter.
+        material: Elastic constants.
+        sides: Support of its sides.
+        side_term: Free sides that are a term of their own in the contact's compliance; None where
+            the body correction includes them.
+    """
+
+    shape: BlockShape
+    material: Material
+    sides: Sides
+    side_term: FreeSides | None = None
+
+    @classmethod
+    def of(cls, shape: BlockShape, material: Material, sides: Sides, *, side_term: bool) -> Self:
+        """Return the terms of a block.
+
+        Args:
+            shape: Its shape, with the contact as its interface.
+            material: Elastic constants.
+            sides: Support of its sides.
+            side_term: Whether free sides that bound the interface are a term of their own.
+        """
+        own = None
+        if side_term and sides == "free" and not shape.margin:
+            own = free_sides(shape.interface, material, shape.height)
+        return cls(shape=shape, material=material, sides=sides, side_term=own)
+
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """Sides of the top, margin included [mm]."""
+        x, y = (length + 2.0 * self.shape.margin for length in self.shape.interface)
+        return x, y
+
+    @property
+    def margin(self) -> float:
+        """Width by which the top exceeds the contact on every side [mm]."""
+        return self.shape.margin
+
+    @property
+    def modes(self) -> int:
+        """Modes along a side that resolve the body correction."""
+        least = 0 if self.side_term is not None else LEAST_WITH_SIDES
+        return self.resolving_modes(
+            self.shape.height, LEAST_WITH_MARGIN if self.shape.margin else least
+        )
+
+    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
+        """Return the compliance of the top in modes, from finite elements; see `FaceTerms.face`.
+
+        Raises:
+            InputError: When the modes of so flat a block do not fit into memory.
+        """
+        from mpi4py import MPI
+
+        from macro import face_compliance
+
+        count, shape = modes or self.modes, self.shape
+        needed, memory = _BYTES * float(count) ** 4, process_memory()
+        if needed > memory:
+            ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)
+            raise InputError(
+                f"the compliance of so flat a block, in {count} modes a side, needs about "
+                f"{needed / 1e9:.3g} GB of memory",
+                key="block.margin" if shape.margin else "block.height",
+                value=shape.margin or shape.height,
+                allowed="blocks whose longest side is at most "
+                f"{ratio:.3g} times the shortest or the height",
+            )
+        comm = comm or MPI.COMM_SELF
+        return face_compliance(
+            self.lengths, shape.height, self.material, self.sides, count, comm, use_cache=True
+        )

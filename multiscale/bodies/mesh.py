@@ -5,32 +5,22 @@ Theory: docs/theory.md, sections 5 and 6.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geometry import Material, PatchGrid
 from micro import FreeSides, RectangleFields
 from multiscale.bodies.face_terms import (
-    CUBE_MODES,
-    DECAY_LENGTH,
-    FLATNESS_POWER,
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
     FaceTerms,
+    free_sides,
 )
-from multiscale.bodies.scene_body import SceneBody
+from multiscale.inputs.bodies import SceneBody
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, FaceCompliance, MeshedBody
     from macro.compliance.surroundings import Surroundings
-
-_SAME = 1e-9
-"""Difference of Poisson's ratios that is rounding."""
-_CACHED = "mesh-face"
-"""Kind of these compliances in the cache."""
-_ON_MESH = 6
-"""Modes at most where they load the mesh itself: finer ones are those of its elements."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -88,12 +78,7 @@ class MeshTerms(FaceTerms):
         around = surroundings(scene_body.body, facets, rectangle)
         sides = None
         if side_term and any(around.free_sides):
-            sides = FreeSides(
-                lengths=lengths,
-                poisson_ratio=around.material.poisson_ratio,
-                decay_length=DECAY_LENGTH * min(*lengths, around.thickness),
-                present=around.free_sides,
-            )
+            sides = free_sides(lengths, around.material, around.thickness, around.free_sides)
         return cls(
             body=scene_body.body,
             facets=facets,
@@ -117,13 +102,11 @@ class MeshTerms(FaceTerms):
     @property
     def modes(self) -> int:
         """Modes along a side that resolve the body correction; see `FaceTerms`."""
-        flatness = max(self.lengths) / min(*self.lengths, self.around.thickness)
-        count = CUBE_MODES * flatness**FLATNESS_POWER
-        if self.side_term is None and any(self.around.free_sides):
-            count = max(count, LEAST_WITH_SIDES)
-        elif not all(self.around.free_sides):
-            count = max(count, LEAST_WITH_MARGIN)
-        return math.ceil(round(count if self.around.below else min(count, _ON_MESH), 6))
+        free = self.around.free_sides
+        least = 0 if all(free) else LEAST_WITH_MARGIN
+        if self.side_term is None and any(free):
+            least = LEAST_WITH_SIDES
+        return self._resolved(self.resolving_modes(self.around.thickness, least))
 
     def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
         """Return the compliance of the rectangle in modes, from the mesh.
@@ -139,7 +122,7 @@ class MeshTerms(FaceTerms):
         from macro.compliance.cache import cached
         from macro.compliance.mesh_face import mesh_face_compliance, raised, turned
 
-        count, body = self._count(modes), raised(self.body)
+        count, body = self._resolved(modes or self.modes), raised(self.body)
 
         def of(one: MeshedBody) -> FaceCompliance:
             fields = RectangleFields(
@@ -157,13 +140,12 @@ class MeshTerms(FaceTerms):
             rough = of(body.linear).normal if body.degree == 2 else None
             return replace(of(body), rough=rough).arrays
 
-        found = FaceCompliance(**cached(_CACHED, self._key(count), compute, self.body.comm))
+        found = FaceCompliance(**cached("mesh-face", self._key(count), compute, self.body.comm))
         return turned(found) if self.behind else found
 
-    def _count(self, modes: int | None) -> int:
-        """Return the modes along a side, by default those of the shape."""
-        count = modes or self.modes
-        return count if self.around.below else min(count, _ON_MESH)
+    def _resolved(self, count: int) -> int:
+        """Return as many modes along a side, or as many as the mesh itself resolves."""
+        return count if self.around.below else min(count, 6)
 
     def _key(self, count: int) -> tuple[object, ...]:
         """Return what the compliance in so many modes along a side depends on."""
@@ -251,7 +233,7 @@ class PairTerms(FaceTerms):
         left, right, *others = around.free_sides
         same = own is not None and own.present == (right, left, *others)
         apart = self.first.material.poisson_ratio - self.second.material.poisson_ratio
-        return same and abs(apart) < _SAME
+        return same and abs(apart) < 1e-9
 
     @property
     def _behind(self) -> MeshTerms:

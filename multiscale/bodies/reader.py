@@ -14,8 +14,7 @@ import numpy as np
 
 from geometry import InputError, Material
 from geometry.face_frame import UPWARD, FaceFrame
-from multiscale.bodies.scene_body import SceneBody
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts, SceneBody
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
@@ -25,14 +24,10 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, MeshedBody, TaggedMesh
     from macro.mesh.tagged import PlanarFace
 
-MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
-"""Units of meshes in mm."""
 
+_MILLIMETRES = {"mm": 1.0, "m": 1e3, "um": 1e-3, "inch": 25.4}
 _SAME_PLANE = 1e-6
 """Distance between planes, relative to the face, that is rounding of coordinates in files."""
-_MOST_CURVED = 5e-3
-"""Height of a slightly curved face over its shorter side, up to which its gap counts as one between
-planes. A sphere has slopes of 2 % at its edge then, whose squares are not counted."""
 
 
 def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | None]:
@@ -91,7 +86,7 @@ class _Reader:
         from macro.mesh.checks import size_note
         from macro.mesh.from_file import read_mesh
 
-        mesh = read_mesh(self._path, self._comm, unit=MILLIMETRES[self._section.mesh_unit])
+        mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
         note = size_note(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
         for region in regions:
@@ -166,7 +161,8 @@ class _Reader:
         from macro.mesh.tagged import PlanarFace, planar_face
 
         curved = self._scene.law.representative
-        allowed = _MOST_CURVED * self._shortest(mesh) if curved else 0.0
+        # a gap counts as one between planes up to here: a sphere has slopes of 2 % at its edge
+        allowed = 5e-3 * self._shortest(mesh) if curved else 0.0
         faces = [
             planar_face(mesh, tag, deviation=allowed, key=f"{self._key}.contact") for tag in tags
         ]

@@ -7,12 +7,13 @@ import os
 import platform
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING
+from multiscale.figures.files import Drawing, Pictures, file_kinds, pictures_of, write_pictures
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures, write_records
+from multiscale.output.results import write_records
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
@@ -24,9 +25,6 @@ from multiscale.studies.running import CaseResult
 from support.collective import on_root
 from support.errors import InputError, NotConverged
 from support.whole_files import write_text
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -57,7 +55,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
             except KeyboardInterrupt:
                 ended(f"interrupted: what is finished is in {folder}; the same call goes on")
                 raise
-        files = on_root(comm, lambda: write_comparison(folder, done))
+        files = on_root(comm, lambda: write_comparison(folder, done, scene.output.figures))
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
             terminal.say(comm, text)
         terminal.show_files(comm, files)
@@ -70,31 +68,28 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         )
 
 
-def write_comparison(folder: Path, comparison: Comparison) -> list[Path]:
+def write_comparison(
+    folder: Path, comparison: Comparison, figures: bool | str = True
+) -> list[Path]:
     """Write ``compare.csv``, the figure and ``report.html``.
 
     Args:
         folder: Folder of the results; made when missing.
         comparison: The comparison.
+        figures: The scene's `output.figures`, "svg" for a figure in this form too.
 
     Returns:
         The files written.
     """
-
-    def figure() -> Figure:
-        from multiscale.studies.figures import comparison_figure  # loads matplotlib
-
-        return comparison_figure(comparison)
-
     files = [write_records(folder / "compare.csv", iter(comparison.records()))]
-    pictures: Mapping[str, bytes] = {}
+    drawn = Pictures({})
     if comparison.measure is not None:
-        drawn = pictures_of("pareto", figure)
-        pictures = drawn.files
-        if drawn.problem:
-            terminal.say(None, drawn.problem)
-    files += write_pictures(folder, pictures)
-    page = write_text(folder / "report.html", comparison_html(comparison, pictures))
+        what = "studies.figures.comparison_figure"
+        drawn = pictures_of(Drawing("pareto", what, (comparison,), file_kinds(figures)))
+    if drawn.problem:
+        terminal.say(None, drawn.problem)
+    files += write_pictures(folder, drawn)
+    page = write_text(folder / "report.html", comparison_html(comparison, drawn.files))
     return [path for path in (*files, page) if path is not None]
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
-from multiscale import compiled_forms, doctor
+from multiscale import doctor
 from multiscale.doctor import Check, CheckResult, examine
 from multiscale.output import terminal
 from support.errors import InputError
@@ -21,7 +21,7 @@ CHECKS: dict[str, Check] = {
     "launcher": doctor.launcher,
     "ranks": doctor.ranks,
     "threads": doctor.threads,
-    "form cache": compiled_forms.form_cache,
+    "form cache": doctor.form_cache,
     "test solve": doctor.known_solve,
 }
 """Topics and checks of the doctor, in the order in which they are made and shown."""
@@ -60,7 +60,7 @@ def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    folder, count = compiled_forms.warm(choice.element, comm)
+    folder, count = doctor.warm(choice.element, comm)
     terminal.say(comm, f"{count} compiled forms in {folder}")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
-from multiscale.output.results import write_results
+from multiscale.output.results import RunFigures, write_results
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (
@@ -49,11 +49,14 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             terminal.show_plan(comm, run.coupling)
             if notice:
                 terminal.say(comm, notice)
-            with CheckpointWriter(folder, run, lock.hold) as checkpoints:
-                failure = _make_load_steps(run, checkpoints, interruption)
+            with (
+                CheckpointWriter(folder, run, lock.hold) as checkpoints,
+                RunFigures(run) as figures,
+            ):
+                failure = _make_load_steps(run, checkpoints, figures, interruption)
                 if run.steps:
                     checkpoints.finish()  # writing results may fail
-                _write(folder, run, failure, options)
+                _write(folder, run, figures, failure, options)
                 if failure is not None:
                     raise failure
                 checkpoints.remove()
@@ -84,7 +87,7 @@ def _is_finished(folder: Path, scene: Scene, comm: Any) -> bool:
 
 
 def _make_load_steps(
-    run: Run, checkpoints: CheckpointWriter, interruption: Interruption
+    run: Run, checkpoints: CheckpointWriter, figures: RunFigures, interruption: Interruption
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
     load_history = run.scene.loading
@@ -93,6 +96,7 @@ def _make_load_steps(
             if run.coupling.has_laws:
                 run.make_laws()
             checkpoints.accept()
+            figures.begin()
             interruption.check("before the block was made")
             with optional_packages():
                 run.prepare()
@@ -116,14 +120,20 @@ def _make_load_steps(
     return None
 
 
-def _write(folder: Path, run: Run, failure: PatchlawError | None, options: list[str]) -> None:
+def _write(
+    folder: Path,
+    run: Run,
+    figures: RunFigures,
+    failure: PatchlawError | None,
+    options: list[str],
+) -> None:
     """Write and show the results, also of a run that ended early."""
     comm = run.comm
     if failure is not None and _is_finished(folder, run.given, comm):
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
         run.finish()
-        files = write_results(folder, run, options=options)
+        files = write_results(folder, run, options=options, figures=figures)
         if run.scene.output.fields:
             files += write_fields(folder, run)
         terminal.show_history(comm, run.history())

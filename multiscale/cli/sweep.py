@@ -7,23 +7,22 @@ import math
 import os
 import time
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import SWEEP_ENDING
+from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.output import terminal
-from multiscale.output.results import pictures_of, write_pictures, write_records
+from multiscale.output.results import write_records
 from multiscale.restart.results_folder import locked
 from multiscale.studies.cases import Case, sweep_cases, values_from_text
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
-from support.collective import on_root
+from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
 from support.whole_files import remove
-
-MOST_LINES = 20
-"""Ensembles that are told in the terminal; the files hold all of them."""
 
 FILES = ("cases.csv", "history.csv", "statistics.csv", "sweep.png", "sweep.svg")
 """Files of the results of a sweep."""
@@ -44,7 +43,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
-        ranks = parts * (1 if comm is None else comm.size)
+        ranks = parts * place_in(comm)[1]
         terminal.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
         pace, last = terminal.Pace(math.ceil(cases / ranks)), time.monotonic()
         with terminal.following(comm) as (begun, ended):
@@ -57,7 +56,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
                     ended(f"case {case.number}: {result.failure}")
 
             done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = on_root(comm, lambda: _write(folder, done, figures=bool(scene.output.figures)))
+        files = on_root(comm, lambda: _write(folder, done, scene.output.figures))
     for text in _summary(done):
         terminal.say(comm, text)
     terminal.show_files(comm, files)
@@ -88,7 +87,7 @@ def _remove_results(folder: Path) -> None:
         remove(path)
 
 
-def _write(folder: Path, done: SweepResults, *, figures: bool) -> list[Path]:
+def _write(folder: Path, done: SweepResults, figures: bool | str) -> list[Path]:
     """Write the tables and the figure of the cases that are done."""
     statistics = done.statistics_records() if _statistics(done) else []
     files = [
@@ -100,17 +99,15 @@ def _write(folder: Path, done: SweepResults, *, figures: bool) -> list[Path]:
         )
     ]
     if figures and statistics:
-        pictures = pictures_of("sweep", done.plot)
-        if pictures.problem:
-            terminal.say(None, pictures.problem)
-        files += write_pictures(folder, pictures.files)
+        drawing = Drawing("sweep", "studies.figures.sweep_figure", (done,), file_kinds(figures))
+        files += write_figure(folder, drawing, partial(terminal.say, None))
     return [path for path in files if path is not None]
 
 
 def _summary(done: SweepResults) -> Iterator[str]:
     """Yield a line on the last load step of each ensemble."""
     yield f"{len(done) - done.unfinished} of {len(done)} cases are done"
-    for values, part in _statistics(done)[:MOST_LINES]:
+    for values, part in _statistics(done)[:20]:  # the files hold all of them
         said = "".join(f"{key} = {value}, " for key, value in values.items())
         force, approach = _spread(part, "force_N"), _spread(part, "approach_mm", 1e3)
         yield f"{said}at last: force {force} N, approach {approach} µm"

@@ -166,17 +166,17 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     """Add the commands that run no scene."""
     plan = "Say what a run would do, and why; run nothing expensive."
     unused = "accepted so that the words of a run can be reused: a plan writes nothing"
-    _add_scene(command("plan", "describe.plan_scene", plan), folder=unused)
+    _add_scene(command("plan", "plan.plan_scene", plan), folder=unused)
     laws = "Tabulate the patch laws of a scene; write and draw them."
-    tabulate = command("laws", "describe.tabulate_laws", laws)
+    tabulate = command("laws", "laws.tabulate_laws", laws)
     _add_scene(tabulate)
     forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
     choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
     tabulate.add_argument("--export", action="append", help=forms, **choices)
     surface = "Describe and draw the surface of a scene."
-    _add_scene(command("surface", "describe.describe_surface", surface))
-    command("schema", "describe.print_schema", "Print the JSON Schema of scene files.")
-    keys = command("help", "describe.explain_keys", "Explain the sections and keys of a scene.")
+    _add_scene(command("surface", "laws.describe_surface", surface))
+    command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")
+    keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
     topic = "a section or a key, such as load or load.force; all sections by default"
     keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."

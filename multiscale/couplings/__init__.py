@@ -1,10 +1,9 @@
 """One class for each coupling: all that a scene is used for, from its sections to its fields.
 
-    analytic, concurrent     one contact problem per load step              `contact`
+    analytic, concurrent     one contact problem per load step              `micro_coupling`
     consistent, isolated     a law for every patch                          `patch_laws`
     representative           laws of periodic samples at points             `representative`
     reference                the rough surface meshed                       `reference`
 
-`dispatch` is the only place that asks which coupling a scene has. `coupling` has what all share,
-`scene_parts` what is known of the scene alone.
+`dispatch` is the only place that asks which coupling a scene has; `coupling` has what all share.
 """

@@ -12,64 +12,103 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import (
-    Control,
-    InputError,
-    Surface,
-)
+from geometry import Control, InputError, PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
-from micro.model import Stiffness
-from multiscale.bodies.bodies import Bodies
-from multiscale.bodies.scene_body import SceneBody
+from geometry.plausibility import check_finite_slopes
+from geometry.statistics import roughness
+from micro import HalfSpaceModel, MicroModel
+from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.couplings import describe
-from multiscale.couplings.scene_parts import SceneParts
-from multiscale.couplings.work import Work
-from multiscale.inputs.block import FIELD_CELLS, Cells, block_cells
-from multiscale.inputs.body_facts import BodyFacts
-from multiscale.inputs.memory import (
-    block_requests,
-    body_request,
-    check_memory,
-    patch_requests,
-    surface_requests,
+from multiscale.couplings.cost import Work, cost_statement
+from multiscale.inputs.bodies import (
+    FIELD_CELLS,
+    LAW_BLOCK_CELLS,
+    BodyFacts,
+    Cells,
+    SceneBody,
+    stated_cells,
 )
+from multiscale.inputs.memory import body_request, scene_requests
+from multiscale.inputs.scene_parts import SceneParts
+from multiscale.inputs.surfaces import located
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.clock import Clock
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
+from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
-from multiscale.readable import Detail, percent
+from multiscale.readable import Detail, percent, quantity
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
+Meshes = tuple[SceneBody | None, SceneBody | None]
+"""The body and the counter-body where these are meshes."""
+
+
+class Source(NamedTuple):
+    """What a coupling is made from.
+
+    Attributes:
+        scene: The scene, without auto values.
+        facts: What is known of its bodies' meshes.
+        nodes: The nodes of the run.
+        like: A coupling with the same surface, which is taken from it.
+        cells: Cells of the half-space of contact problems; None when they are the surface's.
+    """
+
+    scene: Scene
+    facts: Facts
+    nodes: ClusterNodes
+    like: Coupling | None = None
+    cells: tuple[int, int] | None = None
 
 
 @dataclass(kw_only=True, eq=False)
 class Coupling(SceneParts, ABC):
     """A scene on its way to load steps.
 
-    The attributes up to `seconds` are made from the scene alone; they do not change.
+    The attributes up to `plane_at_largest_load` are made from the scene alone; they do not change.
 
     Attributes:
+        micro: Micro model of the surface on a half-space; None where contacts are meshed.
+        plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
+            prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
+            the load steps needs it.
         comm: MPI communicator; None for this process alone.
         clock: Measures the phases of the run.
-        table: The patch laws, once made, counted from first touch; None without laws.
+        table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
+            None without laws.
     """
 
+    tolerance_by_accuracy: ClassVar[bool] = False
+    """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
+    shows_contacts: ClassVar[bool] = False
+    """Whether fields of a block are those under its contacts, which take more cells."""
+    patches_interact: ClassVar[bool] = True
+    """Whether all patches interact in the compliance of the bodies."""
+    laws_made_by: ClassVar[str] = ""
+    """Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without."""
+
+    micro: MicroModel | None = None
+    plane_at_largest_load: RigidPlane | None = None
     comm: Any = field(default=None, init=False)
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
-    _past: Any = field(default=None, init=False)
-    _meshes: tuple[SceneBody | None, SceneBody | None] = field(default=(None, None), init=False)
+    _meshes: Meshes = field(default=(None, None), init=False)
+
+    def __post_init__(self) -> None:
+        """Refuse finite slopes of surfaces that are too steep for them."""
+        if self.finite_slopes:
+            with located(self.scene, "micro.finite_slopes"):
+                for surface in self.sloped_surfaces:
+                    check_finite_slopes(surface)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what is made from the scene alone; bodies and solvers are not sent."""
@@ -82,30 +121,18 @@ class Coupling(SceneParts, ABC):
 
     @classmethod
     @abstractmethod
-    def from_scene(
-        cls,
-        scene: Scene,
-        facts: Facts,
-        nodes: ClusterNodes,
-        *,
-        like: Coupling | None = None,
-        cells: tuple[int, int] | None = None,
-    ) -> Self:
+    def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process, without finite elements.
 
         Args:
-            scene: The scene, without auto values.
-            facts: What is known of its bodies' meshes.
-            nodes: The nodes of the run.
-            like: A coupling with the same surface, which is taken from it.
-            cells: Cells of the half-space of contact problems; None when they are the surface's.
+            source: The scene, and what else is known.
 
         Raises:
             InputError: When something cannot be made or does not fit; names file, key and value.
             NotConverged: When a contact problem cannot be solved.
         """
 
-    def attach(self, comm: Any, meshes: tuple[SceneBody | None, SceneBody | None]) -> None:
+    def attach(self, comm: Any, meshes: Meshes) -> None:
         """Put the coupling on its bodies, on every rank.
 
         Args:
@@ -121,18 +148,25 @@ class Coupling(SceneParts, ABC):
         self.comm, self._meshes = comm, meshes
 
     @classmethod
-    def cells_unstated(cls, scene: Scene) -> Cells:
-        """Return the cells of a block that a scene states none for.
+    def unstated_cells(cls, scene: Scene) -> Cells:
+        """Return the cells of a block that a scene states none for: more under laws on its mesh.
 
         Args:
             scene: The scene.
         """
-        return FIELD_CELLS
+        return LAW_BLOCK_CELLS if cls.shows_contacts or scene.on_mesh else FIELD_CELLS
 
     @classmethod
-    def meshes_block(cls, scene: Scene) -> bool:
-        """Tell whether a flat block is meshed: under laws, or for fields after the load."""
-        return scene.on_mesh or (cls.has_body and bool(scene.output.fields))
+    def block_cells(cls, scene: Scene) -> Cells | None:
+        """Return the cells of a flat block that is meshed: for laws, or for fields afterwards.
+
+        Args:
+            scene: The scene.
+        """
+        meshed = scene.on_mesh or (cls.has_body and bool(scene.output.fields))
+        if scene.block is None or not meshed:
+            return None
+        return stated_cells(scene, cls.unstated_cells(scene))
 
     @classmethod
     def patch_limits(cls, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
@@ -143,8 +177,7 @@ class Coupling(SceneParts, ABC):
             surface: Its surface.
         """
         limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
-        if scene.block is not None and cls.meshes_block(scene):
-            cells = block_cells(scene, cls.cells_unstated(scene))
+        if cells := cls.block_cells(scene):
             limits["cells of the interface (block.cells)"] = cells[:2]
         return limits
 
@@ -155,15 +188,8 @@ class Coupling(SceneParts, ABC):
         Args:
             scene: The scene.
         """
-        yield from surface_requests(scene)
-        if scene.block is not None and cls.meshes_block(scene):
-            yield from block_requests(scene, block_cells(scene, cls.cells_unstated(scene)))
-        yield from patch_requests(scene)
-
-    @classmethod
-    def check_memory(cls, scene: Scene, nodes: ClusterNodes) -> None:
-        """Refuse a scene that does not fit into the memory of the nodes."""
-        check_memory(scene, nodes, cls.requests(scene))
+        cells, made_by = cls.block_cells(scene), cls.laws_made_by
+        return scene_requests(scene, cells, interact=cls.patches_interact, made_by=made_by)
 
     # --- what is known before the run
 
@@ -171,17 +197,12 @@ class Coupling(SceneParts, ABC):
     def bodies(self) -> Bodies:
         """The bodies under the contact, on every rank."""
         first, counter = self._meshes
-        return Bodies(
-            scene=self.scene,
-            comm=self.comm,
-            facts=(self.body, self.counter),
-            materials=self.materials,
-            lengths=self.surface.lengths,
-            patches=self.patches,
-            regions=self.regions is not None,
-            first=first,
-            counter=counter,
-        )
+        return Bodies(parts=self, comm=self.comm, first=first, counter=counter)
+
+    @property
+    def sloped_surfaces(self) -> Sequence[Surface]:
+        """The rough sides of the bodies, whose slopes count."""
+        return self.rough_surfaces
 
     @property
     def cells(self) -> tuple[int, int] | None:
@@ -189,22 +210,64 @@ class Coupling(SceneParts, ABC):
         return None
 
     @property
-    @abstractmethod
     def label(self) -> str:
         """The coupling, and the cells, meshes or micro model that it works on, in few words."""
+        kind, micro = self.scene.kind, self.micro
+        if isinstance(micro, HalfSpaceModel):
+            return f"{kind} on {describe.times(micro.surface.grid)} cells"
+        return kind if micro is None else f"{kind}, {micro.name}"
+
+    def interference(self, x: Array, y: Array, z: Array) -> Array:
+        """Return how far points lie above the undeformed plane at the largest load [mm].
+
+        Args:
+            x: First coordinate of the points [mm].
+            y: Second coordinate [mm].
+            z: Height [mm].
+
+        Raises:
+            ValueError: Where the plane is not known before the load steps.
+        """
+        return self.plane.at(x, y) - (self.surface.highest - z)
+
+    @property
+    def plane(self) -> RigidPlane:
+        """The rigid plane at the largest load.
+
+        Raises:
+            ValueError: Where it is not known before the load steps.
+        """
+        if self.plane_at_largest_load is None:
+            raise ValueError("the plane under this force is not known before the load steps")
+        return self.plane_at_largest_load
+
+    @property
+    def cell_interference(self) -> Array:
+        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
+        surface = self.surface
+        return self.interference(surface.x[:, None], surface.y, surface.heights)
+
+    @cached_property
+    def largest_interference(self) -> float:
+        """Largest interference of the surface [mm], never less than the approach at the middle.
+
+        Under a tilted plane the approach at the middle may be negative while its lower side
+        touches.
+        """
+        return max(self.plane.approach, float(self.cell_interference.max()))
 
     def statements(self, cost: Iterable[tuple[str, str]] = ()) -> Iterator[tuple[str, str]]:
         """Yield pairs of topic and sentence that say what will be done and why.
 
         Args:
-            cost: What it costs, see `multiscale.couplings.work.cost_statements`.
+            cost: What it costs, see `cost_statements`.
         """
         yield "inputs", f"{describe.materials(self)}; a surface of {describe.dimensions(self)}"
         yield "surface", describe.surface(self)
         yield "contact", self.contact_statement()
         if self.scene.counter_surface is not None:
             yield "two rough sides", describe.two_sides(self)
-        yield "micro model", self.model_statement()
+        yield "micro model", describe.micro_model(self.scene.micro, self.micro)
         yield "coupling", self.coupling_statement()
         yield from self.body_statements()
         yield from self.law_statements()
@@ -214,13 +277,12 @@ class Coupling(SceneParts, ABC):
         yield from cost
         yield "error", self.error_statement()
 
-    @abstractmethod
     def contact_statement(self) -> str:
         """Say what is in contact."""
-
-    @abstractmethod
-    def model_statement(self) -> str:
-        """Say which micro model solves contacts, and how."""
+        cells = f"{self.surface.heights.size} cells"
+        if self.plane_at_largest_load is None:
+            return cells
+        return f"{cells}, {int((self.cell_interference > 0.0).sum())} within the largest approach"
 
     @abstractmethod
     def coupling_statement(self) -> str:
@@ -235,27 +297,28 @@ class Coupling(SceneParts, ABC):
         return iter(())
 
     def load_statement(self) -> str:
-        """Say the load steps."""
-        return describe.load(self)
+        """Say the load steps, and the approach under a force where it is estimated."""
+        text = describe.load(self)
+        if self.load_history.quantity == "force" and self.plane_at_largest_load is not None:
+            approach = quantity(self.plane.approach - self.zero, "mm", 3)
+            text += f"; on a half-space its approach is about {approach}"
+        return text
 
-    @abstractmethod
     def error_statement(self) -> str:
         """Say how the run will know its error."""
+        return f"not measured: {self.unmeasured()}"
 
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
-        yield from describe.surface_warnings(self, self.size)
+        known = self.plane_at_largest_load is not None
+        size = self.largest_interference if known else roughness(self.surface).sq
+        yield from describe.surface_warnings(self, size)
         yield from self.contact_warnings()
         yield from describe.output_warnings(self, cells=self.shows_cells)
         if self.has_body:
             yield from self.body_warnings()
         if self.decision is not None and self.decision.warning:
             yield self.decision.warning
-
-    @property
-    @abstractmethod
-    def size(self) -> float:
-        """Size of the interferences, or of the roughness where these are not known [mm]."""
 
     def contact_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the contact and of its micro model."""
@@ -289,6 +352,17 @@ class Coupling(SceneParts, ABC):
                 element, unknowns = facts.element, facts.unknowns
                 yield body_request(key, element, unknowns, steps, in_parts=in_parts)
 
+    def cost_statements(self, program: float, ranks: int) -> Iterator[tuple[str, str]]:
+        """Yield what a run computes, the order of magnitude of its time, and its memory.
+
+        Args:
+            program: Memory of a process before anything of the scene is in it [B].
+            ranks: Processes of the MPI job.
+        """
+        work = self.work(ranks)
+        yield from work.statements()
+        yield cost_statement(self, work, self.memory_requests(), program)
+
     @abstractmethod
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
@@ -306,7 +380,13 @@ class Coupling(SceneParts, ABC):
             InputError: When the coupling has no laws.
         """
         if not cls.has_laws:
-            raise _without_laws(scene)
+            raise InputError(
+                "has no laws",
+                key="coupling.kind",
+                value=scene.kind,
+                allowed="isolated, consistent",
+                file=scene.file,
+            )
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once.
@@ -318,86 +398,31 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        raise _without_laws(self.scene)
+        self.check_has_laws(self.scene)
+        raise NotImplementedError  # couplings with laws make them
 
     @abstractmethod
-    def prepare(self) -> None:
-        """Make what load steps need, once; `press` does it by itself.
+    def _make_solver(self) -> StepSolver:
+        """Make what finds load steps; collective."""
 
-        Note:
-            Collective.
-        """
+    @cached_property
+    def solver(self) -> StepSolver:
+        """What finds load steps, on the bodies, which are made with it; collective."""
+        with self.clock.phase("block"):
+            return self._make_solver()
 
-    @abstractmethod
     def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step, whose number is still 0.
-
-        Args:
-            control: What the step prescribes of the plane.
-
-        Raises:
-            NotConverged: When none is found. Earlier equilibria stay what they were, so that a
-                smaller step can be tried.
-
-        Note:
-            Collective.
-        """
-
-    def stiffness(self) -> Stiffness:
-        """Return the interfacial stiffness dF/dδ at the latest load step, where it is known.
-
-        The slopes of the plane stay or, where it turns, its moments stay zero.
-
-        Note:
-            Collective.
-        """
-        return Stiffness(None, 0)
-
-    @property
-    def past(self) -> Any:
-        """What the load steps so far left behind beyond initial guesses; None where nothing.
-
-        Set it to take load steps back.
-        """
-        return self._past
-
-    @past.setter
-    def past(self, value: Any) -> None:
-        self._past = value
-
-    @abstractmethod
-    def state(self) -> Any:
-        """Return what the next load step starts from; it does not depend on the number of ranks.
-
-        It is made of numbers, texts, arrays and records of them, or None where there is nothing.
-
-        Note:
-            Collective.
-        """
-
-    @abstractmethod
-    def restore(self, state: Any) -> None:
-        """Start from a state, in a coupling newly made from the same scene.
-
-        Args:
-            state: What `state` returned.
-
-        Note:
-            Collective.
-        """
+        """Find the equilibrium of one load step; see `StepSolver.press`."""
+        return self.solver.press(control)
 
     # --- what is made of load steps
 
-    def contact_state(self) -> Any:
-        """Return what `contact` takes of the latest load step."""
-        return None
-
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState] | None:
+    def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
         """Return the spots and fields of the contact of a load step.
 
         Args:
             step: The load step.
-            state: What `contact_state` returned after it.
+            latest: What `StepSolver.latest` was after it.
 
         Returns:
             The load step, with the largest pressure of the contact, and the contact; None where
@@ -409,19 +434,11 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        return None
+        detail = self.solver.detail(latest)
+        return None if detail is None else (step, detail)
 
-    def contact_note(self, step: int, force: float) -> str:
-        """Return what a report says of the last contact that `contact` returned; empty for nothing.
-
-        Args:
-            step: Number of its load step.
-            force: Force of the contact [N].
-        """
-        return ""
-
-    def checked(self, step: LoadStep) -> LoadStep | None:
-        """Return a load step with its errors measured; None where they cannot be.
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step with its errors measured; as it is where they cannot be.
 
         Args:
             step: The load step.
@@ -432,7 +449,7 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        return None
+        return step
 
     def with_mesh_errors(
         self, steps: Sequence[LoadStep]
@@ -464,25 +481,6 @@ class Coupling(SceneParts, ABC):
         """
         return iter(())
 
-    def interface_stiffness(self, step: LoadStep) -> float | None:
-        """Return dF/dδ of the contacts between half-spaces; None where it is not known [N/mm].
-
-        Args:
-            step: The load step accepted last.
-
-        Note:
-            Collective.
-        """
-        return None
-
-    def gaps(self) -> Array | None:
-        """Return the gaps of all cells at the latest load step, 0 in contact; None without cells.
-
-        Returns:
-            Shape (nx, ny) [mm]; on rank 0 alone.
-        """
-        return None
-
     @property
     def areas(self) -> Array:
         """Nominal areas of the patches or regions, shape (N,) [mm²]."""
@@ -497,56 +495,50 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        return None
+        made = self.made_solver
+        return None if made is None or self.regions is None else made.face_pressures()
 
     # --- fields of the body
 
-    def field_state(self, step: LoadStep) -> Any:
-        """Return what the fields of the load step just accepted are made from.
+    @property
+    def field_parts(self) -> PatchGrid:
+        """The parts of the contact face that contacts are seen on in fields."""
+        return self.patches
 
-        Args:
-            step: The load step.
-
-        Note:
-            Collective.
-        """
-        return step.patches.pressure_MPa
-
-    def write_fields(
-        self, path: Path, states: Mapping[int, Any], steps: Sequence[LoadStep]
-    ) -> None:
+    def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of load steps as XDMF and VTX, see `macro.write_fields`.
 
         Args:
             path: File to write, ending in ``.xdmf``.
-            states: By number of the load step what `field_state` returned.
-            steps: The load steps.
+            states: By number of the load step what `StepSolver.field_state` returned.
 
         Note:
             Collective.
         """
-        from multiscale.couplings.fields import write_solved
-
-        write_solved(path, self.bodies, self.patches, states)
+        if self.solver.on_mesh:
+            self.solver.write_fields(path, states)
+        else:
+            write_solved(path, self.bodies, self.field_parts, states)
 
     # --- for the record
 
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
-        return {}
+        return {} if self.micro is None else {"micro_model": {"name": self.micro.name}}
 
     def surface_record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the surface alone, by name."""
         return {}
 
     @property
+    def made_solver(self) -> StepSolver | None:
+        """What finds load steps, where it is made already."""
+        return self.__dict__.get("solver")
+
+    @property
     def unknowns(self) -> int | None:
         """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        return None
-
-    def meshed_bodies(self) -> list[Any]:
-        """Return the meshed bodies that load steps are solved on, the finest last."""
-        return []
+        return None if self.made_solver is None else self.made_solver.unknowns
 
     def release(self) -> None:
         """Free the bodies; load steps cannot be found any more.
@@ -554,25 +546,8 @@ class Coupling(SceneParts, ABC):
         Note:
             Collective.
         """
-        from multiscale.couplings.release import free_bodies
-
-        bodies = self.meshed_bodies()
+        bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
         self._meshes = (None, None)
-        self.__dict__.pop("bodies", None)
-        self._drop_solvers()
+        for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
+            self.__dict__.pop(name, None)
         free_bodies(bodies)
-
-    @abstractmethod
-    def _drop_solvers(self) -> None:
-        """Let go of what holds the bodies, whose matrices stay in memory until then."""
-
-
-def _without_laws(scene: Scene) -> InputError:
-    """Return the error on a coupling without laws."""
-    return InputError(
-        "has no laws",
-        key="coupling.kind",
-        value=scene.kind,
-        allowed="isolated, consistent",
-        file=scene.file,
-    )

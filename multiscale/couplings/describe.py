@@ -7,21 +7,15 @@ from collections.abc import Iterator
 from geometry.materials import Material
 from geometry.meshes.block import misalignment
 from geometry.statistics import roughness
-from multiscale.couplings.scene_parts import SceneParts
-from multiscale.inputs.block import block_section
-from multiscale.inputs.body_facts import BodyFacts
-from multiscale.inputs.spectrum import heights_per_wave
+from micro import MicroModel
+from multiscale.inputs.bodies import BodyFacts, block_section
+from multiscale.inputs.scene_parts import SceneParts
+from multiscale.inputs.surfaces import heights_per_wave
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
+from multiscale.scene.sections import MicroSection
 
-LOCKING_FROM = 0.45
-"""Poisson's ratio above which linear elements lock. Two by two patches on 8 × 8 × 6 trilinear
-cells are 1.6 % too stiff there, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells
-are 0.5, 1.1 and 1.5 % too stiff."""
-MOST_UNEQUAL = 3.0
-"""Ratio of two edges of the block that deserves a note: few mean it, and many forget a unit."""
-LEAST_CELLS_PER_PATCH = 4
-"""Linear cells along a patch below which the block is too stiff under a patch's pressure."""
+_INTERACTING = ("elliptic", "circular")
 
 
 def materials(parts: SceneParts) -> str:
@@ -79,6 +73,21 @@ def two_sides(parts: SceneParts) -> str:
         rigid = "the slopes of [surface] alone count: the other side is rigid"
         return f"{text}; the heights of both add, {rigid}"
     return f"{text}; the heights of both add, and the slopes of each count on its own body"
+
+
+def micro_model(section: MicroSection, model: MicroModel | None) -> str:
+    """Say which micro model solves contacts, and how.
+
+    Args:
+        section: What the scene says of it.
+        model: The model; None where contacts are meshed.
+    """
+    if model is None:
+        return "none: contacts are meshed, and the keys of [micro] are not used"
+    if section.model in _INTERACTING:
+        return f"{model.name}, solved by {section.solver}"
+    unused = section.solver != type(section)().solver
+    return f"{model.name}; it has no use for micro.solver" if unused else model.name
 
 
 def load(parts: SceneParts) -> str:
@@ -203,12 +212,7 @@ def mesh_warnings(parts: SceneParts) -> Iterator[str]:
     """Yield what a user should know about bodies on meshes, or under laws of samples."""
     for facts in filter(None, (parts.body, parts.counter)):
         yield from facts.notes
-        if facts.degree == 1 and facts.poisson_ratio > LOCKING_FROM:
-            yield (
-                f"linear elements lock as Poisson's ratio comes near 0.5 (here "
-                f"{facts.poisson_ratio:g}): the body is too stiff by several per cent or more; "
-                "take element = 'quadratic'"
-            )
+        yield from locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
 
 
 def proportions(parts: SceneParts) -> Iterator[str]:
@@ -217,9 +221,10 @@ def proportions(parts: SceneParts) -> Iterator[str]:
     assert shape is not None
     widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
     (least, most), high, height = sorted(widths), shape.height, ""
-    if high > MOST_UNEQUAL * least:
+    unequal = 3.0  # few mean such edges, and many forget a unit
+    if high > unequal * least:
         height = "most of the approach may be the compression of the column below the surface"
-    elif least > MOST_UNEQUAL * high:
+    elif least > unequal * high:
         height = "the fixed bottom is near, and stiffens what lies above it"
     if height:
         ratio = max(high / least, least / high)
@@ -227,25 +232,36 @@ def proportions(parts: SceneParts) -> Iterator[str]:
             f"the block is {high:g} mm high and {least:g} mm wide, a ratio of {ratio:.3g}: "
             f"{height}; block.height is the shorter side when not given"
         )
-    if most > MOST_UNEQUAL * least:
+    if most > unequal * least:
         yield (
             f"the block is {widths[0]:g} × {widths[1]:g} mm wide, a ratio of {most / least:.3g}: "
             "are these the lengths along x and y of the whole map?"
         )
 
 
-def locking(poisson_ratio: float, degree: int) -> Iterator[str]:
-    """Yield a warning where linear elements of a block lock.
+def locking(
+    poisson_ratio: float, degree: int, what: str = "block", take: str = ""
+) -> Iterator[str]:
+    """Yield a warning where linear elements lock.
+
+    Two by two patches on 8 × 8 × 6 trilinear cells are 1.6 % too stiff at a Poisson's ratio of
+    0.45, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells are 0.5, 1.1 and 1.5 %
+    too stiff.
 
     Args:
-        poisson_ratio: Poisson's ratio of the block.
+        poisson_ratio: Poisson's ratio of the body.
         degree: Degree of the displacements.
+        what: The body.
+        take: What does not lock; by default what blocks can have.
     """
-    if degree == 1 and poisson_ratio > LOCKING_FROM:
+    if degree == 1 and poisson_ratio > 0.45:
+        take = take or (
+            "block.element = 'Q2' or 'P2', or coupling.compliance = 'decomposed', whose elements "
+            "are of high order"
+        )
         yield (
             f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
-            "block is too stiff by several per cent or more; take block.element = 'Q2' or 'P2', or "
-            "coupling.compliance = 'decomposed', whose elements are of high order"
+            f"{what} is too stiff by several per cent or more; take {take}"
         )
 
 
@@ -255,7 +271,7 @@ def coarse_cells(parts: SceneParts) -> Iterator[str]:
     assert shape is not None
     counts = zip(shape.cells[:2], parts.patches.grid, strict=True)
     cells = min(cells / patches for cells, patches in counts)
-    if cells * shape.degree < LEAST_CELLS_PER_PATCH:
+    if cells * shape.degree < 4:
         yield (
             f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones "
             "make the block stiffer by several per cent under a patch's pressure; refine "

@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from multiscale.couplings.contact import AnalyticCoupling, ConcurrentCoupling
-from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.patch_laws import ConsistentCoupling, IsolatedCoupling
-from multiscale.couplings.reference import ReferenceCoupling
-from multiscale.couplings.representative import RepresentativeCoupling
-from multiscale.scene.scene import Scene
+if TYPE_CHECKING:
+    from multiscale.couplings.coupling import Coupling
+    from multiscale.scene.scene import Scene
 
-COUPLINGS: dict[str, type[Coupling]] = {
-    "analytic": AnalyticCoupling,
-    "concurrent": ConcurrentCoupling,
-    "consistent": ConsistentCoupling,
-    "isolated": IsolatedCoupling,
-    "representative": RepresentativeCoupling,
-    "reference": ReferenceCoupling,
-    "auto": ConsistentCoupling,  # until it is chosen
+COUPLINGS = {
+    "analytic": "micro_coupling.AnalyticCoupling",
+    "concurrent": "micro_coupling.ConcurrentCoupling",
+    "consistent": "patch_laws.ConsistentCoupling",
+    "isolated": "patch_laws.IsolatedCoupling",
+    "representative": "representative.RepresentativeCoupling",
+    "reference": "reference.ReferenceCoupling",
+    "auto": "patch_laws.ConsistentCoupling",  # until it is chosen
 }
-"""The class of every coupling."""
+"""Module and class of every coupling; a run loads its own."""
 
 
 def coupling_class(scene: Scene) -> type[Coupling]:
@@ -29,7 +27,9 @@ def coupling_class(scene: Scene) -> type[Coupling]:
     Args:
         scene: The scene.
     """
-    return COUPLINGS[scene.kind]
+    module, _, name = COUPLINGS[scene.kind].partition(".")
+    known: type[Coupling] = getattr(import_module(f"multiscale.couplings.{module}"), name)
+    return known
 
 
 def load_finite_elements(scene: Scene, comm: Any) -> None:

@@ -1,10 +1,16 @@
-"""Couplings of a micro model of the whole surface, with laws or without."""
+"""Couplings of a micro model of the whole surface; without laws the contact problem at every step.
+
+``analytic`` is the micro model on a half-space, ``concurrent`` the same on the scene's body: they
+differ by a term of the compliance.
+
+Theory: docs/theory.md, sections 3 and 7.
+"""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -12,46 +18,24 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, InputError, MaterialPair, Surface
-from geometry.plausibility import check_finite_slopes
+from geometry import Asperities, InputError, MaterialPair, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
-from multiscale.bodies.on_body import SLOPES, OnBody, on_body
+from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.couplings.coupling import Coupling, Facts
-from multiscale.couplings.estimate import plane_at_largest_load, prescribed_plane
+from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
+from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
+from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.couplings.work import (
-    BYTES_PER_CELL,
-    FACE_CYCLES,
-    PRODUCTS,
-    SET_UP_CYCLES,
-    SLOPES_PRODUCTS,
-    SOLUTIONS_OF_LAWS,
-    Work,
-)
-from multiscale.inputs.memory import law_requests
-from multiscale.inputs.surfaces import located
+from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
-from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
-
-Array = NDArray[np.float64]
-
-_INTERACTING = ("elliptic", "circular")
-_CHECK, _FINER = 2.0, 6.0
-"""Solutions on the run's cells that an error check is worth, and where it solves a finer grid."""
 
 
 @dataclass(kw_only=True, eq=False)
 class MicroCoupling(PressedSurface):
-    """A micro model of the whole surface, on the body of the scene.
-
-    Attributes:
-        micro: Micro model of the whole surface, on a half-space.
-    """
+    """A micro model of the whole surface, on the body of the scene."""
 
     needs_plane: ClassVar[bool] = False
     """Whether something needs the plane at the largest load before the load steps."""
@@ -59,75 +43,47 @@ class MicroCoupling(PressedSurface):
     micro: MicroModel
 
     @classmethod
-    def from_scene(
-        cls,
-        scene: Scene,
-        facts: Facts,
-        nodes: ClusterNodes,
-        *,
-        like: Coupling | None = None,
-        cells: tuple[int, int] | None = None,
-    ) -> Self:
+    def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        parts = cls._parts(scene, facts, nodes, like)
-        began, surface, history = time.perf_counter(), parts["surface"], parts["load_history"]
+        parts, scene = cls._parts(source), source.scene
+        began, surface = time.perf_counter(), parts["surface"]
         model = _stated_model(scene, surface, parts["materials"])
-        if cells is not None and isinstance(model, HalfSpaceModel):
-            model = model.resampled(cells)
-        _refuse_without_summits(scene, model)
-        plane = prescribed_plane(history, surface)
-        solves = cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel)
-        if plane is None and solves:  # laws end there, and statements say it of summits
+        if source.cells is not None and isinstance(model, HalfSpaceModel):
+            model = model.resampled(source.cells)
+        if not math.isfinite(model.first_touch):
+            raise InputError(
+                "the surface has no summit that could carry load",
+                key="micro.model",
+                value=scene.micro.model,
+                allowed="half-space",
+            )
+        solver = None
+        if cls.needs_plane or scene.on_mesh or not isinstance(model, HalfSpaceModel):
+            # laws end at this plane, and statements say it of summits
             solver = ContactSolver(model, parts["patches"], parts["mean_heights"])
-            plane = plane_at_largest_load(history, solver, surface)
+        plane = plane_at_largest_load(parts["load_history"], solver, surface)
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         return cls(micro=model, plane_at_largest_load=plane, **parts)
 
-    def __post_init__(self) -> None:
-        """Refuse finite slopes of a surface that is too steep for them."""
-        if self.finite_slopes:
-            with located(self.scene, "micro.finite_slopes"):
-                for surface in self._sloped:
-                    check_finite_slopes(surface)
-
     @property
-    def _sloped(self) -> list[Surface]:
+    def sloped_surfaces(self) -> Sequence[Surface]:
         """The rough sides of the bodies, whose slopes count."""
         if self.counter_surface is None:
             return [self.surface]
         own = replace(self.surface, heights=self.surface.heights - self.counter_surface.heights)
         return [own] if self.materials.second is None else [own, self.counter_surface]
 
-    @classmethod
-    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
-        """Yield the memory that a scene needs, with the interaction of its patches."""
-        yield from super().requests(scene)
-        yield from law_requests(scene, interact=cls.has_body)
-
     # --- the micro model and the body
 
     @property
     def finite_slopes(self) -> bool:
         """Whether finite slopes of the surface count."""
-        return self.scene.micro.finite_slopes is not False and self._on_cells
-
-    @property
-    def _on_cells(self) -> bool:
-        """Whether the micro model is the half-space on the cells of the surface."""
-        return isinstance(self.micro, HalfSpaceModel)
+        return self.scene.micro.finite_slopes is not False and self.cells is not None
 
     @property
     def cells(self) -> tuple[int, int] | None:
         """Cells of the half-space of contact problems; None where these have no cells."""
         return self.micro.surface.grid if isinstance(self.micro, HalfSpaceModel) else None
-
-    @property
-    def label(self) -> str:
-        """The coupling, and the cells or micro model that it works on."""
-        kind = self.scene.kind
-        if self.cells is None:
-            return f"{kind}, {self.micro.name}"
-        return f"{kind} on {self.cells[0]} × {self.cells[1]} cells"
 
     @cached_property
     def asperities(self) -> Asperities:
@@ -161,6 +117,10 @@ class MicroCoupling(PressedSurface):
             body = terms.term(terms.face(self.comm))
         return replace(self.micro, body=body)  # type: ignore[type-var]
 
+    def contact_solver(self, model: MicroModel) -> ContactSolver:
+        """Return what solves the contact problem of a model of the surface."""
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
+
     # --- errors
 
     def error_probe(self) -> ErrorProbe:
@@ -174,56 +134,48 @@ class MicroCoupling(PressedSurface):
             zero=self.zero_error,
         )
 
-    def checked(self, step: LoadStep) -> LoadStep | None:
-        """Return a load step with its errors measured; None where they cannot be."""
-        if not self._on_cells:
-            return None
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step of contacts on cells with its errors measured."""
         return checked(step, self.error_probe(), self.load_history, self.comm)
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
-        if not self._on_cells:
+        if self.cells is None:
             return f"{self.micro.name} contacts have no measure of it, half-space has"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
-
-    def contact_solver(self, model: MicroModel) -> ContactSolver:
-        """Return what solves the contact problem of a model of the surface."""
-        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
 
     # --- what is known before the run
 
     def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
         output, steps = self.scene.output, step_count(self.scene.loading)
-        rows = SOLUTIONS_OF_LAWS if self.has_laws else 0
-        solutions, factor = float(rows or steps), SLOPES_PRODUCTS if self.finite_slopes else 1.0
-        finer = 1.0
-        if isinstance(self.micro, HalfSpaceModel):
-            size = int(self.micro.surface.heights.size)
-            if output.check != "none":
-                # a check solves a finer grid where the error of the grid is not outweighed
-                refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
-                each, finer = (_FINER, 4.0) if refines else (_CHECK, 1.0)
-                solutions += each * (steps if output.check == "all" else 1)
-        else:
+        rows, finer = SOLUTIONS_OF_LAWS if self.has_laws else 0, 1.0
+        solutions = float(rows or steps)
+        if self.cells is None:
             size = int(self.interfering_summits.sum()) ** 2  # which interact by a matrix
-        unknowns, cycles = 0, 0.0
-        if self.has_body:
-            unknowns = sum(facts.unknowns for facts in self.meshes)
-            cycles = FACE_CYCLES * unknowns
-        if self.has_body and self.scene.on_mesh:
+        else:
+            size = math.prod(self.cells)
+            if output.check != "none":
+                # A check is worth 2 solutions on these cells, and 6 where it solves a finer grid:
+                # where the error of the grid is not outweighed.
+                refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
+                each, finer = (6.0, 4.0) if refines else (2.0, 1.0)
+                solutions += each * (steps if output.check == "all" else 1)
+        unknowns = sum(facts.unknowns for facts in self.meshes) if self.has_body else 0
+        cycles = FACE_CYCLES * unknowns
+        if self.scene.on_mesh:
             unknowns = unknowns or self.body.unknowns
             cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
         return Work(
             size=size,
             solutions=solutions,
             rows=rows,
-            products=solutions * size * PRODUCTS * factor,
+            finite_slopes=self.finite_slopes,
+            finer=finer,
             unknowns=unknowns,
             cycles=cycles,
             ranks=ranks,
-            memory=finer * BYTES_PER_CELL * size * self._on_cells,
-            of_pairs=not self._on_cells,
+            of_pairs=self.cells is None,
         )
 
     def _law_cycles(self, steps: int, rows: int) -> float:
@@ -251,14 +203,6 @@ class MicroCoupling(PressedSurface):
             return f"{len(self.summits)} summits, {within}; the others cost nothing"
         return super().contact_statement()
 
-    def model_statement(self) -> str:
-        """Say which micro model solves contacts, and how."""
-        micro, name = self.scene.micro, self.micro.name
-        if micro.model in _INTERACTING:
-            return f"{name}, solved by {micro.solver}"
-        unused = micro.solver != type(micro)().solver
-        return f"{name}; it has no use for micro.solver" if unused else name
-
     def body_statements(self) -> Iterator[tuple[str, str]]:
         """Yield what the bodies are, with topics."""
         if not self.has_body:
@@ -274,8 +218,8 @@ class MicroCoupling(PressedSurface):
 
     def error_statement(self) -> str:
         """Say how the run will know its error."""
-        if why := self.unmeasured():
-            return f"not measured: {why}"
+        if self.unmeasured():
+            return super().error_statement()
         which = "every load step" if self.scene.output.check == "all" else "the last load step"
         body = ", body" if self.has_body else "; there is no block"
         laws = " and laws" * self.has_laws
@@ -311,13 +255,9 @@ class MicroCoupling(PressedSurface):
     def shows_cells(self) -> bool:
         """Whether pressures of the surface's cells will be known."""
         without = ("auto", "none") if self.has_laws else ("none",)
-        return self._on_cells and self.scene.output.contact not in without
+        return self.cells is not None and self.scene.output.contact not in without
 
     # --- for the record
-
-    def record(self) -> dict[str, Any]:
-        """Return what the provenance of a run says of the coupling alone, by name."""
-        return {"micro_model": {"name": self.micro.name}}
 
     def surface_record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the surface alone, by name."""
@@ -330,6 +270,47 @@ class MicroCoupling(PressedSurface):
         }
 
 
+@dataclass(kw_only=True, eq=False)
+class ConcurrentCoupling(MicroCoupling):
+    """The whole surface on the scene's body at every load step, without laws."""
+
+    shows_contacts: ClassVar[bool] = True
+
+    def _make_solver(self) -> StepSolver:
+        return self.contact_solver(self.model_on_body())
+
+    @property
+    def field_parts(self) -> PatchGrid:
+        """The parts of the contact face that contacts are seen on: facets of a block's mesh."""
+        nx, ny, _ = FIELD_CELLS if self.body.shape is None else self.body.shape.cells
+        if self.body.shape is None:
+            nx, ny = map(min, self.surface.grid, (nx, ny))
+        return PatchGrid(grid=(nx, ny), lengths=self.surface.lengths)
+
+    def coupling_statement(self) -> str:
+        """Say how contacts and bodies are put together."""
+        return (
+            "concurrent: the whole surface on the block at every load step, no laws; "
+            f"{describe.times(self.patches.grid)} patches gather the results"
+        )
+
+
+@dataclass(kw_only=True, eq=False)
+class AnalyticCoupling(ConcurrentCoupling):
+    """The micro model alone on a half-space, without finite elements."""
+
+    has_body: ClassVar[bool] = False
+    shows_contacts: ClassVar[bool] = False
+    patches_interact: ClassVar[bool] = False
+
+    def coupling_statement(self) -> str:
+        """Say how contacts and bodies are put together."""
+        counted = "; displacements, and so the approach, count from the mean of the surface"
+        return "analytic: the micro model alone on a half-space, no finite elements" + (
+            counted if self.scene.surface.periodic else ""
+        )
+
+
 def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> MicroModel:
     """Return the micro model that a scene names, on a half-space."""
     micro, modulus = scene.micro, materials.contact_modulus
@@ -337,14 +318,3 @@ def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> Mi
     if isinstance(model, HalfSpaceModel):
         return replace(model, periodic=scene.surface.periodic, hardness=micro.hardness)
     return model
-
-
-def _refuse_without_summits(scene: Scene, model: MicroModel) -> None:
-    if not math.isfinite(model.first_touch):
-        raise InputError(
-            "the surface has no summit that could carry load",
-            key="micro.model",
-            value=scene.micro.model,
-            allowed="half-space",
-            file=scene.file,
-        )

@@ -10,44 +10,26 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.on_body import on_body
-from multiscale.couplings.law_coupling import LawCoupling, LawSolver, NewtonChoice
+from multiscale.bodies.bodies import on_body
+from multiscale.couplings.describe import times
+from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
-from multiscale.inputs.block import FIELD_CELLS, LAW_BLOCK_CELLS, Cells
-from multiscale.inputs.memory import law_requests
-from multiscale.law_solvers.condensed import CondensedLaws
+from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from multiscale.law_solvers.embedded import EmbeddedLaws
-from multiscale.law_solvers.free_plane import FreePlaneLaws
+from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
-from multiscale.machine import MemoryRequest
-from multiscale.readable import Detail, Observer, quantity
-from multiscale.scene.scene import Scene
+from multiscale.readable import Detail, Observer
 
-Array = NDArray[np.float64]
-
-_CELLS_TOLERANCE, _SUMMITS_TOLERANCE = 5e-4, 1e-4
-"""Interpolation error of laws by default. Finer tables would trace the steps of single cells."""
-_SUMMITS_ROWS = 400
-"""Most rows of laws by summits. On cells a row costs a solution, which is dear."""
-_MOST_CYCLES_PER_STEP = 12
-"""Multigrid cycles that a load step of the full Newton takes at most, when it starts from earlier
-steps. With fewer patches that can touch it takes about one for each (the paper's cube with 4 × 4
-patches, 4 of them loaded: 39 in 8 steps; with 2 of 64 that can touch: 36 in 40)."""
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
 and 8 × 8 patches."""
-_CYCLES_PER_ROW = 3.0
-"""Multigrid cycles of a row of consistent laws on a mesh, whose displacements it takes."""
 _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
@@ -55,21 +37,10 @@ _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 class PatchLaws(LawCoupling, MicroCoupling):
     """A coupling with a law for every patch of the surface."""
 
-    @classmethod
-    def cells_unstated(cls, scene: Scene) -> Cells:
-        """Return the cells of a block that a scene states none for: more under laws on its mesh."""
-        return LAW_BLOCK_CELLS if scene.on_mesh else FIELD_CELLS
-
-    @property
-    def table_tolerance(self) -> float:
-        """Interpolation error that laws are tabulated to."""
-        default = _CELLS_TOLERANCE if self.summits is None else _SUMMITS_TOLERANCE
-        return self.scene.coupling.table_tolerance or default
-
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
-        return MOST_ROWS if self.summits is None else _SUMMITS_ROWS
+        return MOST_ROWS if self.summits is None else 400  # on cells a row costs a solution
 
     def newton(self, table: LawTable | None = None) -> NewtonChoice:
         """Choose the Newton of the scene, or the one that is predicted to take fewer cycles.
@@ -110,8 +81,13 @@ class PatchLaws(LawCoupling, MicroCoupling):
         )
 
     def _full_cycles(self, steps: int) -> int:
-        """Return the multigrid cycles that load steps on the mesh are predicted to take."""
-        return steps * min(max(self.interfering_patches, 1), _MOST_CYCLES_PER_STEP)
+        """Return the multigrid cycles that load steps on the mesh are predicted to take.
+
+        A step that starts from earlier ones takes at most 12. With fewer patches that can touch it
+        takes about one for each (the paper's cube with 4 × 4 patches, 4 of them loaded: 39 in 8
+        steps; with 2 of 64 that can touch: 36 in 40).
+        """
+        return steps * min(max(self.interfering_patches, 1), 12)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""
@@ -119,7 +95,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
             return float(_CYCLES_PER_PATCH * self.patches.count)
         return float(self._full_cycles(steps))
 
-    def _make_solver(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws: on the mesh, or on the compliance of patches."""
         if self.newton(table).condensed:
             return CondensedLaws(table, self.bodies.patch_compliance())
@@ -133,19 +109,13 @@ class PatchLaws(LawCoupling, MicroCoupling):
         """Return the micro model on the body, which laws stand for; collective."""
         return self.model_on_body()
 
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState] | None:
+    def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         solver = self.contact_solver(self.model_behind_laws())
         solved = solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        detail = solver.detail(solver.latest)
         with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
-        return with_peak, solver.detail(solver.latest)
-
-    def contact_note(self, step: int, force: float) -> str:
-        """Return that the contact is not that of the laws."""
-        return Detail(
-            f"contact of load step {step}: the contact problem behind the laws, solved under the "
-            f"plane of the step, with a force of {quantity(force, 'N', 5)}"
-        )
+        return None if detail is None else (with_peak, detail)
 
     def notes(self, steps: Any) -> Iterator[str]:
         """Yield what a report says of the approximations behind load steps."""
@@ -159,7 +129,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
     def coupling_statement(self) -> str:
         """Say how contacts and bodies are put together."""
         patches = self.patches
-        grid = f"{patches.grid[0]} × {patches.grid[1]} patches"
+        grid = f"{times(patches.grid)} patches"
         if self.plane_at_largest_load is not None:
             laws = self.interfering_patches
             grid += f", {laws} get a law, {patches.count - laws} stay open"
@@ -176,11 +146,8 @@ class PatchLaws(LawCoupling, MicroCoupling):
 class ConsistentCoupling(PatchLaws):
     """Laws of all patches from one solution of the whole surface."""
 
-    @classmethod
-    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
-        """Yield the memory that a scene needs, with its laws, which rank 0 makes."""
-        yield from super().requests(scene)
-        yield from law_requests(scene, interact=False, made_by="root_only")
+    tolerance_by_accuracy: ClassVar[bool] = True
+    laws_made_by: ClassVar[str] = "root_only"
 
     def _prepare_laws(self) -> None:
         with self.clock.phase("block"):
@@ -204,16 +171,17 @@ class ConsistentCoupling(PatchLaws):
     def _displacements(self, dense: bool) -> Any:
         return self.bodies.patch_displacements(dense=dense, solutions=self.table_rows)
 
-    def _make_solver(self, table: LawTable) -> LawSolver:
+    def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
         free = table.path is not None and self.load_history.slopes is None
         if free and self.scene.coupling.interface == "patchwise":
             return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
-        return super()._make_solver(table)
+        return super()._solver_of(table)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         cycles = super()._law_cycles(steps, rows)
-        return cycles if self.newton().condensed else cycles + _CYCLES_PER_ROW * rows
+        # a row takes the displacements of the mesh
+        return cycles if self.newton().condensed else cycles + 3.0 * rows
 
     @property
     def _made(self) -> str:
@@ -230,12 +198,7 @@ class IsolatedCoupling(PatchLaws):
     """Laws of patches from what lies in each alone (Waddad et al. 2016)."""
 
     needs_plane: ClassVar[bool] = True
-
-    @classmethod
-    def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:
-        """Yield the memory that a scene needs, with its laws, which all ranks make."""
-        yield from super().requests(scene)
-        yield from law_requests(scene, interact=False, made_by="shared")
+    laws_made_by: ClassVar[str] = "shared"
 
     @property
     def finite_slopes(self) -> bool:

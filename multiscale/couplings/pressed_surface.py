@@ -5,34 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import InputError, PatchGrid, RigidPlane, Surface
+from geometry import PatchGrid
 from geometry.materials import MaterialPair
 from geometry.patches import patch_means
-from geometry.statistics import roughness
-from multiscale.bodies.scene_body import SceneBody
-from multiscale.couplings import describe
-from multiscale.couplings.coupling import Coupling, Facts
-from multiscale.inputs.block import make_shape
-from multiscale.inputs.body_facts import BodyFacts, second_material
+from multiscale.couplings.coupling import Coupling, Meshes, Source
+from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
-from multiscale.inputs.surfaces import make_surfaces
-from multiscale.machine import ClusterNodes
-from multiscale.readable import quantity
-from multiscale.scene.scene import Scene
-
-Array = NDArray[np.float64]
-
-CLOSURE_RESERVE = 0.15
-"""Closure that laws are made for beyond the largest approach, relative to the largest interference.
-The surface of a bent block may rise between the loads of its patches."""
-_COVERED = 1e-6
-"""Part of the surface's rectangle beside the contact face that is rounding."""
+from multiscale.inputs.memory import check_memory
+from multiscale.inputs.surfaces import located, make_surfaces
+from support.arrays import Array
 
 
 @dataclass(kw_only=True, eq=False)
@@ -40,35 +25,26 @@ class PressedSurface(Coupling):
     """A rough surface that is pressed as a whole.
 
     Attributes:
-        counter_surface: What of the surface is the counter-body's; None where that is smooth.
         mean_heights: Mean height of each patch, shape (N,) [mm].
-        plane_at_largest_load: The rigid plane at the largest load. Where the force or the moment is
-            prescribed, it is the plane in equilibrium on a half-space, or None where nothing before
-            the load steps needs it.
     """
 
-    counter_surface: Surface | None = None
     mean_heights: Array
-    plane_at_largest_load: RigidPlane | None = None
 
     @classmethod
-    def _parts(
-        cls, scene: Scene, facts: Facts, nodes: ClusterNodes, like: Coupling | None
-    ) -> dict[str, Any]:
+    def _parts(cls, source: Source) -> dict[str, Any]:
         """Return the attributes that all couplings of one surface have."""
-        began = time.perf_counter()
-        cls.check_memory(scene, nodes)
-        if isinstance(like, PressedSurface):
+        began, scene, like = time.perf_counter(), source.scene, source.like
+        check_memory(scene, source.nodes, cls.requests(scene))
+        if like is not None and like.regions is None:
             surface, counter_surface = like.surface, like.counter_surface
         else:
             surface, counter_surface = make_surfaces(scene)
         check_patches(scene, cls.patch_limits(scene, surface))
-        face, counter = facts
-        if face is None:
-            face = BodyFacts.of_block(scene, make_shape(scene, surface, cls.cells_unstated(scene)))
-        second = second_material(scene, counter)
-        materials = MaterialPair(first=face.materials[0], second=second)
-        check_load(scene, (surface,), surface.area, face if cls.has_body else None)
+        body, counter = source.facts
+        body = body or BodyFacts.of_block(scene, surface, cls.unstated_cells(scene))
+        materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
+        history = load_history_on(scene, (surface,))
+        check_load(scene, history, (surface,), surface.area, body if cls.has_body else None)
         patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
         return {
             "scene": scene,
@@ -77,82 +53,25 @@ class PressedSurface(Coupling):
             "materials": materials,
             "patches": patches,
             "mean_heights": patch_means(surface, patches),
-            "body": face,
+            "body": body,
             "counter": counter,
-            "load_history": load_history_on(scene, (surface,)),
+            "load_history": history,
             "seconds": {"surface": time.perf_counter() - began},
         }
 
-    def attach(self, comm: Any, meshes: tuple[SceneBody | None, SceneBody | None]) -> None:
+    def attach(self, comm: Any, meshes: Meshes) -> None:
         """Put the coupling on its bodies, whose contact faces must cover the surface."""
         first, counter = meshes
-        section = self.scene.body
+        section, lengths = self.scene.body, self.surface.lengths
         if first is not None and section is not None:
-            free = np.subtract(first.facts.lengths, self.surface.lengths)
+            free = np.subtract(first.facts.lengths, lengths)
             place = section.place or (0.5 * float(free[0]), 0.5 * float(free[1]))
             first, counter = first.placed(place), counter and counter.placed(place)
         super().attach(comm, (first, counter))
         for mesh, key in ((first, "body.place"), (counter, "counter_body.contact")):
             if mesh is not None:
-                self._check_covered(mesh, key)
-
-    def _check_covered(self, mesh: SceneBody, key: str) -> None:
-        from macro import LoadedFace
-
-        lengths = self.surface.lengths
-        whole = PatchGrid(grid=(1, 1), lengths=lengths)
-        try:
-            face = LoadedFace(mesh.body, mesh.facets[0], whole)
-            covered = float(face.areas[0]) / whole.area
-        except InputError:  # no facet lies in it
-            covered = 0.0
-        if covered < 1.0 - _COVERED:
-            x, y = mesh.facts.lengths
-            raise InputError(
-                f"the surface's rectangle, {lengths[0]:g} × {lengths[1]:g} mm, does not lie on the "
-                f"contact face, which covers {100.0 * covered:.3g} % of it and is {x:.6g} × "
-                f"{y:.6g} mm large",
-                key=key,
-                allowed="a rectangle on the face; or law.kind = 'representative', where the "
-                "surface is a sample and the face may have any size and outline",
-                file=self.scene.file,
-            )
-
-    @property
-    def plane(self) -> RigidPlane:
-        """The rigid plane at the largest load.
-
-        Raises:
-            ValueError: Where it is not known before the load steps.
-        """
-        if self.plane_at_largest_load is None:
-            raise ValueError("the plane under this force is not known before the load steps")
-        return self.plane_at_largest_load
-
-    def interference(self, x: Array, y: Array, z: Array) -> Array:
-        """Return how far points lie above the undeformed plane at the largest load [mm].
-
-        Args:
-            x: First coordinate of the points [mm].
-            y: Second coordinate [mm].
-            z: Height [mm].
-        """
-        return self.plane.at(x, y) - (self.surface.highest - z)
-
-    @property
-    def cell_interference(self) -> Array:
-        """Interference of the heights of the surface, shape (nx, ny) [mm]."""
-        surface = self.surface
-        return self.interference(surface.x[:, None], surface.y, surface.heights)
-
-    @cached_property
-    def largest_interference(self) -> float:
-        """Largest interference of the surface [mm], never less than the approach at the middle.
-
-        Under a tilted plane the approach at the middle may be negative while its lower side
-        touches.
-        """
-        return max(self.plane.approach, float(self.cell_interference.max()))
+                with located(self.scene, key):
+                    mesh.check_covers(lengths)
 
     @property
     def interfering_patches(self) -> int:
@@ -171,7 +90,8 @@ class PressedSurface(Coupling):
     def largest_closures(self) -> Array:
         """Largest closure that the law of each patch is made for, shape (N,) [mm].
 
-        It is the largest mean approach of the patch and `CLOSURE_RESERVE`. Laws that hold at points
+        It is the largest mean approach of the patch and 15 % of the largest interference, for the
+        surface of a bent block may rise between the loads of its patches. Laws that hold at points
         need the approach at the corners of the patch. A free plane may tilt further than on a
         half-space.
         """
@@ -181,33 +101,12 @@ class PressedSurface(Coupling):
             ends = ends + 0.5 * float(np.abs(np.multiply(self.patches.size, plane.tilt)).sum())
         if loading.tilt == "free":
             ends = ends + (ends.max() - plane.approach)
-        return ends + CLOSURE_RESERVE * self.largest_interference
+        return ends + 0.15 * self.largest_interference
 
     @property
     def _closes_at_corners(self) -> bool:
         """Whether closures at the corners of a patch may be those of its law."""
         return self.scene.coupling.interface == "pointwise"
-
-    def contact_statement(self) -> str:
-        """Say what is in contact."""
-        cells = f"{self.surface.heights.size} cells"
-        if self.plane_at_largest_load is None:
-            return cells
-        return f"{cells}, {int((self.cell_interference > 0.0).sum())} within the largest approach"
-
-    def load_statement(self) -> str:
-        """Say the load steps, and the approach under a force where it is estimated."""
-        text = describe.load(self)
-        if self.load_history.quantity == "force" and self.plane_at_largest_load is not None:
-            approach = quantity(self.plane.approach - self.zero, "mm", 3)
-            text += f"; on a half-space its approach is about {approach}"
-        return text
-
-    @property
-    def size(self) -> float:
-        """Size of the interferences [mm]."""
-        known = self.plane_at_largest_load is not None
-        return self.largest_interference if known else roughness(self.surface).sq
 
     def contact_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the contact."""

@@ -7,24 +7,22 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import Control
+from geometry import Control, PatchGrid
 from geometry.contact_state import ContactState, Spots, peaks_of
-from geometry.rigid_plane import RigidPlane
 from micro import HalfSpaceModel
 from multiscale.couplings import describe
-from multiscale.couplings.coupling import Coupling, Facts
-from multiscale.couplings.estimate import estimated_plane
+from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
+from multiscale.couplings.cost import SET_UP_CYCLES, Work
+from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.couplings.work import SET_UP_CYCLES, Work
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import Cells, block_section
 from multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
     reference_meshes,
@@ -32,20 +30,13 @@ from multiscale.inputs.reference_meshes import (
 )
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_step import LoadStep
-from multiscale.loading.stepper import step_count
-from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.loading.stepper import StepSolver, step_count
+from multiscale.machine import MemoryRequest
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.scene.scene import Scene
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, MeshQuality, UnilateralContactProblem
-
-Array = NDArray[np.float64]
-
-_CYCLES = {1: 30.0, 2: 60.0}
-"""Multigrid cycles of a load step by degree: 15 to 44, and 51 to 90."""
-_NO_AREA = 1e-9
-"""Area of a node, relative to the largest, that counts as none."""
 
 
 class RoughMesh(NamedTuple):
@@ -60,6 +51,123 @@ class RoughMesh(NamedTuple):
     quality: MeshQuality
 
 
+class ReferenceSolver(StepSolver):
+    """Presses all meshes alike; load steps are those of the finest, with the others beside it.
+
+    Args:
+        meshes: The meshes, from coarse to fine.
+        patches: What results are summed over.
+
+    Attributes:
+        meshes: The meshes.
+    """
+
+    on_mesh = True
+
+    def __init__(self, meshes: Sequence[RoughMesh], patches: PatchGrid) -> None:
+        self.meshes, self._patches = meshes, patches
+        self._last: tuple[FaceContactState, ...] = ()
+
+    @property
+    def finest(self) -> UnilateralContactProblem:
+        """The contact problem that the load steps are those of."""
+        return self.meshes[-1].problem
+
+    @property
+    def latest(self) -> FaceContactState | None:
+        """The finest block at the latest load step; None before the first."""
+        return self._last[-1] if self._last else None
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step on every mesh; see `StepSolver.press`."""
+        self._last = states = tuple(one.problem.solve(control) for one in self.meshes)
+        patches = self._patches
+        finest, nominal = states[-1], patches.area * patches.count
+        # patches count whole nodes; all together they have the area with its border in the facets
+        share = (finest.contact_area or 0.0) / finest.nodal_area if finest.nodal_area else 0.0
+        return LoadStep.of_patches(
+            patches,
+            plane=(finest.approach, *finest.tilt),
+            load=(finest.force, *finest.moment),
+            closure=finest.patch_closure,
+            pressure=finest.patch_pressure,
+            area_fraction=share * finest.patch_area / patches.area,
+            separation=finest.mean_separation,
+            contacts=finest.contacts,
+            newton_iterations=sum(state.iterations for state in states),
+            linear_iterations=sum(state.linear_iterations for state in states),
+            reason=finest.reason,
+            imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
+            peak_pressure_MPa=finest.peak_pressure,
+            meshes=tuple(
+                (state.approach, state.force, (state.contact_area or 0.0) / nominal)
+                for state in states
+            ),
+        )
+
+    def detail(self, latest: FaceContactState) -> ContactState:
+        """Return the spots and fields of a contact.
+
+        The area of a spot is that of its nodes times the area with its border in the facets over
+        that of all nodes, so that the areas of all spots add up to the load step's.
+        """
+        from macro import nodal_contact
+
+        nodes = nodal_contact(self.finest, latest)
+        touching = np.flatnonzero(nodes.region >= 0)
+        region, count = nodes.region[touching], latest.contacts
+        share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
+        top = touching[peaks_of(region, nodes.pressure[touching], count)]
+        some = nodes.area > 1e-9 * nodes.area.max()  # quadratic triangles: vertices have none
+        spots = Spots(
+            place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
+            area=share * np.bincount(region, nodes.area[touching], minlength=count),
+            force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
+            peak_pressure=nodes.pressure[top],
+        )
+        return ContactState(
+            plane=latest.plane,
+            patches=self._patches,
+            force=latest.force,
+            spots=spots,
+            x=nodes.x[some],
+            y=nodes.y[some],
+            pressure=nodes.pressure[some],
+            gap=nodes.gap[some],
+        )
+
+    def state(self) -> Any:
+        """Return the plane on every mesh."""
+        return tuple((state.approach, *state.tilt) for state in self._last)
+
+    def restore(self, state: Any) -> None:
+        """Press every mesh by its plane again."""
+        self._last = tuple(
+            one.problem.solve(Control(approach=approach, tilt=(tx, ty)))
+            for one, (approach, tx, ty) in zip(self.meshes, state, strict=False)
+        )
+
+    def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return the finest block at the latest load step."""
+        return self.latest
+
+    def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
+        """Write the fields of the finest rough block."""
+        from macro import write_rough_fields
+
+        write_rough_fields(path, self.finest, sorted(states.items()))
+
+    @property
+    def meshed_bodies(self) -> list[Any]:
+        """The rough blocks, the finest last."""
+        return [one.problem.body for one in self.meshes]
+
+    @property
+    def unknowns(self) -> int:
+        """Degrees of freedom of the finest mesh."""
+        return self.finest.body.dofs
+
+
 @dataclass(kw_only=True, eq=False)
 class ReferenceCoupling(PressedSurface):
     """The rough surface of a block, meshed ever finer and pressed alike at every load step.
@@ -71,36 +179,31 @@ class ReferenceCoupling(PressedSurface):
         rough_meshes: The meshes, from coarse to fine.
     """
 
+    meshes_roughness: ClassVar[bool] = True
+    patches_interact: ClassVar[bool] = False
+
     rough_meshes: ReferenceMeshes
-    _last: tuple[FaceContactState, ...] = field(default=(), init=False)
 
     @classmethod
-    def from_scene(
-        cls,
-        scene: Scene,
-        facts: Facts,
-        nodes: ClusterNodes,
-        *,
-        like: Coupling | None = None,
-        cells: tuple[int, int] | None = None,
-    ) -> Self:
+    def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
-        parts = cls._parts(scene, facts, nodes, like)
+        parts, scene = cls._parts(source), source.scene
         began, surface = time.perf_counter(), parts["surface"]
         model = HalfSpaceModel(
             surface,
             contact_modulus=parts["materials"].contact_modulus,
             periodic=scene.surface.periodic,
         )
-        plane = estimated_plane(parts["load_history"], model)
+        plane = plane_at_largest_load(parts["load_history"], on_few_cells(model), surface)
+        assert plane is not None
         parts["seconds"]["load estimate"] = time.perf_counter() - began
-        meshes = reference_meshes(scene, surface, plane, nodes)
+        meshes = reference_meshes(scene, surface, plane, source.nodes)
         return cls(plane_at_largest_load=plane, rough_meshes=meshes, **parts)
 
     @classmethod
-    def meshes_block(cls, scene: Scene) -> bool:
-        """Tell whether a flat block is meshed: never beside the rough ones."""
-        return False
+    def block_cells(cls, scene: Scene) -> Cells | None:
+        """Return no cells: a flat block is never meshed beside the rough ones."""
+        return None
 
     @property
     def label(self) -> str:
@@ -111,8 +214,13 @@ class ReferenceCoupling(PressedSurface):
     # --- load steps
 
     @cached_property
-    def _made(self) -> list[RoughMesh]:
+    def solver(self) -> ReferenceSolver:
         """The rough blocks, meshed when first needed; collective."""
+        with self.clock.phase("block"):
+            return self._make_solver()
+
+    def _make_solver(self) -> ReferenceSolver:
+        """Mesh the rough blocks."""
         from mpi4py import MPI
 
         from macro import Block, UnilateralContactProblem, rough_block_mesh
@@ -130,96 +238,7 @@ class ReferenceCoupling(PressedSurface):
                 patches=self.patches if finest else None,
             )
             made.append(RoughMesh(problem, quality))
-        return made
-
-    @property
-    def _problems(self) -> list[UnilateralContactProblem]:
-        return [one.problem for one in self._made]
-
-    @property
-    def finest(self) -> UnilateralContactProblem:
-        """The contact problem that the load steps are those of."""
-        return self._made[-1].problem
-
-    def prepare(self) -> None:
-        """Mesh the rough blocks, once."""
-        with self.clock.phase("block"):
-            _ = self._made
-
-    def contact_state(self) -> Any:
-        """Return the finest block at the latest load step; None before the first."""
-        return self._last[-1] if self._last else None
-
-    def press(self, control: Control) -> LoadStep:
-        """Solve one load step on every mesh; see `Coupling.press`."""
-        self._last = states = tuple(problem.solve(control) for problem in self._problems)
-        finest, nominal = states[-1], self.patches.area * self.patches.count
-        # patches count whole nodes; all together they have the area with its border in the facets
-        share = (finest.contact_area or 0.0) / finest.nodal_area if finest.nodal_area else 0.0
-        return LoadStep.of_patches(
-            self.patches,
-            plane=(finest.approach, *finest.tilt),
-            load=(finest.force, *finest.moment),
-            closure=finest.patch_closure,
-            pressure=finest.patch_pressure,
-            area_fraction=share * finest.patch_area / self.patches.area,
-            separation=finest.mean_separation,
-            contacts=finest.contacts,
-            newton_iterations=sum(state.iterations for state in states),
-            linear_iterations=sum(state.linear_iterations for state in states),
-            reason=finest.reason,
-            imbalance=(finest.force - finest.reaction) / finest.force if finest.force else 0.0,
-            peak_pressure_MPa=finest.peak_pressure,
-            meshes=tuple(
-                (state.approach, state.force, (state.contact_area or 0.0) / nominal)
-                for state in states
-            ),
-        )
-
-    def contact(self, step: LoadStep, state: Any) -> tuple[LoadStep, ContactState]:
-        """Return the spots and fields of the contact of a load step; see `Coupling.contact`.
-
-        The area of a spot is that of its nodes times the area with its border in the facets over
-        that of all nodes, so that the areas of all spots add up to the load step's.
-        """
-        from macro import nodal_contact
-
-        latest: FaceContactState = state
-
-        nodes = nodal_contact(self.finest, latest)
-        touching = np.flatnonzero(nodes.region >= 0)
-        region, count = nodes.region[touching], latest.contacts
-        share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
-        top = touching[peaks_of(region, nodes.pressure[touching], count)]
-        some = nodes.area > _NO_AREA * nodes.area.max()
-        spots = Spots(
-            place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
-            area=share * np.bincount(region, nodes.area[touching], minlength=count),
-            force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
-            peak_pressure=nodes.pressure[top],
-        )
-        contact = ContactState(
-            plane=RigidPlane(approach=latest.approach, tilt=latest.tilt),
-            patches=self.patches,
-            force=latest.force,
-            spots=spots,
-            x=nodes.x[some],
-            y=nodes.y[some],
-            pressure=nodes.pressure[some],
-            gap=nodes.gap[some],
-        )
-        return step, contact
-
-    def state(self) -> Any:
-        """Return the plane on every mesh."""
-        return tuple((state.approach, *state.tilt) for state in self._last)
-
-    def restore(self, state: Any) -> None:
-        """Press every mesh by its plane again."""
-        self._last = tuple(
-            problem.solve(Control(approach=approach, tilt=(tx, ty)))
-            for problem, (approach, tx, ty) in zip(self._problems, state, strict=False)
-        )
+        return ReferenceSolver(made, self.patches)
 
     def with_mesh_errors(
         self, steps: Sequence[LoadStep]
@@ -244,7 +263,7 @@ class ReferenceCoupling(PressedSurface):
         record = reference_record(
             steps,
             meshes.sizes,
-            [one.problem.body.dofs for one in self._made],
+            [one.problem.body.dofs for one in self.solver.meshes],
             force_order=meshes.force_order,
             area_order=meshes.area_order,
         )
@@ -265,8 +284,8 @@ class ReferenceCoupling(PressedSurface):
                 "point: the mesh is too coarse for contact there, and the force zero; refine "
                 f"{self.rough_meshes.key}"
             )
-        thinnest = min(one.quality.thinnest for one in self._made)
-        steepest = max(one.quality.steepest for one in self._made)
+        thinnest = min(one.quality.thinnest for one in self.solver.meshes)
+        steepest = max(one.quality.steepest for one in self.solver.meshes)
         yield (
             f"the roughness leaves the cells at least {thinnest:.2g} of their volume; the steepest "
             f"edge of the top has a slope of {steepest:.2g}"
@@ -282,36 +301,12 @@ class ReferenceCoupling(PressedSurface):
         several = len(self.rough_meshes.shapes) > 1
         return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
-    # --- fields and record
-
-    def field_state(self, step: LoadStep) -> Any:
-        """Return the finest block at the latest load step."""
-        return self.contact_state()
-
-    def write_fields(
-        self, path: Path, states: Mapping[int, Any], steps: Sequence[LoadStep]
-    ) -> None:
-        """Write the fields of the finest rough block."""
-        from macro import write_rough_fields
-
-        write_rough_fields(path, self.finest, sorted(states.items()))
-
-    @property
-    def unknowns(self) -> int | None:
-        """Degrees of freedom of the finest mesh, once it is made."""
-        return self.finest.body.dofs if "_made" in self.__dict__ else None
-
-    def meshed_bodies(self) -> list[Any]:
-        """Return the rough blocks, the finest last."""
-        return [one.problem.body for one in self._made] if "_made" in self.__dict__ else []
-
-    def _drop_solvers(self) -> None:
-        self.__dict__.pop("_made", None)
-        self._last = ()
-
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
-        qualities = [one.quality for one in self._made] if "_made" in self.__dict__ else []
+        made = self.made_solver
+        qualities = (
+            [one.quality for one in made.meshes] if isinstance(made, ReferenceSolver) else []
+        )
         return {"method": self.scene.reference.method, "mesh_quality": qualities}
 
     # --- what is known before the run
@@ -325,19 +320,16 @@ class ReferenceCoupling(PressedSurface):
         """Count what a run computes; see `Coupling.work`."""
         unknowns = sum(self.rough_meshes.unknowns)
         steps = step_count(self.scene.loading)
-        cycles = SET_UP_CYCLES + steps * _CYCLES[self.rough_meshes.degree]
+        # 15 to 44 cycles a step with linear elements, 51 to 90 with quadratic ones
+        cycles = SET_UP_CYCLES + steps * 30.0 * self.rough_meshes.degree
         return Work(unknowns=unknowns, cycles=unknowns * cycles, ranks=ranks)
-
-    def model_statement(self) -> str:
-        """Say that there is no micro model."""
-        return "none: contacts are meshed, and the keys of [micro] are not used"
 
     def coupling_statement(self) -> str:
         """Say how the rough surface is pressed."""
-        x, y = self.patches.grid
         return (
             "reference: the rough surface itself, meshed and pressed by "
-            f"{self.scene.reference.method}; {x} × {y} patches gather the results"
+            f"{self.scene.reference.method}; {describe.times(self.patches.grid)} patches gather "
+            "the results"
         )
 
     def body_statements(self) -> Iterator[tuple[str, str]]:
@@ -347,17 +339,11 @@ class ReferenceCoupling(PressedSurface):
 
     def error_statement(self) -> str:
         """Say how the run will know its error."""
-        why = self.unmeasured()
         told = "the meshes of the reference tell it, at every load step"
-        return f"not measured: {why}" if why else told
+        return super().error_statement() if self.unmeasured() else told
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""
         yield from describe.proportions(self)
         yield from self.rough_meshes.warnings()
         yield from describe.locking(self.materials.first.poisson_ratio, self.rough_meshes.degree)
-
-    @property
-    def shows_cells(self) -> bool:
-        """Whether pressures of cells will be known: those of nodes are."""
-        return False

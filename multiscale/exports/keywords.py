@@ -30,8 +30,7 @@ from multiscale.exports.sampling import (
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 
-_CALCULIX_ROWS = 200
-_HEAT, _PER_W_PER_M2K = "thermal_conductance_W_per_m2K", 1e-3
+_HEAT = "thermal_conductance_W_per_m2K"
 _HEAT_UNITS = "Conductance of the contacts [N/(mm s K) = mW/(mm2 K)] over pressure [MPa]:"
 _BY_HAND = """
 CalculiX does not know the pressure of such a law in its heat conduction, and would take the first
@@ -70,7 +69,7 @@ class Program(NamedTuple):
 
 
 ABAQUS = Program(_ABAQUS, None, "", "")
-CALCULIX = Program(_CALCULIX, _CALCULIX_ROWS - 1, _BY_HAND, "** ")
+CALCULIX = Program(_CALCULIX, 199, _BY_HAND, "** ")  # it stores one more, for the tangent
 
 
 def keyword_text(
@@ -130,7 +129,7 @@ def _heat(program: Program, law: PatchLaw, sample: LawSample, conducts: Conducts
         return
     yield from _comments(f"{_HEAT_UNITS}{program.heat}")
     yield f"{program.mark}*GAP CONDUCTANCE, PRESSURE"
-    heat = np.maximum(_PER_W_PER_M2K * known, 0.0).tolist()
+    heat = np.maximum(1e-3 * known, 0.0).tolist()
     for row in zip(heat, sample.pressure.tolist(), strict=True):
         yield program.mark + "{:.12e}, {:.12e}".format(*row)
 

@@ -23,14 +23,6 @@ Conducts = Callable[[Array], dict[str, Array]]
 LEAST_PRESSURE = 0.01
 """Pressures below this part of the law's largest count as that much in relative errors."""
 
-_CANDIDATES = 128  # per interval between two rows of the law
-_FIRST_CANDIDATES = 1024  # in the first, where the pressure grows as the power 3/2
-_CHECKS = 3  # between two candidates, where the error is measured
-_SHARE = 0.98  # of the tolerance, for what errors exceed those at the candidates by
-_RELAXATION = 1.1  # of the tolerance at least, until the rows are few enough
-_LEAST_RISE = 1e-9  # of a pressure from row to row, relative to the largest
-_LONGEST = 40  # characters of a region's name; keyword programs take 80 with what stands before
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
@@ -62,7 +54,7 @@ def places(table: LawTable) -> list[Place]:
     if isinstance(table.patches, Regions):
         names = table.patches.names
         labels = [re.sub(r"\W+", "_", plain(name).replace("?", " ")).strip("_") for name in names]
-        short = [label[:_LONGEST].lower() for label in labels]
+        short = [label[:40].lower() for label in labels]
         if not all(short) or len(set(short)) < len(short):
             short = [str(index) for index in range(len(names))]
         return [
@@ -160,10 +152,10 @@ def sample_law(
         raise no_function(subject)
     approach, closure, pressure = _candidates(rising)
     scale = np.maximum(pressure, LEAST_PRESSURE * pressure[-1])
-    scale *= _SHARE
+    scale *= 0.98  # errors exceed those at the candidates by the rest
     chosen = _chords(closure, pressure, tolerance * scale)
     while most is not None and len(chosen) > most:
-        tolerance *= max(_RELAXATION, (len(chosen) / most) ** 2)  # rows go as its root
+        tolerance *= max(1.1, (len(chosen) / most) ** 2)  # rows go as its root
         chosen = _chords(closure, pressure, tolerance * scale)
     rows = approach[chosen], closure[chosen], _strictly_rising(pressure[chosen])
     return LawSample(
@@ -178,8 +170,9 @@ def sample_law(
 def _candidates(law: PatchLaw) -> tuple[Array, Array, Array]:
     """Return approaches, closures and pressures on the law, closures strictly ascending."""
     knots = law.rows.approach[: law.rising_rows]
-    first = np.linspace(0.0, 1.0, _FIRST_CANDIDATES, endpoint=False) ** 2
-    steps = np.linspace(0.0, 1.0, _CANDIDATES, endpoint=False)
+    # most where the pressure grows as the power 3/2
+    first = np.linspace(0.0, 1.0, 1024, endpoint=False) ** 2
+    steps = np.linspace(0.0, 1.0, 128, endpoint=False)
     within = knots[1:-1, None] + np.diff(knots[1:])[:, None] * steps
     begun = knots[0] + (knots[1] - knots[0]) * first
     approach = np.concatenate((begun, within.ravel(), knots[-1:]))
@@ -212,7 +205,7 @@ def _chords(x: Array, y: Array, allowed: Array) -> NDArray[np.intp]:
 
 def _strictly_rising(pressure: Array) -> Array:
     """Return pressures that rise from row to row; the same ones where they do."""
-    least = _LEAST_RISE * pressure[-1]
+    least = 1e-9 * pressure[-1]
     if np.all(np.diff(pressure) >= least):
         return pressure
     ramp = least * np.arange(len(pressure))
@@ -221,7 +214,7 @@ def _strictly_rising(pressure: Array) -> Array:
 
 def _error(law: PatchLaw, candidates: Array, closure: Array, pressure: Array) -> float:
     """Return the largest error of straight lines through rows, between the candidates too."""
-    steps = np.linspace(0.0, 1.0, _CHECKS + 1, endpoint=False)
+    steps = np.linspace(0.0, 1.0, 4, endpoint=False)
     checks = (candidates[:-1, None] + np.diff(candidates)[:, None] * steps).ravel()
     exact = law.pressure(checks)
     scale = np.maximum(exact, LEAST_PRESSURE * pressure[-1])

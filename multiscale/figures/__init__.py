@@ -1,1 +1,21 @@
-"""Draws what results hold, in one style."""
+"""Draws what results hold, in one style; matplotlib is loaded when something is drawn."""
+
+from importlib import import_module
+from typing import Any
+
+from support.packages import optional_packages
+
+
+def by_matplotlib(function: str, *arguments: Any) -> Any:
+    """Return what a function makes that needs matplotlib, such as a figure.
+
+    Args:
+        function: Module and name of the function, within `multiscale`.
+        *arguments: What the function takes.
+
+    Raises:
+        NotInstalled: When matplotlib is missing, or cannot be imported.
+    """
+    module, _, name = function.rpartition(".")
+    with optional_packages():
+        return getattr(import_module(f"multiscale.{module}"), name)(*arguments)

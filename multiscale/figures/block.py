@@ -20,14 +20,6 @@ from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure
 
 Array = NDArray[np.float64]
 
-_TURN, _ELEVATION = np.radians(24.0), np.radians(32.0)
-_MOST_CELLS = 256
-"""Cells a side that are drawn; of more, the mean height and the largest pressure are shown."""
-_DEPTH, _LAYERS = 0.35, 40
-"""Depth of the cut over the shorter side, and its layers, narrow near the surface."""
-_RELIEF = 0.12
-"""Height of the drawn relief over the shorter side, which the heights are exaggerated to."""
-
 
 @styled()
 def block_figure(
@@ -46,7 +38,7 @@ def block_figure(
     view = BlockView(surface, pressure, poisson_ratio)
     figure = new_figure(FULL_WIDTH, 4.65)
     figure.set_layout_engine("none")  # axes are placed by hand
-    axes = figure.add_axes((0.01, 0.0, 0.83, 0.93))
+    axes = figure.add_axes((0.04, 0.0, 0.81, 0.93))
     view.draw(axes)
     for at, scale, colours, label in (
         (0.56, view.pressures, PRESSURES, "contact pressure [MPa]"),
@@ -86,7 +78,7 @@ class BlockView:
 
     def __init__(self, surface: Surface, pressure: Array, poisson_ratio: float) -> None:
         lengths = 1e3 * np.asarray(surface.lengths)
-        steps = [-(-count // _MOST_CELLS) for count in surface.grid]
+        steps = [-(-count // 256) for count in surface.grid]
         height = blocks_of(surface.heights - surface.mean_height, steps).mean(axis=(1, 3))
         largest = blocks_of(pressure, steps).max(axis=(1, 3))
         loads = blocks_of(pressure, steps).mean(axis=(1, 3))
@@ -101,9 +93,9 @@ class BlockView:
             length * (np.arange(n + 1) / n) for length, n in zip(lengths, height.shape, strict=True)
         )
         side = float(min(lengths))
-        self.exaggeration = _nice(_RELIEF * side / (1e3 * float(np.ptp(height)) or 1.0))
-        self.depth = _DEPTH * side
-        layers = np.linspace(0.0, 1.0, _LAYERS + 1)
+        self.exaggeration = _nice(0.12 * side / (1e3 * float(np.ptp(height)) or 1.0))
+        self.depth = 0.35 * side
+        layers = np.linspace(0.0, 1.0, 41)  # narrow near the surface
         self.layers = self.depth * layers**2
         spacing = surface.lengths[0] / height.shape[0], surface.lengths[1] / height.shape[1]
         below = stresses_below(loads, spacing, poisson_ratio, 1e-3 * self.layers, row)
@@ -118,9 +110,10 @@ class BlockView:
     def seen(self, x: Any, y: Any, z: Any) -> tuple[Array, Array]:
         """Return where points appear on the page, without perspective."""
         x, y, z = (np.asarray(part, float) for part in (x, y, z))
-        across = -x * np.sin(_TURN) + y * np.cos(_TURN)
-        along = x * np.cos(_TURN) + y * np.sin(_TURN)
-        return along, z * np.cos(_ELEVATION) + across * np.sin(_ELEVATION)
+        turn, elevation = np.radians((24.0, 32.0))
+        across = -x * np.sin(turn) + y * np.cos(turn)
+        along = x * np.cos(turn) + y * np.sin(turn)
+        return along, z * np.cos(elevation) + across * np.sin(elevation)
 
     def draw(self, axes: Any) -> None:
         """Draw the cut block into empty axes, which lose their own."""

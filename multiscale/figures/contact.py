@@ -15,23 +15,15 @@ from geometry.surface import Surface
 from multiscale.figures.maps import coarsened, colour_bar, draw_face, draw_pressures, map_axes
 from multiscale.figures.style import (
     BLUE,
-    FULL_WIDTH,
     GAPS,
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
-    new_figure,
+    panels,
     styled,
 )
 from multiscale.figures.surface import draw_surface
 from multiscale.readable import quantity, usual_unit
-
-_SHOWN = 0.99
-"""Part of the pressures within the colour scale; few cells carry the largest ones."""
-_PER_DECADE = 8
-"""Bars of the histogram per factor of ten in the area."""
-_MOST_OUTLINED = 500
-"""Spots that have outlines; those of more would hide their colours."""
 
 
 def load_text(step: Any) -> str:
@@ -54,14 +46,17 @@ def contact_figure(record: Any) -> Figure:
         record: A `multiscale.results.contact_record.ContactRecord`.
     """
     fields = record.pressure_MPa is not None
-    figure = new_figure(FULL_WIDTH, 5.4 if fields else 2.9)
-    panels = figure.subplots(2 if fields else 1, 2).ravel()
-    draw_contact(panels[0], record)
-    if fields:
-        _draw_gaps(panels[1], record)
-        _draw_shares(panels[3], record)
-    _draw_sizes(panels[2 if fields else 1], record)
-    figure.suptitle(record_text(record))
+    if not fields:
+        figure, (spots, sizes) = panels(1, 2, 2.9, bars=[0], title=record_text(record))
+        draw_contact(spots, record)
+    else:
+        figure, (pressures, gaps, sizes, shares) = panels(
+            2, 2, 5.4, bars=[0, 1], title=record_text(record)
+        )
+        draw_contact(pressures, record)
+        _draw_gaps(gaps, record)
+        _draw_shares(shares, record)
+    _draw_sizes(sizes, record)
     return figure
 
 
@@ -77,7 +72,8 @@ def draw_contact(axes: Any, record: Any) -> None:
         return
     unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
     shown = np.ma.masked_less_equal(pressure, 0.0)
-    top = float(np.quantile(shown.compressed(), _SHOWN)) if shown.count() else 1.0
+    # few cells carry the largest pressures
+    top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
     image = _draw_field(axes, record, shown, PRESSURES, Normalize(0.0, top), largest=True)
     colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
     peak = quantity(float(np.max(record.pressure_MPa)), "MPa", 3)
@@ -123,7 +119,7 @@ def _draw_field(
 def _draw_spots(axes: Any, record: Any) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
-    many = len(diameter) > _MOST_OUTLINED
+    many = len(diameter) > 500  # whose outlines would hide their colours
     spots = EllipseCollection(
         diameter, diameter, np.zeros(len(diameter)), units="xy", offsets=unit * record.place_mm,
         offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
@@ -144,7 +140,7 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     if not exponent.size:
         return
     low, high = np.floor(exponent.min()), np.floor(exponent.max()) + 1.0
-    bins = np.logspace(low, high, int(_PER_DECADE * (high - low)) + 1)
+    bins = np.logspace(low, high, int(8 * (high - low)) + 1)
     axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.minorticks_off()
@@ -176,8 +172,7 @@ def pressure_figure(history: Any) -> Figure:
     Args:
         history: A `multiscale.results.history.History`.
     """
-    figure = new_figure(ONE_COLUMN, 2.9)
-    axes = figure.add_subplot()
+    figure, (axes,) = panels(1, 1, 2.9, width=ONE_COLUMN, bars=[0])
     last = history.steps[-1]
     draw_pressures(axes, history.patches, last.patches.pressure_MPa)
     bar = f" ({history.reference.label})" if history.reference else ""
@@ -197,8 +192,7 @@ def overview_figure(
         history: A `multiscale.results.history.History`.
         face: Pressures on a face with laws of samples, see `face_figure`; None without.
     """
-    figure = new_figure(FULL_WIDTH, 2.8)
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = panels(1, 2, 2.8, bars=[0, 1])
     draw_surface(left, surface, None)
     left.set_title("surface" + " of a sample" * is_sample)
     record, last = history.contact, history.steps[-1]
@@ -223,8 +217,7 @@ def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
         step: The load step.
     """
-    figure = new_figure(FULL_WIDTH, 4.2)
-    axes = figure.add_subplot()
+    figure, (axes,) = panels(1, 1, 4.2, bars=[0])
     draw_face(axes, points)
     mean = quantity(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")

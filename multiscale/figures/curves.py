@@ -13,20 +13,13 @@ from multiscale.figures.maps import map_axes, place_colours
 from multiscale.figures.style import (
     BLUE,
     COLOURS,
-    FULL_WIDTH,
     NO_CONTACT,
     PALETTE,
     add_legend,
-    new_figure,
+    panels,
     show_unit,
     styled,
 )
-
-MOST_MARKED = 500
-"""Load steps that have a symbol each; more of them are drawn as lines alone."""
-
-MOST_MARKED_LAWS = 36
-"""Laws whose rows are marked; the dots of more would hide the curves."""
 
 
 @styled()
@@ -37,11 +30,10 @@ def history_figure(history: Any, kind: str) -> Figure:
         history: A `multiscale.results.history.History`.
         kind: Its coupling, which has a colour of its own, or another label.
     """
-    figure = new_figure(FULL_WIDTH, 2.4)
-    force, area, gap = figure.subplots(1, 3)
+    figure, (force, area, gap) = panels(1, 3, 2.4)
     colour = COLOURS.get(kind, BLUE)
     look: dict[str, Any] = {"color": colour, "label": kind}
-    if len(history) <= MOST_MARKED:
+    if len(history) <= 500:
         look |= {"marker": "o", "ms": 3.0}
     pressure = np.append(0.0, history.mean_pressure_MPa)
     # The first touch of a tilted plane is not at that of the middle.
@@ -100,12 +92,14 @@ def law_figure(table: Any) -> Figure:
         table: A `multiscale.laws.law_table.LawTable` of patches, which gets a key of their colours,
             or of regions, which get their names.
     """
-    figure = new_figure(FULL_WIDTH, 2.7)
     on_grid = isinstance(table.patches, PatchGrid) and table.patches.count > 1
-    pressure, area, *key = figure.subplots(1, 2 + on_grid)
     colours, names = _law_colours(table)
     closing = [index for index, law in enumerate(table.laws) if not law.is_open]
-    few = len(closing) <= MOST_MARKED_LAWS
+    few = len(closing) <= 36  # the dots of more would hide the curves
+    what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
+    rows = "; dots are their rows" if few else ""
+    title = f"laws of {len(closing)} of {table.patches.count} {what}{rows}"
+    figure, (pressure, area, *key) = panels(1, 2 + on_grid, 2.7, title=title)
     for index in closing:
         law, look = table.laws[index], {"color": colours[index], "lw": 1.2 if few else 0.6}
         closure = np.linspace(law.range[0], law.range[1], 200)
@@ -124,9 +118,6 @@ def law_figure(table: Any) -> Figure:
         _draw_places(key[0], table, colours)
     elif len(closing) > 1:
         pressure.legend()
-    what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
-    rows = "; dots are their rows" if few else ""
-    figure.suptitle(f"laws of {len(closing)} of {table.patches.count} {what}{rows}")
     return figure
 
 

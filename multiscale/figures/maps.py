@@ -15,15 +15,6 @@ from multiscale.readable import number, usual_unit
 
 Array = NDArray[np.float64]
 
-MOST_NUMBERED_PATCHES = 36
-"""A map of more patches shows colours alone; the numbers would cover each other."""
-
-MOST_CELLS = 420
-"""Cells a side of a map that is drawn; of more, blocks of cells are shown."""
-
-MOST_POINTS = 40_000
-"""Points of a face that are drawn at most."""
-
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
     """Return the number of units in a mm and the unit of x and y on maps, µm below 1 mm.
@@ -64,7 +55,9 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     Returns:
         The colour bar.
     """
-    beside = axes.inset_axes((1.04, 0.0, 0.05, 1.0))
+    inches = axes.get_position().width * axes.figure.get_figwidth()
+    wide = 0.05 * min(1.0, 2.2 / inches)
+    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     bar.set_label(label)
@@ -113,9 +106,10 @@ def draw_pressures(
     axes.set_facecolor(NO_CONTACT)
     borders = scale * patches.borders_x, scale * patches.borders_y
     image = axes.pcolormesh(*borders, shown.T, cmap=PRESSURES, norm=norm)
-    image.set_rasterized(patches.count > MOST_NUMBERED_PATCHES)
+    few = patches.count <= 36  # the numbers of more would cover each other
+    image.set_rasterized(not few)
     draw_patch_borders(axes, patches)
-    if patches.count <= MOST_NUMBERED_PATCHES:
+    if few:
         for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
             colour = "white" if value > 0.6 * norm.vmax else "black"
             axes.text(x, y, _number(value), ha="center", va="center", color=colour, fontsize=7)
@@ -140,7 +134,7 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
         axes: Axes to draw into.
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
     """
-    x, y, pressure = points[:: -(-len(points) // MOST_POINTS)].T
+    x, y, pressure = points[:: -(-len(points) // 40_000)].T
     lengths = float(np.ptp(x)), float(np.ptp(y))
     scale = map_axes(axes, lengths)
     axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
@@ -172,7 +166,7 @@ def place_colours(shares: Array) -> Array:
     return found
 
 
-def coarsened(values: Any, *, largest: bool, most: int = MOST_CELLS) -> Any:
+def coarsened(values: Any, *, largest: bool, most: int = 420) -> Any:
     """Return a field on few enough cells to draw; what lies beyond whole blocks is left out.
 
     Args:

@@ -17,12 +17,11 @@ from geometry.surface import Surface
 from multiscale.figures.maps import coarsened, colour_bar, draw_patch_borders, map_axes
 from multiscale.figures.style import (
     BLUE,
-    FULL_WIDTH,
     GREY,
     HEIGHTS,
     INK,
     VERMILLION,
-    new_figure,
+    panels,
     styled,
 )
 from multiscale.readable import quantity, usual_unit
@@ -31,12 +30,6 @@ Array = NDArray[np.float64]
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""
-
-MOST_PATCHES = 1024
-"""Patches whose borders are drawn; more would hide the heights."""
-
-_LEAST_POWER = 1e-8
-"""Spectral densities below this share of the largest are rounding, or none, and not drawn."""
 
 
 @styled()
@@ -54,8 +47,7 @@ def surface_figure(
         patches: The partition of the interface.
         target: The spectrum that the surface was synthesised from; None for another surface.
     """
-    figure = new_figure(FULL_WIDTH, 5.4)
-    (map_, heights), (spectrum, bearing) = figure.subplots(2, 2)
+    figure, (map_, heights, spectrum, bearing) = panels(2, 2, 5.4, bars=[0], below=0.6)
     draw_surface(map_, surface, asperities, patches)
     draw_heights(heights, surface)
     draw_spectrum(spectrum, surface, target)
@@ -80,7 +72,7 @@ def draw_surface(
     extent = (0.0, scale * surface.lengths[0], 0.0, scale * surface.lengths[1])
     image = axes.imshow(heights.T, origin="lower", extent=extent, cmap=HEIGHTS)
     colour_bar(image, axes, f"height over the mean plane [{unit}]")
-    if patches is not None and 1 < patches.count <= MOST_PATCHES:
+    if patches is not None and 1 < patches.count <= 1024:
         draw_patch_borders(axes, patches, colour="white")
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if asperities is not None:
@@ -103,7 +95,10 @@ def _draw_summits(axes: Any, asperities: Asperities, scale: float) -> str:
             place = scale * x[chosen], scale * y[chosen]
             axes.plot(*place, ls="none", label=label, clip_on=False, **look)
     if highest.size or edge.size:
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncol=2, handletextpad=0.2)
+        axes.legend(
+            loc="upper center", bbox_to_anchor=(0.5, 0.0), borderaxespad=3.8, ncol=2,
+            handletextpad=0.2,
+        )  # fmt: skip
     if len(highest) < len(asperities):
         return f"the {len(highest)} highest of {len(asperities):,} summits".replace(",", " ")
     return f"{len(asperities)} summits"
@@ -119,7 +114,8 @@ def draw_heights(axes: Any, surface: Surface) -> None:
     unit, centred = _centred(surface)
     heights, rough = centred.ravel(), roughness(surface)
     sq, bins = float(np.std(heights)), min(80, max(10, int(heights.size**0.4)))
-    axes.hist(heights, bins, density=True, color=BLUE, alpha=0.55, label="heights")
+    shares, edges = np.histogram(heights, bins, density=True)
+    axes.stairs(shares, edges, fill=True, color=BLUE, alpha=0.55, label="heights")
     if sq > 0.0:
         h = np.linspace(float(heights.min()), float(heights.max()), 200)
         normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)
@@ -141,7 +137,7 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
         target: The spectrum that the surface was synthesised from; None draws none.
     """
     found = power_spectrum(surface)
-    kept = found.density > _LEAST_POWER * found.density.max()
+    kept = found.density > 1e-8 * found.density.max()  # the rest is rounding
     few = dict(marker="o", ms=2.5) if kept.sum() <= 40 else {}
     axes.loglog(found.wavenumber[kept], found.density[kept], color=BLUE, label="surface", **few)
     if target is not None:

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
+from typing import Any
 
 import numpy as np
 
 from geometry import InputError, Surface
 from geometry.zero import Zero
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene
 
-_ROUNDING = 16.0 * float(np.finfo(float).eps)
-"""Approach over the largest height below which it does not change where the plane is."""
+Problem = tuple[str, Any, str, str]
+"""A key, its value, why it makes no sense, and what is allowed."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
 
@@ -41,7 +43,6 @@ def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
                 key="patches.grid",
                 value=list(grid),
                 allowed=f"at most {list(limit)}",
-                file=scene.file,
             )
 
 
@@ -68,13 +69,16 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
             key="load.approach",
             value=list(loading.approach),
             allowed=f"> {-depth:.6g} mm",
-            file=scene.file,
         )
     return replace(loading, approach=points, depth=depth)
 
 
 def check_load(
-    scene: Scene, surfaces: Sequence[Surface], area: float, body: BodyFacts | None
+    scene: Scene,
+    load_history: LoadHistory,
+    surfaces: Sequence[Surface],
+    area: float,
+    body: BodyFacts | None,
 ) -> None:
     """Refuse loads lost in the rounding of heights, or that press the body to nothing.
 
@@ -82,76 +86,71 @@ def check_load(
 
     Args:
         scene: The scene.
+        load_history: Its loads, counted from first touch.
         surfaces: Its surface, or samples of it.
         area: Area of the contact face [mm²].
         body: What is known of its body; None of a half-space.
     """
-    loading, fields = scene.loading, scene.output.fields
-    count = loading.count
-    if isinstance(fields, list) and loading.force_change is None and max(fields) > count:
-        raise InputError(
-            "there are fewer load steps",
-            key="output.fields",
-            value=fields,
-            allowed=f"numbers up to {count}",
-            file=scene.file,
-        )
-    resolved = _ROUNDING * max(float(np.abs(one.heights).max()) for one in surfaces)
-    approaches = load_history_on(scene, surfaces).points
-    if loading.approach is not None and 0.0 < max(approaches) < resolved:
-        raise InputError(
-            "is lost in the rounding of the heights",
-            key="load.approach",
-            value=list(loading.approach),
-            allowed=f"at least {resolved:.3g} mm, for heights of this size",
-            file=scene.file,
-        )
-    _check_hardness(scene, area)
-    _check_gap(scene, surfaces[0], approaches)
-    if body is None:
-        return
-    if loading.force is not None:
-        key, points = "load.force", loading.force
-        most, named, unit = body.materials[0].young_modulus * area, "E times area", "N"
-    else:
-        key, points = "load.approach", approaches
-        most, named, unit = body.depth, "the body's height", "mm"
-    if max(points) > most:
-        raise InputError(
-            "presses the body to nothing",
-            key=key,
-            value=list(points),
-            allowed=f"at most {named}, {most:.6g} {unit}",
-            file=scene.file,
-        )
+    problems = chain(
+        _without_steps(scene),
+        _lost(scene, load_history, surfaces),
+        _beyond_hardness(scene, area),
+        _without_gap(scene, surfaces[0], load_history),
+        () if body is None else _beyond_body(load_history, area, body),
+    )
+    for key, value, problem, allowed in problems:
+        raise InputError(problem, key=key, value=value, allowed=allowed)
 
 
-def _check_hardness(scene: Scene, area: float) -> None:
-    """Refuse forces whose mean pressure the hardness does not bear anywhere."""
+def _without_steps(scene: Scene) -> Iterator[Problem]:
+    fields, count = scene.output.fields, scene.loading.count
+    if isinstance(fields, list) and scene.loading.force_change is None and max(fields) > count:
+        yield "output.fields", fields, "there are fewer load steps", f"numbers up to {count}"
+
+
+def _lost(
+    scene: Scene, load_history: LoadHistory, surfaces: Sequence[Surface]
+) -> Iterator[Problem]:
+    eps, stated = float(np.finfo(float).eps), scene.loading.approach
+    resolved = 16.0 * eps * max(float(np.abs(one.heights).max()) for one in surfaces)
+    if stated is not None and 0.0 < load_history.largest < resolved:
+        allowed = f"at least {resolved:.3g} mm, for heights of this size"
+        yield "load.approach", list(stated), "is lost in the rounding of the heights", allowed
+
+
+def _beyond_hardness(scene: Scene, area: float) -> Iterator[Problem]:
+    """Yield forces whose mean pressure the hardness does not bear anywhere."""
     force, hardness = scene.loading.force, scene.micro.hardness
     if force is None or hardness is None or hardness > (mean := max(force) / area):
         return
-    raise InputError(
+    problem = (
         "leaves no equilibrium: even where all of the face touches, the force of "
-        f"{max(force):.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa",
-        key="micro.hardness",
-        value=f"{hardness:.6g} MPa",
-        allowed=f"> {mean:.6g} MPa, or a smaller load.force",
-        file=scene.file,
+        f"{max(force):.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
     )
+    allowed = f"> {mean:.6g} MPa, or a smaller load.force"
+    yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
 
 
-def _check_gap(scene: Scene, surface: Surface, approaches: Sequence[float]) -> None:
-    """Refuse approaches from first touch that leave a periodic surface no gap, unless it yields."""
+def _without_gap(scene: Scene, surface: Surface, load_history: LoadHistory) -> Iterator[Problem]:
+    """Yield approaches that leave a periodic surface no gap, unless it yields."""
     points, most = scene.loading.approach, surface.highest - surface.mean_height
     if points is None or not scene.surface.periodic or scene.law.representative:
         return
-    if scene.micro.hardness is None and (deepest := max(approaches)) >= most:
-        raise InputError(
-            "leaves no gap on the periodic surface, whose mean displacement counts as none",
-            key="load.approach",
-            value=list(points),
-            allowed=f"less than {most - deepest + max(points):.6g} mm, where the plane reaches the "
-            "mean height; beyond it load.force",
-            file=scene.file,
+    if scene.micro.hardness is None and (deepest := load_history.largest) >= most:
+        problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
+        allowed = (
+            f"less than {most - deepest + max(points):.6g} mm, where the plane reaches the mean "
+            "height; beyond it load.force"
         )
+        yield "load.approach", list(points), problem, allowed
+
+
+def _beyond_body(load_history: LoadHistory, area: float, body: BodyFacts) -> Iterator[Problem]:
+    key, most = "load.approach", f"the body's height, {body.depth:.6g} mm"
+    largest = body.depth
+    if load_history.quantity == "force":
+        key, largest = "load.force", body.materials[0].young_modulus * area
+        most = f"E times area, {largest:.6g} N"
+    if load_history.largest > largest:
+        points = list(load_history.points)
+        yield key, points, "presses the body to nothing", f"at most {most}"

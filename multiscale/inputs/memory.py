@@ -4,35 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Any
 
 from geometry import InputError
 from geometry.files.content import BYTES_PER_HEIGHT
-from multiscale.inputs.block import Cells, block_section
+from multiscale.inputs.bodies import Cells, block_section
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.scene.scene import Scene
-
-BYTES_PER_CELL = 5000
-"""Memory that mesh, stiffness and multigrid take per cell, roughly, over all ranks [B]."""
-BYTES_PER_SENT_HEIGHT = 17
-"""Memory of a height and its spline on every rank, once the surface is made [B]."""
-BYTES_PER_PAIR = 40
-"""Memory of dense matrices per pair of patches: compliance, tangent and factors [B]."""
-BYTES_PER_LAW, BYTES_PER_NEW_LAW = 3_600, 11_400
-"""Memory of a law with 65 rows of 7 numbers on every rank, and of what it takes besides where it
-is made, while rows are inserted [B]."""
-BYTES_PER_STATE, BYTES_PER_STEP = 24, 1000
-"""Memory of a patch's results and of the other results of a load step [B]."""
-
-BYTES_PER_BODY_UNKNOWN = {"P1": 2400, "P2": 1600, "Q1": 4200, "Q2": 2800}
-"""Memory of a body on a mesh per unknown, over all ranks: mesh, stiffness, multigrid and solve [B].
-Brake pads took 2350 (2.5·10⁵ unknowns) with P1, 1320 to 1560 (2·10⁵ to 10⁶) with P2, 4000 (1.9·10⁵)
-with Q1; an L took 2690 (1.3·10⁵) with Q2."""
-BYTES_READ_PER_UNKNOWN = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}
-"""Memory that rank 0 takes besides, per unknown, while gmsh reads the mesh of a body [B]."""
-_BYTES_PER_EARLIER_STATE, _MOST_STATES, _WORK_VECTORS = 8, 32, 100
-"""Memory per unknown of an earlier state for initial guesses, the largest number of them, and the
-vectors of Newton's method [B]. Two load steps took 107."""
 
 
 class MemoryLacking(InputError):
@@ -58,7 +37,6 @@ def check_memory(scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryReq
                 key=request.key,
                 value=list(value) if isinstance(value, tuple) else value,
                 allowed=f"what fits into {nodes.remedy(request)}{'; or ' * bool(other)}{other}",
-                file=scene.file,
             )
 
 
@@ -75,82 +53,73 @@ def shortage_warnings(requests: Iterable[MemoryRequest], nodes: ClusterNodes) ->
             yield f"{key}{request.sentence}; there is {nodes.remedy(request)}"
 
 
-def surface_requests(scene: Scene) -> Iterator[MemoryRequest]:
-    """Yield the memory that the surface of a scene needs.
+def scene_requests(
+    scene: Scene, cells: Cells | None, *, interact: bool, made_by: str = ""
+) -> Iterator[MemoryRequest]:
+    """Yield the memory that a scene needs, key by key, as far as its file tells.
 
     Auto values are left out: none is chosen that would not fit.
 
     Args:
         scene: The scene.
+        cells: Cells of the block, where it is meshed.
+        interact: Whether all patches interact in the compliance of the bodies.
+        made_by: Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without.
     """
     grids = {"surface.grid": scene.surface.grid, "surface.resample": scene.surface.resample}
     for key, heights in grids.items():
         if isinstance(heights, tuple):
-            sent = math.prod(heights) * BYTES_PER_SENT_HEIGHT
+            sent = math.prod(heights) * 17  # a height and its spline, once the surface is made
             made = math.prod(heights) * BYTES_PER_HEIGHT - sent
             yield MemoryRequest(key=key, value=heights, per_rank=sent, root_only=made)
+    if cells is not None:
+        yield from _block_requests(scene, cells)
+    if isinstance(scene.patches.grid, tuple):
+        yield from _patch_requests(scene, scene.patches.grid, interact, made_by)
 
 
-def block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
-    """Yield the memory that the mesh of a block needs.
-
-    Args:
-        scene: The scene.
-        cells: Cells of the block.
-    """
+def _block_requests(scene: Scene, cells: Cells) -> Iterator[MemoryRequest]:
+    """Yield the memory that the mesh of a block needs."""
     nx, ny, nz = cells
-    size = nx * ny * nz * BYTES_PER_CELL
-    yield MemoryRequest(key="block.cells", value=cells, shared=size)
+    each = 5000  # mesh, stiffness and multigrid of a cell, roughly
+    yield MemoryRequest(key="block.cells", value=cells, shared=nx * ny * nz * each)
     if block_section(scene).margin:
         margin = block_section(scene).margin_cells
-        size = (nx + 2 * margin) * (ny + 2 * margin) * nz * BYTES_PER_CELL
+        size = (nx + 2 * margin) * (ny + 2 * margin) * nz * each
         yield MemoryRequest(key="block.margin_cells", value=margin, shared=size)
 
 
-def patch_requests(scene: Scene) -> Iterator[MemoryRequest]:
-    """Yield the memory that the patches of a scene and their history need.
-
-    Args:
-        scene: The scene.
-    """
-    patches, loading = scene.patches.grid, scene.loading
-    if not isinstance(patches, tuple):
-        return
-    count = math.prod(patches)
-    size = count * BYTES_PER_HEIGHT
-    yield MemoryRequest(key="patches.grid", value=patches, per_rank=size)
-    purpose = f"the history of {count} patches"
-    size = loading.count * (count * BYTES_PER_STATE + BYTES_PER_STEP)
-    yield MemoryRequest(key="load.steps", value=loading.steps, purpose=purpose, per_rank=size)
-
-
-def law_requests(
-    scene: Scene, *, interact: bool = True, made_by: str = ""
+def _patch_requests(
+    scene: Scene, patches: tuple[int, int], interact: bool, made_by: str
 ) -> Iterator[MemoryRequest]:
-    """Yield the memory that the laws of patches and their interaction need.
+    """Yield the memory that patches need: their history, their interaction, and their laws.
 
-    Args:
-        scene: The scene.
-        interact: Whether all patches interact in the compliance of the bodies.
-        made_by: Which ranks make laws, ``"shared"`` or ``"root_only"``; empty without any.
+    A law has 65 rows of 7 numbers on every rank; where it is made it takes more besides, while rows
+    are inserted.
     """
-    patches = scene.patches.grid
-    if not isinstance(patches, tuple):
-        return
-    count = math.prod(patches)
+    count, loading = math.prod(patches), scene.loading
+    asked = partial(MemoryRequest, key="patches.grid", value=patches)
+    yield asked(per_rank=count * BYTES_PER_HEIGHT)
+    purpose = f"the history of {count} patches"
+    size = loading.count * (24 * count + 1000)
+    yield MemoryRequest(key="load.steps", value=loading.steps, purpose=purpose, per_rank=size)
     if interact:
-        purpose, size = "the interaction of all patches with each other", count**2 * BYTES_PER_PAIR
-        yield MemoryRequest(key="patches.grid", value=patches, purpose=purpose, per_rank=size)
+        purpose = "the interaction of all patches with each other"
+        yield asked(purpose=purpose, per_rank=40 * count**2)  # matrices, factors
     if made_by:
-        purpose, size = "a law for every patch", count * BYTES_PER_LAW
-        sizes: dict[str, Any] = {"per_rank": size, made_by: count * BYTES_PER_NEW_LAW}
-        yield MemoryRequest(key="patches.grid", value=patches, purpose=purpose, **sizes)
+        sizes: dict[str, Any] = {made_by: 11_400 * count}
+        yield asked(purpose="a law for every patch", per_rank=3_600 * count, **sizes)
 
 
 def body_request(
     key: str, element: str, unknowns: int, steps: int, *, in_parts: bool = False
 ) -> MemoryRequest:
-    """Return the memory that a body on a mesh takes.
+    """Return the memory that a body on a mesh takes: mesh, stiffness, multigrid and solve.
+
+    Brake pads took 2350 B an unknown over all ranks (2.5·10⁵ unknowns) with P1, 1320 to 1560
+    (2·10⁵ to 10⁶) with P2, 4000 (1.9·10⁵) with Q1; an L took 2690 (1.3·10⁵) with Q2. Beside it rank
+    0 holds the file while gmsh reads it. Up to 32 earlier states start load steps, and the vectors
+    of Newton's method took 107 B an unknown in two steps.
 
     Args:
         key: Its section of the scene.
@@ -159,12 +128,12 @@ def body_request(
         steps: Load steps.
         in_parts: Its file is read by all ranks in parts, as ``.xdmf`` is, and not by rank 0 whole.
     """
-    states = min(steps, _MOST_STATES) * _BYTES_PER_EARLIER_STATE
-    each = BYTES_PER_BODY_UNKNOWN[element] + states + _WORK_VECTORS
+    each = {"P1": 2400, "P2": 1600, "Q1": 4200, "Q2": 2800}[element] + 8 * min(steps, 32) + 100
+    read = {"P1": 800, "P2": 120, "Q1": 500, "Q2": 80}[element]
     return MemoryRequest(
         key=f"{key}.mesh",
         value=None,
         purpose=f"the mesh of [{key}], its stiffness and multigrid,",
         shared=float(unknowns) * each,
-        root_only=0.0 if in_parts else float(unknowns) * BYTES_READ_PER_UNKNOWN[element],
+        root_only=0.0 if in_parts else float(unknowns) * read,
     )

@@ -2,44 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
 from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import block_section, block_unknowns
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import listed
 from multiscale.scene.scene import Scene
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""
-_BYTES_IN_GMSH = {1: 1900, 2: 250}
-"""Memory of rank 0 per unknown while gmsh makes tetrahedra, by the element's degree. It is 1 kB for
-each cell [B]."""
-LEAST_ACROSS = {1: 12.0, 2: 3.0}
-"""Edges across a typical contact below which the force is wrong by several per cent, by the
-element's degree."""
-_NODES = {1: 1.1, 2: 8.4}
-"""Nodes of unstructured tetrahedra per cube of their edge, by the element's degree."""
-_RESERVE = 0.1
-"""Depth beyond the largest approach, relative to it, that tetrahedra are small for where the
-approach is not prescribed: the block yields more than a half-space."""
-_ORDERS = {1: (2.0, 1.0), 2: (3.0, 1.0)}
-"""Known orders of force and contact area in the mesh size, by the element's degree."""
-_MOST_LATTICE = 400
-"""Points along a side, at most, of the lattice that tetrahedra are counted on."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,12 +58,12 @@ class ReferenceMeshes:
     @property
     def force_order(self) -> float:
         """Known order of the force in the mesh size."""
-        return _ORDERS[self.degree][0]
+        return self.degree + 1.0
 
     @property
     def area_order(self) -> float:
         """Known order of the contact area in the mesh size."""
-        return _ORDERS[self.degree][1]
+        return 1.0
 
     @property
     def bytes(self) -> float:
@@ -91,7 +73,9 @@ class ReferenceMeshes:
     @property
     def gathered(self) -> float:
         """Memory of rank 0 while it makes the largest mesh, roughly; 0 for hexahedra [B]."""
-        return 0.0 if self.hexahedral else float(max(self.unknowns)) * _BYTES_IN_GMSH[self.degree]
+        # while gmsh makes tetrahedra, 1 kB for each cell
+        each = {1: 1900, 2: 250}[self.degree]
+        return 0.0 if self.hexahedral else float(max(self.unknowns)) * each
 
     @property
     def statement(self) -> str:
@@ -119,7 +103,7 @@ class ReferenceMeshes:
                 "one mesh: the discretisation error stays unknown, and the results have no error "
                 "bar; reference.meshes = 2 gives one"
             )
-        if self.across < LEAST_ACROSS[self.degree]:
+        if self.across < {1: 12.0, 2: 3.0}[self.degree]:
             yield (
                 f"{self.across:.2g} edges across a typical contact at the largest load: the "
                 f"force is wrong by several per cent; refine {self.key}"
@@ -154,7 +138,7 @@ def reference_meshes(
     hexahedral, fine = reference.hexahedral, reference.fine
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
     prescribed = scene.loading.force is None and scene.loading.tilt != "free"
-    largest = approach if prescribed else (1.0 + _RESERVE) * approach
+    largest = approach if prescribed else 1.1 * approach  # blocks yield more than half-spaces
     with located(scene, _key(hexahedral)):
         if fine is not None and not hexahedral:
             # the nodes of the top face where contact can occur alone
@@ -223,7 +207,6 @@ def _check_block(scene: Scene) -> None:
             key="block.margin",
             value=block.margin,
             allowed="0",
-            file=scene.file,
         )
     if scene.reference.hexahedral and not block.element.startswith("Q"):
         raise InputError(
@@ -231,7 +214,6 @@ def _check_block(scene: Scene) -> None:
             key="block.element",
             value=block.element,
             allowed="Q1, Q2, or reference.mesh = 'tetrahedra'",
-            file=scene.file,
         )
 
 
@@ -242,15 +224,14 @@ def mesh_unknowns(shape: Shape) -> int:
         shape: What is meshed.
     """
     if isinstance(shape, BlockShape):
-        return 3 * math.prod(shape.degree * (len(ticks) - 1) + 1 for ticks in shape.ticks)
-    return round(3.0 * _NODES[shape.degree] * _cubes(shape))
+        return block_unknowns(shape)
+    nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
+    return round(3.0 * nodes * _cubes(shape))
 
 
 def _cubes(shape: RefinedShape) -> float:
     """Return the number of cubes as large as the edges at their place that fill a block."""
-    counts = [
-        int(np.clip(np.ceil(length / shape.fine), 8, _MOST_LATTICE)) for length in shape.interface
-    ]
+    counts = [int(np.clip(np.ceil(length / shape.fine), 8, 400)) for length in shape.interface]
     spacing = np.divide(shape.interface, counts)
     away = np.ones(counts, dtype=bool)
     near = np.minimum((shape.places / spacing).astype(int), np.array(counts) - 1)

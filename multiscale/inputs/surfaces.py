@@ -15,6 +15,7 @@ from geometry import (
     InputError,
     Material,
     MaterialPair,
+    Spectrum,
     Surface,
     facing,
     laid_on,
@@ -54,8 +55,8 @@ def make_surfaces(scene: Scene) -> tuple[Surface, Surface | None]:
     own = sample_surface(scene, scene.surface, "surface")
     if scene.counter_surface is None:
         return own, None
-    counter = laid_counter_surface(scene, scene.counter_surface, own)
     with located(scene, "counter_surface"):
+        counter = laid_counter_surface(scene, scene.counter_surface, own)
         return facing(own, counter), counter
 
 
@@ -86,9 +87,7 @@ def laid_counter_surface(scene: Scene, section: CounterSurfaceSection, own: Surf
             return laid
         problem = "leaves no counter-surface that continues periodically over these sides"
         allowed = "multiples of 90 deg, of 180 deg on sides that differ"
-    raise InputError(
-        problem, key=f"counter_surface.{key}", value=value, allowed=allowed, file=scene.file
-    )
+    raise InputError(problem, key=f"counter_surface.{key}", value=value, allowed=allowed)
 
 
 def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
@@ -126,8 +125,8 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
 
 
 @contextmanager
-def located(scene: Scene, key: str) -> Iterator[None]:
-    """Give errors of the input that occur within the scene's file and a key.
+def located(scene: Scene, key: str | None = None) -> Iterator[None]:
+    """Give errors of the input that occur within the scene's file and, without one, a key.
 
     Args:
         scene: The scene.
@@ -177,8 +176,8 @@ def region_samples(
     for (name, section, key), material in zip(parts, materials, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
         if above is not None:
-            laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
             with located(scene, "counter_surface"):
+                laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
                 surfaces = [facing(*pair) for pair in zip(surfaces, laid, strict=True)]
         samples = tuple(one if one.periodic else mirrored(one) for one in surfaces)
         pair = MaterialPair(first=material, second=second)
@@ -198,3 +197,28 @@ def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSect
         return [section]
     spectra = [replace(section.spectrum, seed=seed) for seed in seeds]
     return [replace(section, spectrum=spectrum) for spectrum in spectra]
+
+
+def heights_per_wave(
+    spectrum: Spectrum, grid: tuple[int, int], lengths: tuple[float, float]
+) -> float:
+    """Return the heights along the shortest wavelength of a spectrum.
+
+    Args:
+        spectrum: The spectrum.
+        grid: Heights in x and y.
+        lengths: Sides of the surface [mm].
+    """
+    return min(n / most for n, most in zip(grid, most_waves(spectrum, lengths), strict=True))
+
+
+def most_waves(spectrum: Spectrum, lengths: tuple[float, float]) -> list[float]:
+    """Return the largest number of waves along each side.
+
+    Args:
+        spectrum: The spectrum.
+        lengths: Sides of the surface [mm].
+    """
+    if spectrum.waves is not None:  # counted along x
+        return [spectrum.waves[1], spectrum.waves[1] * lengths[1] / lengths[0]]
+    return [band[1] for band in (spectrum.waves_x, spectrum.waves_y) if band]

@@ -1,4 +1,4 @@
-"""Patch laws on the compliance of a block's patches, without its mesh, by Newton's method.
+"""Patch laws without the mesh of a body: on the compliance of its patches, or along their rows.
 
 Theory: docs/theory.md, section 11.
 """
@@ -10,28 +10,22 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from geometry import Control, NotConverged, PatchGrid
+from geometry import Control, NotConverged, PatchGrid, RigidPlane
 from geometry.plane_equilibrium import UNSUPPORTED
 from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
-from multiscale.law_solvers.law_range import ROUNDING, beyond_law
+from multiscale.law_solvers.law_solver import ROUNDING, LawSolver
 from multiscale.law_solvers.loaded_patches import TOLERANCE, DenseState, LoadedPatches
+from multiscale.laws.consistent import Displacements
+from multiscale.laws.interpolation import LawPoint
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
-
-Array = NDArray[np.float64]
-
-_MOST_STEPS = 100
-_MOST_HALVINGS = 40
-_MEMORY = 4  # residuals that a step is compared with: at kinks of the laws it may rise for a while
-_DECREASE = 1e-4  # share of the predicted decrease that a step must bring
-_PAST_TOUCH = 0.02  # of the largest approach: distance beyond touch when a plane gains a support
+from support.arrays import Array
 
 
-class CondensedLaws:
+class CondensedLaws(LawSolver):
     """Patch laws on the compliance of the block's patches; a load step is a small dense system.
 
     The block is linear, so that its compliance says all that patchwise laws need to know of it.
@@ -42,21 +36,14 @@ class CondensedLaws:
             (N, N) [mm/MPa].
     """
 
-    past: Any = None
-    face: Any = None
-
     def __init__(self, table: LawTable, compliance: Array) -> None:
-        self.table, self._laws = table, PatchLaws(table.laws)
-        self._compliance = compliance
+        super().__init__(table)
+        self._laws, self._compliance = PatchLaws(table.laws), compliance
         self._last: DenseState | None = None
         self._control = Control(approach=0.0)
 
-    def field_state(self, step: LoadStep) -> Any:
-        """Return what fields of the load step just accepted are made from: the pressures."""
-        return step.patches.pressure_MPa
-
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Solver.press`."""
+        """Solve one load step; see `StepSolver.press`."""
         patches, end = self.table.grid, self._laws.end
         state = equilibrium(self._laws, self._compliance, patches, control, self._last)
         worst = int(np.argmax(state.local - end * (1.0 + ROUNDING)))
@@ -65,7 +52,7 @@ class CondensedLaws:
                 f"patch {patches.unravel(worst)} at a local approach of {state.local[worst]:.6g} "
                 f"mm (allowed: up to {end[worst]:.6g} mm)"
             )
-            raise beyond_law(control, problem, self.table)
+            raise self.beyond_law(control, problem)
         self._last, self._control = state, control
         return LoadStep.of_patches(
             patches,
@@ -95,6 +82,90 @@ class CondensedLaws:
     def restore(self, state: Any) -> None:
         """Start from an equilibrium."""
         self._last = state
+
+
+class FreePlaneLaws(LawSolver):
+    """Consistent laws under a plane without moment.
+
+    The moment of the contacts decides how such a plane turns. Mean pressures of few large patches
+    do not tell that moment, and a single law knows nothing of it. Therefore the plane turns as it
+    did in the rows of the laws, where the macro model that the laws were made for is in equilibrium
+    with their pressures.
+
+    Every load step is found without those before it.
+
+    Args:
+        table: The laws, with the path of the plane.
+        displacements: Mean displacements of the patches by their pressures in the macro model.
+            Collective.
+
+    Raises:
+        ValueError: When the laws have no path.
+    """
+
+    def __init__(self, table: LawTable, displacements: Displacements) -> None:
+        if table.path is None:
+            raise ValueError("the laws were made under a plane of given tilt")
+        super().__init__(table)
+        self._path, self._laws = table.path, PatchLaws(table.laws)
+        self._displacements = displacements
+        self._approach: float | None = None
+
+    def press(self, control: Control) -> LoadStep:
+        """Find the equilibrium of one load step; see `StepSolver.press`.
+
+        Raises:
+            NotConverged: Also when the laws were made for another macro model.
+        """
+        path, patches = self._path, self.table.grid
+        approach, evaluations = control.approach, 0
+        if approach is None:
+            approach, evaluations = path.approach_under(control.force or 0.0, self._force)
+        end = float(path.approach[-1])
+        if approach > end + ROUNDING * abs(end):
+            problem = f"the plane at an approach of {approach:.6g} mm (allowed: up to {end:.6g} mm)"
+            raise self.beyond_law(control, problem)
+        tx, ty, *moment = map(float, path.at(approach))
+        point = self._along(approach)
+        xc, yc = map(float, patches.middle)
+        local = RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)).means(patches)
+        closure = local - self._displacements(point.pressure[None])[0]
+        residual = np.abs(np.where(point.pressure > 0.0, closure - point.closure, 0.0)).max()
+        residual /= float(np.abs(local).max()) or 1.0
+        if residual > 0.05:  # between rows of laws of this macro model it is hundredths of that
+            raise NotConverged(
+                f"the patches at {control}",
+                reason="OTHER_BODY",
+                iterations=0,
+                remedy=f"their closures miss {residual:.1%} of the approach: make the laws for "
+                "this block and mesh",
+            )
+        self._approach = approach
+        return LoadStep.of_patches(
+            patches,
+            plane=(approach, tx, ty),
+            load=(self._force(approach), *moment),
+            closure=closure,
+            pressure=point.pressure,
+            area_fraction=point.contact_area_fraction,
+            separation=point.separation,
+            contacts=point.contacts,
+            stiffness=point.stiffness,
+            newton_iterations=evaluations,
+        )
+
+    def stiffness(self) -> Stiffness:
+        """Return dF/dδ at the latest load step, from the laws alone."""
+        if self._approach is None:
+            return Stiffness(None, 0)
+        rates = self._along(self._approach).dpressure
+        return Stiffness(self.table.grid.area * float(rates.sum()), 0)
+
+    def _force(self, approach: float) -> float:
+        return self.table.grid.area * float(self._along(approach).pressure.sum())
+
+    def _along(self, approach: float) -> LawPoint:
+        return self._laws.along(np.full(self.table.grid.count, approach))
 
 
 def equilibrium(
@@ -140,8 +211,8 @@ def equilibrium(
 
 def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
     now = problem.at(local, plane)
-    recent: deque[float] = deque(maxlen=_MEMORY)
-    for iterations in range(_MOST_STEPS):
+    recent: deque[float] = deque(maxlen=4)  # at kinks of the laws a residual may rise for a while
+    for iterations in range(100):
         problem.force_scale = max(problem.force_scale, float(now.load[0]))
         if problem.relative_residual(now) <= TOLERANCE:
             return replace(now, iterations=iterations)
@@ -152,7 +223,7 @@ def _iterated(problem: LoadedPatches, local: Array, plane: Array) -> DenseState:
         else:
             recent.clear()
             now = problem.at(now.local + step, now.plane + motion)
-    raise problem.failure("DIVERGED_MAX_IT", _MOST_STEPS)
+    raise problem.failure("DIVERGED_MAX_IT", 100)
 
 
 def _newton_step(problem: LoadedPatches, now: DenseState) -> tuple[Array, Array, bool]:
@@ -186,7 +257,7 @@ def _to_next_touch(problem: LoadedPatches, now: DenseState, motion: Array) -> tu
     if not coming.any():
         raise plane_failure(problem.control, "NO_SUPPORT")
     largest = max(float(np.abs(problem.levers.matrix @ now.plane).max()), float(gap[coming].max()))
-    way = np.maximum(gap[coming], 0.0) + _PAST_TOUCH * largest
+    way = np.maximum(gap[coming], 0.0) + 0.02 * largest  # beyond touch, for a support
     share = float(np.min(way / rise[coming]))
     return share * rise, share * motion
 
@@ -205,9 +276,9 @@ def _line_search(
     step and the one along the laws is taken where its residual is below the reference.
     """
     before = problem.norm(now)
-    for share in 0.5 ** np.arange(_MOST_HALVINGS):
+    for share in 0.5 ** np.arange(40):
         part, plane = share * step, now.plane + share * motion
-        trial, enough = problem.at(now.local + part, plane), 1.0 - _DECREASE * share
+        trial, enough = problem.at(now.local + part, plane), 1.0 - 1e-4 * share
         if problem.norm(trial) <= enough * before:
             return trial
         trial = min(trial, problem.along_laws(now, part, plane), key=problem.norm)

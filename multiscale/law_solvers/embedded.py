@@ -5,24 +5,25 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Control, InputError, NotConverged, PatchGrid
-from micro.model import Stiffness
-from multiscale.law_solvers.law_range import beyond_law
+from multiscale.bodies.bodies import write_displaced
+from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
+from multiscale.loading.stepper import BeyondLaws
+from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
 
-Array = NDArray[np.float64]
 
-
-class EmbeddedLaws:
+class EmbeddedLaws(LawSolver):
     """Patch laws on the flat interface of an elastic block (Waddad et al. 2016, section 3.2).
 
     Args:
@@ -31,17 +32,23 @@ class EmbeddedLaws:
         face: The patches on its contact face.
 
     Attributes:
-        table: The laws.
         face: The patches on its contact face.
     """
 
-    past: Any = None
+    on_mesh = True
 
     def __init__(
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
-        self._problem, self.table, self.face = problem, table, face
+        super().__init__(table)
+        self._problem, self.face = problem, face
         self._last: FaceContactState | None = None
+
+    @property
+    def _known(self) -> FaceContactState:
+        if self._last is None:
+            raise ValueError("no load step has been accepted yet")
+        return self._last
 
     @property
     def displacement(self) -> Array:
@@ -50,16 +57,12 @@ class EmbeddedLaws:
         Raises:
             ValueError: Before the first load step.
         """
-        if self._last is None:
-            raise ValueError("no load step has been accepted yet")
-        return self._last.displacement
+        return self._known.displacement
 
     @property
     def point_pressures(self) -> Array:
         """Pressures at this rank's quadrature points of the face at the latest load step [MPa]."""
-        if self._last is None:
-            raise ValueError("no load step has been accepted yet")
-        pressure, face = self._last.sample_pressure, self.face
+        pressure, face = self._known.sample_pressure, self.face
         if not hasattr(face, "on_both"):
             return pressure
         whole = np.zeros(len(face.on_both))
@@ -67,39 +70,54 @@ class EmbeddedLaws:
         return whole
 
     def face_pressures(self) -> Array:
-        """Return places on the face and the pressures there at the latest load step.
-
-        Returns:
-            Columns x, y [mm] and p [MPa] of the quadrature points of all ranks, shape (n, 3).
-
-        Note:
-            Collective.
-        """
+        """Return the places and pressures of quadrature points; see `StepSolver`."""
         first: Any = getattr(self.face, "first", self.face)
         first = first.quadrature
         own = np.column_stack([first.x, first.y, self.point_pressures])
         return np.concatenate(self.face.comm.allgather(own))
 
-    def field_state(self, step: LoadStep) -> Any:
-        """Return what fields of the load step just accepted are made from: the displacements."""
-        return self.displacement
+    def field_state(self, step: LoadStep, parts: PatchGrid) -> Any:
+        """Return this rank's displacements, and the pressures of patches or at its points."""
+        of_patches = isinstance(self.table.patches, PatchGrid)
+        shown = step.patches.pressure_MPa if of_patches else self.point_pressures
+        return self.displacement, shown
+
+    def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
+        """Write the fields of the body; where laws hold at points it alone has the pressures."""
+        of_patches = isinstance(self.table.patches, PatchGrid)
+
+        def pressures(number: int, counter: bool) -> Any:
+            shown = states[number][1]
+            if of_patches:
+                return shown
+            return None if counter else shown
+
+        moved = {number: state[0] for number, state in states.items()}
+        write_displaced(path, self.face, moved, pressures)
+
+    @property
+    def meshed_bodies(self) -> list[Any]:
+        """The body, and the counter-body where that is a mesh."""
+        body: Any = self.face.body
+        return [body.body, body.counter] if hasattr(body, "counter") else [body]
+
+    @property
+    def unknowns(self) -> int:
+        """Degrees of freedom of the body, or of both."""
+        return self.face.body.dofs
 
     def press(self, control: Control) -> LoadStep:
-        """Solve one load step; see `Solver.press`."""
+        """Solve one load step; see `StepSolver.press`."""
         try:
             state = self._problem.solve(control)
         except NotConverged as error:
             if not any(law.is_flat for law in self.table.laws):
                 raise
             problem = "a flat patch, whose pressure is a function of closure nowhere"
-            raise beyond_law(control, problem, self.table) from error
+            raise self.beyond_law(control, problem) from error
         step = self._step(control, state)
         self._last = state
         return step
-
-    def stiffness(self) -> Stiffness:
-        """Return nothing: the stiffness on the mesh is not solved for."""
-        return Stiffness(None, 0)
 
     def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
@@ -113,8 +131,7 @@ class EmbeddedLaws:
         """
         if state is not None:
             approach, tilt, pressure = state
-            if isinstance(self.table.patches, PatchGrid) or not hasattr(self.face.body, "counter"):
-                self._problem.start_from(pressure)
+            self._problem.start_from(pressure)
             self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
@@ -130,7 +147,7 @@ class EmbeddedLaws:
             stiffness = means("stiffness")
         except InputError as error:
             falls = not all(law.is_function for law in laws)
-            raise beyond_law(control, str(error), self.table, falls=falls) from error
+            raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,
             plane=(state.approach, *state.tilt),
@@ -167,3 +184,36 @@ class EmbeddedLaws:
             "areas": areas,
             "peak_pressure_MPa": float(peaks.max()),
         }
+
+
+class ExtendedLaws(EmbeddedLaws):
+    """Laws of samples at the points of a face; they are extended where a load step needs it.
+
+    Args:
+        problem_of: Returns the body with laws on its contact face.
+        table: The laws.
+        face: The contact face.
+        longer: Returns laws that go further than these; None where that cannot be.
+    """
+
+    def __init__(
+        self,
+        problem_of: Callable[[LawTable], LawContactProblem],
+        table: LawTable,
+        face: LoadedFace | FacePair,
+        longer: Callable[[LawTable], LawTable | None],
+    ) -> None:
+        super().__init__(problem_of(table), table, face)
+        self._problem_of, self._longer = problem_of, longer
+
+    def press(self, control: Control) -> LoadStep:
+        """Solve one load step, with longer laws where these end too early."""
+        while True:
+            try:
+                return super().press(control)
+            except BeyondLaws:
+                if (longer := self._longer(self.table)) is None:
+                    raise
+                last = self.state()
+                self.table, self._problem = longer, self._problem_of(longer)
+                self.restore(last)

@@ -8,25 +8,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from geometry import Control, InputError, NotConverged, PatchGrid
 from geometry.rigid_plane import PlaneLevers
 from multiscale.laws.interpolation import LawPoint, Tangent
 from multiscale.laws.patch_law import PatchLaws
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 TOLERANCE = 1e-12
 """Residual of a solution: of the closures relative to the largest approach, of the force and the
 moments relative to the largest force and that force times half the interface's diagonal. Near first
 touch rounding changes closures by more than that, and the residual is relative to its effect."""
 
-_FARTHEST = 1e3  # halves of the diagonal up to which a first contact is looked for
-_ROUNDING = 8.0 * float(np.finfo(float).eps)  # of approaches and of the closures at first touch
-_GUESS = 1e-9  # accuracy of an initial guess relative to the bracket it is found in
-_MOST_STEPS_ALONG_LAWS = 40  # Newton steps or bisections to a point on all laws
 _LEAST_SLOPE = 1e-3  # of a patch's own approach over the local one; laws below count as falling
 
 
@@ -110,7 +104,7 @@ class LoadedPatches:
         target = now.point.closure + own * now.point.pressure + slope * step
         low, high = now.local, now.local + 2.0 * np.maximum(slope, 1.0) * step
         local = now.local + step
-        for _ in range(_MOST_STEPS_ALONG_LAWS):
+        for _ in range(40):  # Newton steps or bisections
             point = self.laws.along(local)
             ahead = (target - point.closure - own * point.pressure) * direction
             low, high = np.where(ahead > 0.0, local, low), np.where(ahead > 0.0, high, local)
@@ -149,7 +143,7 @@ class LoadedPatches:
         if plain <= TOLERANCE:
             return plain
         # rounding of approaches, and its effect on closures and on the force
-        rounding = _ROUNDING * max(self._largest_touch(), approach)
+        rounding = 8.0 * float(np.finfo(float).eps) * max(self._largest_touch(), approach)
         of_closures = self.tangent(state).norm * rounding
         of_force = self.area * float(state.point.dpressure.sum()) * rounding
         return max(
@@ -195,11 +189,11 @@ class LoadedPatches:
         below, above = -self.levers.half, 1e-6 * self.levers.half
         while excess(above) < 0.0:
             below, above = above, 2.0 * above
-            if above > _FARTHEST * self.levers.half:
+            if above > 1e3 * self.levers.half:
                 if force is not None:
                     raise self.failure("NO_CONTACT", 0)
                 return self.levers.matrix @ plane, plane  # nothing is in contact
-        accuracy = _GUESS * (above - below)
+        accuracy = 1e-9 * (above - below)
         common = min(brentq(excess, below, above, xtol=accuracy) + accuracy, above)
         if force is not None:
             plane[0] = mean_approach(self.laws.along(common + tilted))

@@ -13,7 +13,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
@@ -115,6 +114,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
     try:
         content = path.read_bytes() if isinstance(path, Path) else path.read()
         check_hdf5(content)
+        import h5py  # takes longer than all else that a plan needs of laws
+
         with h5py.File(BytesIO(content), "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise InputError("is not a law file of patchlaw", file=name)
@@ -160,7 +161,7 @@ def _table(file: Any) -> LawTable:
 
 
 def _law(group: Any) -> PatchLaw:
-    if not isinstance(group, h5py.Group):  # h5py would look for names among all its numbers
+    if hasattr(group, "dtype"):  # h5py would look for names among all its numbers
         raise InputError(f"{group.name} is no group of columns")
     found = {
         one.name: _numbers(group[name])
@@ -178,6 +179,8 @@ def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:
     Args:
         fill: Writes the content into the open `h5py.File` that it is given.
     """
+    import h5py
+
     image = BytesIO()  # HDF5 itself may not survive a full disk
     with h5py.File(image, "w", userblock_size=HDF5_HEAD) as file:
         fill(file)

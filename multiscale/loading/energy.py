@@ -15,19 +15,15 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multiscale.loading.load_step import LoadStep
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 BALANCE = 1e-3
 """Energy that may be missing, relative to the largest, before a run says so. In 150 load steps on
 64² cells (half-space and cube, level and free planes) no bound was broken; work and energy differed
 by 6e-5, 6e-4 and 1e-3 at rms gradients of 0.2, 0.4 and 0.8, whose second order is no gradient of an
 energy, and by 5e-6 without finite slopes, which the trapezoidal rule leaves."""
-_NO_MOMENT = 1e-6
-"""Work of moments, relative to that of the force, that is rounding."""
 
 
 def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
@@ -52,7 +48,7 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     work = 0.5 * float((load + ahead) @ motion)
     turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
     stiffness, earlier = step.stiffness_N_per_mm, before.stiffness_N_per_mm
-    if earlier is not None and stiffness is not None and turning <= _NO_MOMENT * abs(work):
+    if earlier is not None and stiffness is not None and turning <= 1e-6 * abs(work):
         bent = 0.5 * motion[0] * (earlier - stiffness)
         if before.plastic_work_mJ and not step.stiffness_error_N_per_mm:
             bent = ahead[0] - load[0] - motion[0] * stiffness

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry import PatchGrid, Regions
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,12 +6,8 @@ Theory: docs/theory.md, section 14.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any, Self
-
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import replace
+from typing import Any
 
 from micro.conductance import (
     conductance_per_area,
@@ -23,66 +19,45 @@ from micro.conductance import (
 from multiscale.couplings.coupling import Coupling
 from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
-from multiscale.observers.observer import StepObserver
+from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, quantity
 from multiscale.scene.bodies import ConductanceSection
+from support.arrays import Array
 from support.collective import on_root
 
-Array = NDArray[np.float64]
+_PER_AREA = {
+    "thermal_conductance_W_per_K": "thermal_conductance_W_per_m2K",
+    "electrical_conductance_S": "electrical_conductance_S_per_m2",
+}
+"""Names of the conductances of load steps, and of those per area of laws."""
 
-_MM2_PER_M2 = 1e6
+
+def _conductivities(section: ConductanceSection) -> dict[str, float]:
+    """Return the conductivities of the pair by name of the conductance [W/m/K or S/m]."""
+    thermal, resistivity = section.conductivity, section.resistivity
+    electrical = None if resistivity is None else [1.0 / one for one in resistivity]
+    pairs = zip(_PER_AREA, (thermal, electrical), strict=True)
+    return {name: pair_conductivity(given) for name, given in pairs if given is not None}
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Conductances:
-    """Turns interfacial stiffnesses of a scene into conductances.
+def conducts_of(coupling: Coupling) -> Conducts | None:
+    """Return conductances per area at stiffnesses of laws; None where the scene asks for none.
 
     Args:
-        modulus: E* of the pair of materials [MPa].
-        areas: Nominal areas of the patches or regions, shape (N,) [mm²].
-        section: What the scene asks for.
+        coupling: The coupling.
     """
+    section, modulus = coupling.scene.conductance, coupling.materials.contact_modulus
+    if section is None:
+        return None
+    known = _conductivities(section)
 
-    modulus: float
-    areas: Array
-    section: ConductanceSection
-
-    @classmethod
-    def of(cls, coupling: Coupling, section: ConductanceSection) -> Self:
-        """Return that of a coupling, whose solver is made.
-
-        Args:
-            coupling: The coupling.
-            section: What its scene asks for.
-        """
-        modulus = coupling.materials.contact_modulus
-        return cls(modulus=modulus, areas=coupling.areas, section=section)
-
-    @property
-    def thermal(self) -> float | None:
-        """Conductivity of the pair [W/m/K]; None where it is not about heat."""
-        given = self.section.conductivity
-        return None if given is None else pair_conductivity(given)
-
-    @property
-    def electrical(self) -> float | None:
-        """Electrical conductivity of the pair [S/m]; None where it is not about currents."""
-        given = self.section.resistivity
-        return None if given is None else pair_conductivity([1.0 / one for one in given])
-
-    def per_area(self, stiffness: Array) -> dict[str, Array]:
-        """Return conductances per area by column name, of the contacts alone.
-
-        Args:
-            stiffness: Stiffnesses dp/dc of laws, of any shape [MPa/mm].
-        """
-        names = "thermal_conductance_W_per_m2K", "electrical_conductance_S_per_m2"
-        known = zip(names, (self.thermal, self.electrical), strict=True)
+    def per_area(stiffness: Array) -> dict[str, Array]:
         return {
-            name: conductance_per_area(stiffness, self.modulus, k)
-            for name, k in known
-            if k is not None
+            _PER_AREA[name]: conductance_per_area(stiffness, modulus, conductivity)
+            for name, conductivity in known.items()
         }
+
+    return per_area
 
 
 class ConductanceObserver(StepObserver):
@@ -97,26 +72,22 @@ class ConductanceObserver(StepObserver):
     """
 
     def __init__(self, coupling: Coupling, section: ConductanceSection) -> None:
-        self._coupling, self._section = coupling, section
-
-    @cached_property
-    def _conductances(self) -> Conductances:
-        return Conductances.of(self._coupling, self._section)
+        super().__init__(coupling)
+        self._section = section
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""
-        stiffness, pair = self._coupling.interface_stiffness(step), self._conductances
+        coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
+        stiffness = coupling.solver.interface_stiffness(step, coupling.areas)
         if stiffness is None:
             return step
-        columns: dict[str, Any] = {}
-        if pair.thermal is not None:
-            gap = self._of_gaps(step)
-            columns["gap_conductance_W_per_K"] = gap
-            contacts = total_conductance(stiffness, pair.modulus, pair.thermal)
-            columns["thermal_conductance_W_per_K"] = contacts + gap
-        if pair.electrical is not None:
-            conductance = total_conductance(stiffness, pair.modulus, pair.electrical)
-            columns["electrical_conductance_S"] = conductance
+        columns: dict[str, Any] = {
+            name: total_conductance(stiffness, modulus, conductivity)
+            for name, conductivity in _conductivities(self._section).items()
+        }
+        if "thermal_conductance_W_per_K" in columns:
+            gap = columns["gap_conductance_W_per_K"] = self._of_gaps(step)
+            columns["thermal_conductance_W_per_K"] += gap
         return replace(step, **columns)
 
     def _of_gaps(self, step: LoadStep) -> float:
@@ -126,7 +97,7 @@ class ConductanceObserver(StepObserver):
         if (gas := section.gas) is not None:
 
             def through_gas() -> float:
-                gaps = self._coupling.gaps()
+                gaps = self._coupling.solver.gaps
                 if gaps is not None:
                     return gas_conductance(gaps, gas, jump)
                 # laws know the mean gap: the mean of k/(g + M) is no less
@@ -137,24 +108,11 @@ class ConductanceObserver(StepObserver):
         if section.temperature is not None and section.emissivity is not None:
             radiation = radiation_conductance(section.temperature, section.emissivity)
             per_area += (1.0 - share) * radiation
-        return per_area * float(self._conductances.areas.sum()) / _MM2_PER_M2
+        return per_area * float(self._coupling.areas.sum()) / 1e6  # from mm² to m²
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
         return conductance_notes(steps, self._section, with_laws=self._coupling.has_laws)
-
-
-def conducts_of(coupling: Coupling) -> Conducts | None:
-    """Return conductances per area at stiffnesses of laws; None where the scene asks for none.
-
-    Args:
-        coupling: The coupling.
-    """
-    section = coupling.scene.conductance
-    if section is None:
-        return None
-    modulus, none = coupling.materials.contact_modulus, np.zeros(0)
-    return Conductances(modulus=modulus, areas=none, section=section).per_area
 
 
 def conductance_notes(

@@ -11,8 +11,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import h5py
-
 from multiscale.run import Run
 from support.collective import on_root
 from support.errors import NotWritten, PatchlawError
@@ -117,6 +115,8 @@ def _check_complete(path: Path) -> None:
     with path.open("rb") as file:
         os.fsync(file.fileno())
     if path.suffix == ".h5":
+        import h5py
+
         h5py.File(path, "r").close()
     elif path.suffix == ".xdmf":
         try:

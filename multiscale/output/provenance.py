@@ -13,7 +13,7 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts
 from multiscale.machine import peak_memory
 from multiscale.run import Run
 from multiscale.scene.identity import files_of

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
-from datetime import UTC, datetime
+from datetime import datetime
 from importlib.metadata import version
+from typing import Any
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
-from multiscale.output.provenance import library_versions
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
 from multiscale.run import Run
@@ -34,13 +33,13 @@ _MORE = {
 """What some runs know of their load steps: attribute, name and unit."""
 
 
-def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) -> str:
+def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any]) -> str:
     """Return the report of a run: a complete HTML document that needs no network.
 
     Args:
         run: The run, finished or stopped.
-        pictures: Files of the figures by name, see `multiscale.output.results.pictures_of`.
-        options: PETSc options given by the user.
+        pictures: Files of the figures by name, see `multiscale.figures.files.pictures_of`.
+        facts: The provenance of the run, see `multiscale.output.provenance.provenance`.
     """
     history, coupling = run.history(), run.coupling
     statements = dict(coupling.statements())
@@ -63,7 +62,7 @@ def report_html(run: Run, pictures: Mapping[str, bytes], *, options: list[str]) 
         folded=[pair for pair in folded if pair[0] != "inputs"],
         measured=next((step for step in reversed(history.steps) if step.errors), None),
         pictures=pictures,
-        made=_made(run, options),
+        made=_made(facts),
         citations=citations(),
         percent=percent,
         quantity=quantity,
@@ -115,18 +114,17 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
         yield "hardness", quantity(coupling.scene.micro.hardness, "MPa")
 
 
-def _made(run: Run, options: list[str]) -> list[tuple[str, str]]:
+def _made(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return what made the report: version, date, scene, processes, options, libraries."""
-    threads = os.environ.get("OMP_NUM_THREADS", "all")
-    versions = ", ".join(f"{name} {number}" for name, number in library_versions().items())
+    written = datetime.fromisoformat(facts["written"])
     return [
-        ("patchlaw", version("patchlaw")),
-        ("written", f"{datetime.now(UTC):%d %B %Y, %H:%M} UTC"),
-        ("scene", run.scene.file or "made in Python"),
-        ("heights, SHA-256", run.heights),
-        ("processes", f"{1 if run.comm is None else run.comm.size}, threads: {threads}"),
-        ("PETSc options", " ".join(options) or "none given"),
-        ("libraries", versions),
+        ("patchlaw", facts["patchlaw"]),
+        ("written", f"{written:%d %B %Y, %H:%M} UTC"),
+        ("scene", facts["scene_file"] or "made in Python"),
+        ("heights, SHA-256", facts["surface"]["heights_sha256"]),
+        ("processes", f"{facts['ranks']}, threads: {facts['threads'] or 'all'}"),
+        ("PETSc options", " ".join(facts["petsc_options"]) or "none given"),
+        ("libraries", ", ".join(f"{name} {one}" for name, one in facts["versions"].items())),
     ]
 
 

@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
-from importlib import import_module
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 from multiscale.couplings.coupling import Coupling
+from multiscale.figures.files import (
+    Drawing,
+    FigureProcess,
+    Pictures,
+    file_kinds,
+    pictures_of,
+    write_pictures,
+)
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
@@ -18,12 +27,8 @@ from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecor
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
 from support.collective import on_root, shared
-from support.errors import NotInstalled
-from support.packages import optional_packages
+from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
 
@@ -35,17 +40,17 @@ FILES = (
 )  # fmt: skip
 """All files that a run may write."""
 
-_COMPRESSION = 1
-"""Level of gzip for maps: most of a map of pressures is zero."""
 
-
-def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
+def write_results(
+    folder: Path, run: Run, *, options: list[str], figures: RunFigures | None = None
+) -> list[Path]:
     """Write the files of a run, finished or stopped.
 
     Args:
         folder: Folder of the results; made when missing.
         run: The run.
         options: PETSc options given by the user, for the provenance.
+        figures: The figures of the run, where some were begun before; the caller ends them.
 
     Returns:
         The files written.
@@ -53,18 +58,14 @@ def write_results(folder: Path, run: Run, *, options: list[str]) -> list[Path]:
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawn: list[Pictures] = []
-    if run.scene.output.figures and run.steps:
-        figures = list(_figures(run).items())
-        with run.phase("output"):
-            drawn = shared(run.comm, len(figures), lambda index: pictures_of(*figures[index]))
+    drawn = (figures or RunFigures(run)).drawn()
     run.remark(filter(None, (one.problem for one in drawn)))
-    pictures = {name: content for one in drawn for name, content in one.files.items()}
+    pictures = Pictures(dict(chain.from_iterable(one.files.items() for one in drawn)))
     with run.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
-def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str]) -> list[Path]:
+def _write(folder: Path, run: Run, pictures: Pictures, options: list[str]) -> list[Path]:
     for name in FILES:  # Files of an earlier run must not stand beside those of this one.
         with written(folder / name):
             remove(folder / name)
@@ -73,12 +74,10 @@ def _write(folder: Path, run: Run, pictures: dict[str, bytes], options: list[str
     if table is not None:
         files.append(write_laws(folder / "laws.h5", table))
     files += write_pictures(folder, pictures)
-    content = json.dumps(provenance(run, options=options), indent=2)
-    files.append(write_text(folder / "provenance.json", content + "\n"))
+    facts = provenance(run, options=options)
+    files.append(write_text(folder / "provenance.json", json.dumps(facts, indent=2) + "\n"))
     if run.scene.output.report:
-        files.append(
-            write_text(folder / "report.html", report_html(run, pictures, options=options))
-        )
+        files.append(write_text(folder / "report.html", report_html(run, pictures.files, facts)))
     return files
 
 
@@ -141,98 +140,110 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
             group.attrs.update(approach_mm=record.approach_mm, force_N=record.force_N)
             for name in FIELDS:
                 if (data := getattr(record, name)) is not None:
-                    group.create_dataset(name, data=data, compression=_COMPRESSION)
+                    # most of a map of pressures is zero
+                    group.create_dataset(name, data=data, compression=1)
 
     if contacts[0].pressure_MPa is not None:
         files.append(write_bytes(folder / "contact.h5", hdf5_bytes(fill)))
     return files
 
 
-class Pictures(NamedTuple):
-    """The files of figures.
-
-    Attributes:
-        files: Their contents by name.
-        problem: Why there are none; empty where there are.
-    """
-
-    files: dict[str, bytes]
-    problem: str = ""
-
-
-def pictures_of(name: str, draw: Callable[[], Figure]) -> Pictures:
-    """Return the files of a figure: PNG, and SVG beside it.
-
-    Results do not depend on figures: without matplotlib, or with one that fails, there are none.
-
-    Args:
-        name: Name of the files without an ending.
-        draw: Draws the figure.
-    """
-    try:
-        with optional_packages():
-            from multiscale.figures.style import encoded  # loads matplotlib
-
-            found = encoded(draw())
-    except NotInstalled as error:
-        return Pictures({}, f"no figures are drawn: {error}")
-    return Pictures({f"{name}.{kind}": content for kind, content in found.items()})
-
-
-def write_pictures(folder: Path, pictures: Mapping[str, bytes]) -> list[Path]:
-    """Write pictures by the names of their files.
-
-    Args:
-        folder: Folder of the results; made when missing.
-        pictures: The content of each file, see `pictures_of`.
-
-    Returns:
-        The files written.
-    """
-    return [write_bytes(folder / name, content) for name, content in pictures.items()]
-
-
-def _figures(run: Run) -> dict[str, Callable[[], Figure]]:
-    """Return the functions that draw the figures of a run, by their names.
-
-    Note:
-        Collective; drawing is not.
-    """
-    coupling, history, face = run.coupling, run.history(), run.coupling.face_pressures()
-    surface, of_samples = coupling.surface, coupling.regions is not None
-    figures: dict[str, Callable[[], Figure]] = {
-        "overview": _from("contact", "overview_figure", surface, of_samples, history, face),
-        "surface": partial(surface_picture, coupling),
-        "curves": partial(history.plot, run.scene.kind),
-    }
-    if not of_samples:
-        figures["pressures"] = _from("contact", "pressure_figure", history)
-    if face is not None:
-        figures["face"] = _from("contact", "face_figure", face, history.steps[-1])
-    if run.contacts:
-        contact = run.contacts[-1]
-        figures["contact"] = contact.plot
-        of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
-        if run.scene.output.figures == "all" and of_cells:
-            ratio = coupling.materials.first.poisson_ratio
-            figures["block"] = _from("block", "contact_block", surface, contact, ratio)
-    if coupling.table is not None:
-        figures["laws"] = _from("curves", "law_figure", run.laws)
-    return figures
-
-
-def surface_picture(coupling: Coupling) -> Figure:
-    """Draw the surface of a scene, with its summits where the micro model uses them.
+def surface_drawing(coupling: Coupling) -> Drawing:
+    """Return the figure of a scene's surface, with its summits where the micro model uses them.
 
     Args:
         coupling: What was made of the scene.
     """
-    from multiscale.figures.surface import surface_figure  # loads matplotlib
+    output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
+    surface = replace(coupling.surface)  # without its interpolant, which is not drawn
+    about = surface, coupling.summits, coupling.patches, spectrum
+    return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
 
-    target = coupling.scene.surface.spectrum
-    return surface_figure(coupling.surface, coupling.summits, coupling.patches, target)
 
+class RunFigures:
+    """The figures of a run.
 
-def _from(module: str, function: str, *arguments: Any) -> Callable[[], Figure]:
-    """Return what draws a figure; matplotlib is loaded only when it is called."""
-    return lambda: getattr(import_module(f"multiscale.figures.{module}"), function)(*arguments)
+    Ranks share them at its end. Of a process on its own with a further core, another process draws
+    them: surface and laws while load steps are made.
+
+    Args:
+        run: The run.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._run, self._figures = run, run.scene.output.figures
+        self._process: FigureProcess | None = None
+        self._begun: dict[str, Future[Pictures]] = {}
+
+    def __enter__(self) -> RunFigures:
+        """Return the figures."""
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End the process that draws."""
+        if self._process is not None:
+            self._process.close()
+
+    def begin(self) -> None:
+        """Have those drawn beside the load steps that do not depend on them."""
+        # larger ones take minutes beside their figures, and long to send
+        few = self._run.coupling.surface.heights.size <= 2**20
+        if self._figures and self._run.comm is None and cores() > 1 and few:
+            with suppress(OSError):  # no process can be started, and figures are drawn here
+                self._process = FigureProcess()
+                for drawing in self._before_load_steps():
+                    self._begun[drawing.name] = self._process.draw(drawing)
+
+    def drawn(self) -> list[Pictures]:
+        """Return the files of all figures; none of a run without load steps, or that wants none.
+
+        Note:
+            Collective.
+        """
+        if not self._figures or not self._run.steps:
+            return []
+        with self._run.phase("output"):
+            drawings = [*self._after_load_steps(), *self._before_load_steps()]
+            if self._process is None:
+                comm = self._run.comm
+                return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
+            draw, begun = self._process.draw, self._begun
+            starts = not all(one.done() for one in begun.values())  # then this one helps
+            ahead = [begun.get(drawing.name) or draw(drawing) for drawing in drawings]
+            return [
+                pictures_of(drawing) if starts and one.cancel() else one.result()
+                for drawing, one in zip(drawings, ahead, strict=True)
+            ]
+
+    def _before_load_steps(self) -> Iterator[Drawing]:
+        yield surface_drawing(self._run.coupling)
+        if (laws := self._run.laws) is not None:
+            kinds = file_kinds(self._figures)
+            yield Drawing("laws", "figures.curves.law_figure", (laws,), kinds)
+
+    def _after_load_steps(self) -> Iterator[Drawing]:
+        """Yield the figures of what was found.
+
+        Note:
+            Collective.
+        """
+        run, coupling, history = self._run, self._run.coupling, self._run.history()
+        surface, of_samples = replace(coupling.surface), coupling.regions is not None
+        face = coupling.face_pressures()
+        figures: dict[str, tuple[str, Any]] = {
+            "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
+            "curves": ("curves.history_figure", (history, run.scene.kind)),
+        }
+        if not of_samples:
+            figures["pressures"] = "contact.pressure_figure", (history,)
+        if face is not None:
+            figures["face"] = "contact.face_figure", (face, history.steps[-1])
+        if run.contacts:
+            contact = run.contacts[-1]
+            figures["contact"] = "contact.contact_figure", (contact,)
+            of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
+            if self._figures in ("all", "svg") and of_cells:
+                ratio = coupling.materials.first.poisson_ratio
+                figures["block"] = "block.contact_block", (surface, contact, ratio)
+        for name, (function, arguments) in figures.items():
+            yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))

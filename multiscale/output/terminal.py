@@ -5,22 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from multiscale.couplings.coupling import Coupling
-from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.load_step import LoadStep
 from multiscale.machine import cores_statement, peak_memory
 from multiscale.readable import Caution, Observer, duration, quantity
-from multiscale.results.history import History
 from support.errors import PatchlawError
 
-MOST_ROWS = 60
-"""Load steps that are printed; the files hold all of them."""
+if TYPE_CHECKING:
+    from multiscale.couplings.coupling import Coupling
+    from multiscale.loading.load_history import LoadHistory
+    from multiscale.loading.load_step import LoadStep
+    from multiscale.results.history import History
 
 TABLE_WIDTH = 100
 """Characters of a line that tables take at least, in a log file too."""
@@ -228,7 +227,7 @@ def show_history(comm: Any, history: History) -> None:
     """
     if not speaks(comm):
         return
-    header, rows = history.table(most=MOST_ROWS)
+    header, rows = history.table(most=60)
     table = Table(box=None, padding=(0, 2, 0, 0))
     for name in header:
         table.add_column(escape(name.replace(" [", "\n[")), justify="right")

@@ -29,13 +29,6 @@ _REASONS: dict[float, str] = {
 }
 _IN_TIME = (_TIME_OVER, signal.SIGUSR1)
 
-_RESERVE = 0.05
-"""Share of the time limit that is left for writing results."""
-_LEAST_RESERVE, _MOST_RESERVE = 1.0, 20.0
-"""Bounds of that reserve [s]."""
-_GROWTH = 1.5
-"""Wall time that the next load step is expected to take, over that of the last one."""
-
 _told: list[int] = []  # signals since the command began
 
 Handler = Callable[[int, FrameType | None], None]
@@ -182,5 +175,6 @@ class Interruption:
     def _is_late(self, last_step: float) -> bool:
         if self._limit is None:
             return False
-        reserve = min(max(_RESERVE * self._limit, _LEAST_RESERVE), _MOST_RESERVE)
-        return time.monotonic() + _GROWTH * last_step + reserve > self._began + self._limit
+        reserve = min(max(0.05 * self._limit, 1.0), 20.0)  # for writing results [s]
+        # the next load step may take half as long again as the last one
+        return time.monotonic() + 1.5 * last_step + reserve > self._began + self._limit

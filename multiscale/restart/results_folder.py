@@ -28,8 +28,6 @@ from support.collective import on_root
 from support.errors import InputError
 
 _NAME = ".lock"
-_PATIENCE = 0.2  # for another run that is just ending, or others that remove the folder [s]
-_NAP = 0.02
 _OUTPUT = "output."
 _READ_OR_MAKE = os.O_RDWR | os.O_CREAT
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EISDIR, errno.EINVAL)
@@ -84,7 +82,7 @@ class FolderLock:
         Raises:
             InputError: When another process holds it, or the folder cannot be written to.
         """
-        until = time.monotonic() + _PATIENCE
+        until = time.monotonic() + 0.2  # for a run that is just ending, or removes the folder
         while not self._is_held():
             problem, passing = "is removed by another run", True
             try:
@@ -101,7 +99,7 @@ class FolderLock:
             if not passing or time.monotonic() > until:
                 self.release()
                 raise InputError(problem, key="--out", value=str(self._folder))
-            time.sleep(_NAP)
+            time.sleep(0.02)
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.contact_state import ContactState
+from multiscale.figures import by_matplotlib
 from multiscale.loading.load_step import LoadStep
-from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 
@@ -117,7 +117,4 @@ class ContactRecord:
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        with optional_packages():
-            from multiscale.figures.contact import contact_figure  # loads matplotlib
-
-        return contact_figure(self)
+        return by_matplotlib("figures.contact.contact_figure", self)

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid, Regions
+from multiscale.figures import by_matplotlib
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
-from multiscale.results.accuracy_verdict import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.html_page import Table, table_html
+from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
-from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 
@@ -25,8 +25,6 @@ PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""
 PATCH_STIFFNESS = "stiffness_MPa_per_mm"
 """Column of the derivative dp/dc of a patch's law."""
-MOST_SHOWN = 1000
-"""Load steps in the table of a report or notebook; ``history.csv`` has all."""
 
 
 @dataclass(eq=False)
@@ -263,7 +261,7 @@ class History:
         """
         return data_frame(self.records())
 
-    def table(self, *names: str, most: int = MOST_SHOWN) -> Table:
+    def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
 
         Units have the prefixes that suit the largest value of their column. A reference has one
@@ -305,10 +303,7 @@ class History:
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        with optional_packages():
-            from multiscale.figures.curves import history_figure  # loads matplotlib
-
-        return history_figure(self, label)
+        return by_matplotlib("figures.curves.history_figure", self, label)
 
     def _repr_html_(self) -> str:
         """Return the table as HTML, which notebooks show for a history."""

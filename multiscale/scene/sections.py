@@ -246,7 +246,7 @@ class OutputSection:
         figures: Whether figures are drawn. "all" adds ``block.png``, which takes about a second:
             the rough block in three dimensions with its contacts and the stresses below them, where
             pressures of cells are known. Half-space contacts have them, with laws where ``contact``
-            is written.
+            is written. "svg" writes all of them as SVG too, beside the PNG files.
         report: Whether report.html is written.
         fields: Load steps whose displacements, stresses and contact pressures are written for
             ParaView: "last" (or true), "all", or a list of their numbers.
@@ -258,7 +258,7 @@ class OutputSection:
             and "none" with laws. "none" leaves out the interfacial stiffness as well.
     """
 
-    figures: bool | Literal["all"] = True
+    figures: bool | Literal["all", "svg"] = True
     report: bool = True
     fields: Annotated[
         bool | Literal["last", "all"] | _StepNumbers, BeforeValidator(_load_steps)

@@ -16,6 +16,7 @@ from multiscale.scene.identity import CONTENT, content_digest
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import parsed
 from support.errors import InputError
+from support.whole_files import plain
 
 MOST_CASES = 100_000
 """Most cases of a sweep: every rank holds the rows of all, some 10 kB for 8 load steps of each."""
@@ -74,7 +75,7 @@ def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> list[Case]:
         InputError: When nothing is varied, a key has no values or one twice, or there are too many
             cases. Scenes are not made.
     """
-    lists = {key: [_plain(value) for value in values] for key, values in vary.items()}
+    lists = {key: [plain(value) for value in values] for key, values in vary.items()}
     if not lists:
         raise InputError("varies nothing", key="--vary", allowed="KEY=VALUES, at least once")
     for key, values in lists.items():
@@ -98,11 +99,6 @@ def _digest(path: Path) -> str:
 
 def _text(value: Any) -> str:
     return json.dumps(value, sort_keys=True, default=str)
-
-
-def _plain(value: Any) -> Any:
-    """Return numpy's scalars as Python's own, which scenes and JSON take."""
-    return value.item() if hasattr(value, "item") and getattr(value, "ndim", 0) == 0 else value
 
 
 def values_from_text(text: str) -> tuple[str, list[Any]]:

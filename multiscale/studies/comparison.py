@@ -13,15 +13,12 @@ from typing import Any
 import numpy as np
 
 from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
+from multiscale.couplings.dispatch import coupling_class
 from multiscale.readable import duration
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
-from multiscale.studies.configurations import (
-    Configuration,
-    configurations,
-    pressure_grid,
-)
+from multiscale.studies.configurations import Configuration, configurations, pressure_grid
 from multiscale.studies.errors import (
     ERRORS,
     NO_ERRORS,
@@ -31,16 +28,9 @@ from multiscale.studies.errors import (
     uncertainty,
 )
 from multiscale.studies.measured_run import measured_run
-from multiscale.studies.running import CaseResult, Journal, place_in, run_cases
-from support.collective import on_root
+from multiscale.studies.running import CaseResult, Journal, run_cases
+from support.collective import on_root, place_in
 from support.errors import InputError
-
-BUSY = 0.7
-"""A machine is called busy when the processes worked less than this share of their wall time."""
-
-REFERENCE_SHARE, REFERENCE_LIMIT = 0.6, 0.8
-"""Shares of a budget: what a reference may be predicted to take to be run before all others, and
-what it may take in fact; the rest is enough for the quick ways."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +164,7 @@ def compare(
             why = f"it is predicted to take {duration(one.cost)}, and the budget leaves {rest}"
             return CaseResult(status="not started", failure=why)
         begin(one)
-        return solve(one, comm, (REFERENCE_LIMIT if one is first else 1.0) * left)
+        return solve(one, comm, (0.8 if one is first else 1.0) * left)
 
     def chosen() -> tuple[Scene, list[Configuration]]:
         resolved = resolved_scene(scene)
@@ -192,7 +182,7 @@ def compare(
 
 def resolved_scene(scene: Scene) -> Scene:
     """Return a scene with values for all keys that are ``auto``."""
-    sized = scene.kind != "reference" or not is_measured(scene)
+    sized = not (coupling_class(scene).meshes_roughness and is_measured(scene))
     if auto_keys(scene) <= {"micro.model"} and sized:
         return scene
     return with_resolved(scene, resolved_sections(make_setup(scene), scene))
@@ -211,9 +201,9 @@ def reference_within(ways: Sequence[Configuration], budget_s: float | None) -> C
     fitting = [
         one
         for one in ways
-        if one.kind == "reference"
+        if one.coupling.meshes_roughness
         and one.scene.reference.meshes > 1
-        and one.cost <= REFERENCE_SHARE * (budget_s or 0.0)
+        and one.cost <= 0.6 * (budget_s or 0.0)  # predicted; it is ended at 0.8
     ]
     return max(fitting, key=lambda one: one.cost, default=None)
 
@@ -267,7 +257,7 @@ def _warnings(rows: Sequence[Row], against: str | None, chosen: str | None) -> I
     timed = [row for row in rows if row.phases]
     wall = sum(row.ranks * row.seconds for row in timed)
     cpu = sum(row.result.measured["cpu_s"] for row in timed)
-    if cpu < BUSY * wall:
+    if cpu < 0.7 * wall:
         yield (
             f"the processes worked {duration(cpu)} in {duration(wall)} of their wall time: the "
             "machine was busy with something else, and times are too long"
@@ -299,7 +289,7 @@ def _fineness(row: Row) -> tuple[float, ...]:
 
     These are the number of meshes, the edges of the finest in a contact, finite slopes, heights.
     """
-    section, is_meshed = row.scene.reference, row.kind == "reference"
+    section, is_meshed = row.scene.reference, row.coupling.meshes_roughness
     meshes, edges = is_meshed * section.meshes, is_meshed * (section.fine or 0.0)
     return meshes, -edges, row.finite_slopes, math.prod(row.heights)
 

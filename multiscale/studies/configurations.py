@@ -18,7 +18,8 @@ from typing import Any, TypeAlias, cast
 from geometry.meshes.families import suggested_fine
 from micro import MODELS
 from multiscale.couplings.coupling import Coupling
-from multiscale.inputs.block import LAW_BLOCK_CELLS, block_section
+from multiscale.couplings.dispatch import coupling_class
+from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from multiscale.inputs.loads import load_history_on, patch_grid
 from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.surfaces import make_surface
@@ -38,21 +39,6 @@ OWN = "the scene as it is"
 
 SMALL_SLOPES = ", small slopes"
 """End of the name of a configuration that differs from another by neglecting finite slopes."""
-
-FEWEST_HEIGHTS, HEIGHTS_PER_WAVE = 32, 3
-"""Heights along a side and per shortest wave, at least, of coarser versions of a surface."""
-
-LAW_HEIGHTS = 128
-"""Heights along a side, at most, of half-spaces behind laws of several numbers of patches."""
-
-PATCHES = (1, 2, 4, 8, 16)
-"""Patches along a side, of couplings by laws."""
-
-CELLS_PER_PATCH = 2
-"""Elements along a patch, at least, of blocks whose mesh carries the laws."""
-
-REFERENCE_MESHES = ((1, 2.0), (1, 1.0), (2, 1.0), (3, 1.0), (3, 0.5**0.5))
-"""Numbers of meshes of references, and their edges relative to those that fit the contacts."""
 
 _HALF_SPACE: Values = {"model": "half-space"}
 _NO_OUTPUT: Values = {"figures": False, "report": False, "check": "none", "contact": "none"}
@@ -76,13 +62,18 @@ class Configuration:
 
     @property
     def kind(self) -> str:
-        """The coupling."""
-        return self.scene.coupling.kind
+        """The name of the coupling."""
+        return self.scene.kind
+
+    @property
+    def coupling(self) -> type[Coupling]:
+        """The class of the coupling, which says what it has."""
+        return coupling_class(self.scene)
 
     @property
     def model(self) -> str:
         """The micro model; empty for an explicit reference."""
-        return "" if self.kind == "reference" else self.scene.micro.model
+        return "" if self.coupling.meshes_roughness else self.scene.micro.model
 
     @property
     def heights(self) -> Grid:
@@ -140,7 +131,8 @@ def coarser_grids(heights: Grid, scene: Scene) -> list[Grid]:
     if spectrum is None or scene.counter_surface is not None:
         return grids
     bands = (spectrum.waves_x or spectrum.waves, spectrum.waves_y or spectrum.waves)
-    least = [max(FEWEST_HEIGHTS, HEIGHTS_PER_WAVE * band[1]) for band in bands if band]
+    # at least 32 heights along a side, and 3 per shortest wave
+    least = [max(32, 3 * band[1]) for band in bands if band]
     while all(n % 2 == 0 and n // 2 >= few for n, few in zip(grids[0], least, strict=True)):
         grids.insert(0, (grids[0][0] // 2, grids[0][1] // 2))
     return grids
@@ -153,7 +145,7 @@ class _Catalogue:
         surface, cells = make_surface(scene), block_section(scene).cells
         self._of, self._patches = scene, patch_grid(scene)
         self._grids = coarser_grids(surface.grid, scene)
-        fitting = [grid for grid in self._grids if max(grid) <= LAW_HEIGHTS]
+        fitting = [grid for grid in self._grids if max(grid) <= 128]  # quick behind many laws
         self._law_grid = fitting[-1] if fitting else self._grids[0]
         stated = cells if isinstance(cells, tuple) else None
         self._cells = stated or LAW_BLOCK_CELLS
@@ -196,7 +188,8 @@ class _Catalogue:
         else:
             isolated["micro"] = {"model": "elliptic"}
         half = tuple(max(1, count // 2) for count in cells)
-        grids = {(count, count) for count in PATCHES if count <= min(self._grids[-1])} | {own}
+        sides = (count for count in (1, 2, 4, 8, 16) if count <= min(self._grids[-1]))
+        grids = {(count, count) for count in sides} | {own}
         for patches, mesh in (*((patches, cells) for patches in grids), (own, half)):
             if _carries(mesh, patches):
                 yield isolated | {"patches.grid": patches, "block.cells": mesh}
@@ -210,7 +203,8 @@ class _Catalogue:
     def _references(self) -> Iterator[Values]:
         """Yield references, of several numbers of meshes and with several edges."""
         fine = self._fine
-        for meshes, factor in REFERENCE_MESHES if fine else ((1, 1.0), (2, 1.0), (3, 1.0)):
+        ways = [(1, 1.0), (2, 1.0), (3, 1.0)]  # numbers of meshes, and edges over those that fit
+        for meshes, factor in [(1, 2.0), *ways, (3, 0.5**0.5)] if fine else ways:
             edges = {"reference.fine": float(f"{factor * fine:.4g}")} if fine else {}
             yield {"coupling": {"kind": "reference"}, "reference.meshes": meshes} | edges
 
@@ -229,17 +223,17 @@ class _Catalogue:
 
 def _carries(cells: tuple[int, ...], patches: Grid) -> bool:
     """Tell whether enough elements lie under every patch."""
-    return all(c >= CELLS_PER_PATCH * n for c, n in zip(cells[:2], patches, strict=True))
+    return all(c >= 2 * n for c, n in zip(cells[:2], patches, strict=True))
 
 
 def _name(scene: Scene) -> str:
     """Return the name of a configuration in tables: its coupling, micro model and grids."""
-    kind, micro, reference = scene.coupling.kind, scene.micro, scene.reference
-    if kind == "reference":
+    coupling, micro, reference = coupling_class(scene), scene.micro, scene.reference
+    if coupling.meshes_roughness:
         name = f"reference, {reference.meshes} mesh{'es' * (reference.meshes > 1)}"
         return f"{name}, {1e3 * reference.fine:.3g} µm" if reference.fine else name
-    name = kind
-    if kind in ("isolated", "consistent"):
+    name = scene.kind
+    if coupling.has_laws:
         name += f", {times(patch_grid(scene))} patches"
     name += f", {micro.model}"
     if micro.model == "half-space":

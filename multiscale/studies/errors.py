@@ -42,7 +42,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import interval_overlaps
-from multiscale.inputs.block import block_section
+from multiscale.inputs.bodies import block_section
 from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid, times
 from multiscale.studies.running import CaseResult
 
@@ -139,7 +139,7 @@ class Row(Configuration):
         """
         phases, measured, scene = self.phases, self.result.measured, self.scene
         laws, steps = phases.pop("laws", None), phases.pop("load steps", None)
-        meshed = scene.reference if self.kind == "reference" else block_section(scene)
+        meshed = scene.reference if self.coupling.meshes_roughness else block_section(scene)
         record = {
             "name": self.name,
             "kind": self.kind,
@@ -285,7 +285,7 @@ class ErrorCauses:
         self, rows: Sequence[Row], best: Mapping[str, Row], measure: Row, quantity: str
     ) -> None:
         self._best, self._measure, self._quantity = best, measure, quantity
-        self._models = {_micro_key(one): one for one in rows if one.kind == "analytic"}
+        self._models = {_micro_key(one): one for one in rows if not one.coupling.has_body}
         self._slopes = self._effect_of_slopes(rows)
 
     def shares(self, row: Row) -> Mapping[str, float]:
@@ -308,11 +308,11 @@ class ErrorCauses:
         shares = dict(NO_SHARES) | dict.fromkeys(("micro", "coupling", "block"), 0.0)
         if row.model not in ("", "half-space"):
             shares["micro"] = model - half_space
-        if row.kind in ("isolated", "consistent"):
+        if row.coupling.has_laws:
             shares["coupling"] = mine - concurrent - (model - half_space)
-        if (row.kind == "analytic") != (measure.kind == "analytic"):
-            step = half_space - concurrent
-            shares["block"] = step if row.kind == "analytic" else -step
+        neglects_block = measure.coupling.has_body - row.coupling.has_body
+        if neglects_block:
+            shares["block"] = neglects_block * (half_space - concurrent)
         if not math.isnan(self._slopes):
             neglected = measure.finite_slopes - row.finite_slopes
             shares["slopes"] = value - value * self._slopes**neglected

@@ -13,22 +13,14 @@ from matplotlib.figure import Figure
 from multiscale.figures.style import (
     COLOURS,
     ERROR_BAND,
-    FULL_WIDTH,
     MARKERS,
     PALETTE,
     add_legend,
-    new_figure,
-    panels_above_legend,
+    panels,
     styled,
 )
 from multiscale.studies.comparison import Comparison
 from multiscale.studies.errors import Row
-
-MOST_CURVES = 200
-"""Cases of a sweep that are drawn as curves; bands show those beyond."""
-
-MOST_ENSEMBLES = 8
-"""Ensembles that are drawn; more of them cannot be told apart."""
 
 PALE = 0.4
 """Opacity of single cases, and of configurations that another one beats in time and error."""
@@ -41,9 +33,6 @@ LEAST_SHARE = 0.2
 
 NUMBER_SIZE = (10.0, 8.0)
 """Width and height that a number takes [pt]."""
-
-_SHARED = 1e-9
-"""Spread of values of all cases, relative to their mean, that is rounding."""
 
 _POINTS: dict[str, Any] = {"marker": "o", "ms": 4.0}  # curves of one load step
 _PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
@@ -63,15 +52,14 @@ def sweep_figure(sweep: Any) -> Figure:
     to the same approaches, of approaches where all were pressed by the same forces.
 
     Args:
-        sweep: A `multiscale.studies.sweep.SweepResults`, of which `MOST_ENSEMBLES` are drawn.
+        sweep: A `multiscale.studies.sweep.SweepResults`, of which 8 ensembles are drawn.
     """
-    figure = new_figure(FULL_WIDTH, 3.0)
-    force, area = figure.subplots(1, 2)
-    ensembles = sweep.ensembles()[:MOST_ENSEMBLES]
+    figure, (force, area) = panels(1, 2, 3.0)
+    ensembles = sweep.ensembles()[:8]  # more cannot be told apart
     for colour, (values, part), (_, statistics) in zip(
         cycle(PALETTE), ensembles, sweep.statistics, strict=False
     ):
-        few = slice(MOST_CURVES // len(ensembles))
+        few = slice(200 // len(ensembles))  # the band shows those beyond
         approach, pressure = 1e3 * part.approach_mm[few], part.mean_pressure_MPa[few]
         look = {"color": colour} | (_POINTS if approach.shape[1] == 1 else {})
         thin = look | {"lw": 0.5, "alpha": PALE}
@@ -111,7 +99,7 @@ def _draw_scatter(axes: Any, statistics: Any, colour: str) -> None:
         _read_off(statistics, name)
         for name in ("mean", "median", "low", "high", "smallest", "largest")
     )
-    shared = [bool((most[k] - least[k]).max() <= _SHARED * np.abs(mean[k]).max()) for k in (0, 1)]
+    shared = [bool((most[k] - least[k]).max() <= 1e-9 * np.abs(mean[k]).max()) for k in (0, 1)]
     if shared[0] == shared[1]:
         return
     x, y = (mean[0], median[1]) if shared[0] else (median[0], mean[1])
@@ -140,24 +128,21 @@ def comparison_figure(comparison: Comparison) -> Figure:
         "area_max": "contact area: largest error over the curve",
         "distribution": "pressures: distance / mean",
     }
-    figure = new_figure(FULL_WIDTH, 4.4)
-    panels, below = panels_above_legend(figure, 3, 0.16)
-    for axes, (error, title) in zip(panels, titles.items(), strict=True):
-        _draw_errors(axes, comparison, error)
-        axes.set_title(title, fontsize=7.5)
-    panels[0].set_ylabel("relative to the measure")
-    _draw_legend(below, comparison)
     ahead = {row.name for error in titles for row in comparison.frontier(error)}
     ahead.add(str(comparison.measure))
     rows = enumerate(comparison.rows, 1)
     names = [f"{number}: {row.name}" for number, row in rows if row.name in ahead]
     lines = ["      ".join(names[first : first + 2]) for first in range(0, len(names), 2)]
-    figure.supxlabel("\n".join(lines), fontsize=6.5)
-    # Numbers are placed beside the points, whose places are known once the figure is laid out.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
-    for axes, error in zip(panels, titles, strict=True):
-        _draw_numbers(axes, comparison, error)
+    low = 0.1 + 0.12 * len(lines)  # below the legend, for the names
+    high = 3.5 + low
+    figure, axes = panels(1, 3, high, below=1.1 + low)
+    for one, (error, title) in zip(axes, titles.items(), strict=True):
+        _draw_errors(one, comparison, error)
+        _draw_numbers(one, comparison, error)
+        one.set_title(title, fontsize=6.5)
+    axes[0].set_ylabel("relative to the measure")
+    _draw_legend(figure.add_axes((0.0, low / high, 1.0, 0.6 / high)), comparison)
+    figure.text(0.5, 0.05 / high, "\n".join(lines), ha="center", va="bottom", fontsize=6.5)
     return figure
 
 
@@ -181,7 +166,7 @@ def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
             look = _RING if row.is_measure else _EARLY
         axes.plot(seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
-    axes.margins(0.1)
+    axes.margins(0.15)
     axes.autoscale_view()
     axes.autoscale(False)
     if np.isfinite(bar) and bar > 0.0:
@@ -221,4 +206,5 @@ def _draw_legend(axes: Any, comparison: Comparison) -> None:
     axes.fill_between([], [], [], label=lowest, **ERROR_BAND)
     if any(row.steps and row.status != "done" for row in comparison.rows):
         axes.plot([], [], "s", label="hollow: ended before the last load step", **black, **_EARLY)
+    axes.axis("off")
     axes.legend(loc="center", ncol=3)

@@ -138,7 +138,7 @@ def _described(run: Run, history: History) -> dict[str, Any]:
         ratio = np.ones(len(history))
         np.divide(curves["force"], history.force_N, out=ratio, where=history.force_N > 0.0)
         pressure = pressure * ratio[:, None]
-    finite_slopes = run.scene.kind == "reference" or bool(run.coupling.finite_slopes)
+    finite_slopes = run.coupling.meshes_roughness or bool(run.coupling.finite_slopes)
     return {
         "measured": {
             "phases": run.clock.times, "unknowns": run.unknowns, "finite_slopes": finite_slopes,

@@ -26,9 +26,9 @@ from multiscale.run import Run
 from multiscale.scene.identity import changes, told
 from multiscale.scene.scene import Scene
 from support.checked_store import START, append, end_of, unsealed
-from support.collective import on_root, together
+from support.collective import on_root, place_in, together
 from support.errors import InputError, NotConverged
-from support.whole_files import written
+from support.whole_files import plain, written
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""
@@ -86,7 +86,7 @@ def run_case(
     except NotConverged as error:
         status, failure = "not converged", str(error)
     history = run.history()
-    rows = [[_plain(column.of(step)) for column in COLUMNS] for step in history.steps]
+    rows = [[plain(column.of(step)) for column in COLUMNS] for step in history.steps]
     more = describe(run, history)
     run.close()
     return CaseResult(rows=rows, notes=history.notes, status=status, failure=failure, **more)
@@ -176,17 +176,18 @@ class Journal:
         try:
             for value, mark in unsealed(path.read_bytes()):
                 if mark.records > 1:
-                    yield _result(value)
+                    yield CaseResult(**value)
                 elif differing := list(changes(self._identity, value)):
                     raise InputError(
                         f"holds the cases of another scene, where {told(differing)}", key="--out",
                         value=str(path.parents[2]), allowed="another folder, or --overwrite",
                     )  # fmt: skip
-        except InputError as error:
-            if error.key:
+        except (InputError, TypeError) as error:
+            if getattr(error, "key", None):
                 raise
+            problem = getattr(error, "problem", "was written by another patchlaw")
             raise InputError(
-                f"{error.problem}; remove it, and its cases are computed again", file=str(path)
+                f"{problem}; remove it, and its cases are computed again", file=str(path)
             ) from None
 
     def writer(self, part: tuple[int, int], rank: int) -> Callable[[CaseResult], None]:
@@ -283,24 +284,7 @@ def _read(
     return first, set().union(*held)
 
 
-def _result(value: dict[str, Any]) -> CaseResult:
-    """Return the result that a record holds."""
-    try:
-        return CaseResult(**value)
-    except TypeError:
-        raise InputError("was written by another patchlaw") from None
-
-
 def part_name(part: tuple[int, int]) -> str:
     """Return the name of a part of a study, the k-th of n, in the folder of its cases."""
     which, parts = part
     return f"{which}-of-{parts}"
-
-
-def place_in(comm: Any) -> tuple[int, int]:
-    """Return rank and size of a communicator."""
-    return (0, 1) if comm is None else (comm.rank, comm.size)
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from multiscale.figures import by_matplotlib
 from multiscale.results.history import COLUMNS, data_frame
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases
-from multiscale.studies.running import CaseResult, Journal, place_in, run_case, run_cases
-from support.collective import on_root, together
+from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from support.collective import on_root, place_in, together
 from support.errors import InputError
-from support.packages import optional_packages
 
 Array = NDArray[np.float64]
 
@@ -254,12 +254,9 @@ class SweepResults:
         Raises:
             InputError: When no case is finished, or they took different numbers of load steps.
         """
-        with optional_packages():
-            from multiscale.studies.figures import sweep_figure  # loads matplotlib
-
         if self.unfinished == len(self):
             raise InputError("no case is finished, so there is nothing to draw")
-        return sweep_figure(self)
+        return by_matplotlib("studies.figures.sweep_figure", self)
 
     def _columns(self, names: Sequence[str], results: Sequence[CaseResult | None]) -> Array:
         """Return columns of some cases, shape (cases, steps, columns), NaN where nothing is."""

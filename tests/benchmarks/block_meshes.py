@@ -15,16 +15,12 @@ import sys
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from helpers.mpi_environment import MPI_ENVIRONMENT
+
 ROOT = Path(__file__).parents[2]
-ENVIRONMENT = os.environ | {
-    "OMP_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "OMPI_MCA_btl": "^tcp",
-    "PYTHONPATH": str(ROOT),
-}
+ENVIRONMENT = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(ROOT)}
 PRODUCTS = 20
 REPEATS = 3
 

@@ -18,7 +18,7 @@ from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synt
 from macro import Material
 from micro import FreeSides, HalfSpaceModel
 from multiscale import CondensedLaws, LoadHistory, consistent_laws, load_steps
-from multiscale.bodies.block import BlockTerms
+from multiscale.bodies.face_terms import BlockTerms
 from multiscale.couplings.contact_solver import ContactSolver
 
 REPEATS = 5

@@ -24,7 +24,7 @@ import numpy as np
 from geometry import InputError, Spectrum, Surface, synthesise
 from geometry.rigid_plane import Control
 from multiscale import Run, Scene
-from multiscale.bodies.on_body import SLOPES, on_body
+from multiscale.bodies.bodies import SLOPES, on_body
 
 SCENES, MESHED, STEEP, HONED = 40, 4, 10, 4
 """Every so many scenes; honed ones are those that leave 1 when divided."""

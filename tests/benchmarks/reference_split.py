@@ -32,7 +32,7 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel
-from multiscale.bodies.block import BlockTerms
+from multiscale.bodies.face_terms import BlockTerms
 from multiscale.results.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)

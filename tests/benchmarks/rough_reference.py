@@ -26,7 +26,7 @@ from geometry import (
 )
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FiniteSlopes, FreeSides, HalfSpaceModel
-from multiscale.bodies.block import BlockTerms
+from multiscale.bodies.face_terms import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SPECTRUM = Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1)

@@ -16,15 +16,12 @@ import sys
 import time
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from helpers.mpi_environment import MPI_ENVIRONMENT
+
 ROOT = Path(__file__).parents[2]
-ENVIRONMENT = os.environ | {
-    "OMP_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_btl": "^tcp",
-    "PATCHLAW_CACHE": "off",
-    "PYTHONPATH": str(ROOT),
-}
+ENVIRONMENT = os.environ | MPI_ENVIRONMENT | {"PATCHLAW_CACHE": "off", "PYTHONPATH": str(ROOT)}
 ROWS = 33
 MPIRUN = ("mpirun", "-n")
 

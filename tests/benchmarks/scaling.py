@@ -19,19 +19,14 @@ from collections.abc import Callable
 from functools import cached_property
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
 import scaling_tables as tables
+from helpers.mpi_environment import MPI_ENVIRONMENT
 from scaling_model import Machine, observed
 
 HERE = Path(__file__).parent
-ENVIRONMENT = os.environ | {
-    "OMP_NUM_THREADS": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_rmaps_base_oversubscribe": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-    "OMPI_MCA_btl": "^tcp",
-    "PYTHONPATH": str(HERE.parents[1]),
-}
+ENVIRONMENT = os.environ | MPI_ENVIRONMENT | {"PYTHONPATH": str(HERE.parents[1])}
 Sizes = dict[str, object]
 
 

@@ -17,6 +17,7 @@ import argparse
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -24,7 +25,7 @@ from scaling_rank import INSIDE, PARTS, logged, stored
 from stream_triad import bandwidth
 
 from macro.linear_solvers.options import PREFIX
-from multiscale import ReferenceCoupling, Run, Scene
+from multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
 SCENE = Path(__file__).parents[2] / "demos" / "scenes" / "paper.toml"
@@ -171,8 +172,9 @@ def main() -> None:
     words += REFERENCE if choice.reference else ["coupling.newton=full"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
-    coupling = run.prepare()
-    finest = coupling.finest if isinstance(coupling, ReferenceCoupling) else coupling.face
+    run.prepare()
+    solver: Any = run.coupling.solver
+    finest = solver.finest if choice.reference else solver.face
     work = Work(finest.body.solver)
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())
     say(f"{work.unknowns} unknowns on {COMM.size} ranks, {work.grids} grids; memory gives {rates}")

@@ -88,8 +88,13 @@ def solve(folder, face, laws, control, crown=None):
         crown: Depth of the face at (x, y) [mm], by which its nodes are lowered; None: flat.
     """
     (folder / "block.inp").write_text("\n".join(_deck(face, laws, control, crown)) + "\n")
+    return _read(printed(folder, "block"))
+
+
+def printed(folder, deck):
+    """Run CalculiX on an input deck of a folder; return what it prints to the deck's file."""
     done = subprocess.run(
-        [PROGRAM, "-i", "block"],
+        [PROGRAM, "-i", deck],
         cwd=folder,
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         capture_output=True,
@@ -98,7 +103,7 @@ def solve(folder, face, laws, control, crown=None):
         check=False,
     )
     assert done.returncode == 0 and "*ERROR" not in done.stdout, done.stdout[-2000:]
-    return _read((folder / "block.dat").read_text())
+    return (folder / f"{deck}.dat").read_text()
 
 
 def _deck(face, laws, control, crown):

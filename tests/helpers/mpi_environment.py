@@ -9,3 +9,5 @@ MPI_ENVIRONMENT = {
     "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
     "OMPI_MCA_btl": "^tcp",
 }
+BESIDE_OTHERS = MPI_ENVIRONMENT | {"OMPI_MCA_mpi_yield_when_idle": "1"}
+"""The same where other ranks share the cores: those that wait leave them to who works."""

@@ -13,16 +13,16 @@ class OnRanks(dict):
     """What a script found, by the number of ranks.
 
     Args:
-        mpirun: Starts words on a number of ranks.
+        run: Runs words on a number of ranks.
         script: Name of a script in `tests/parallel`.
     """
 
-    def __init__(self, mpirun, script):
+    def __init__(self, run, script):
         super().__init__()
-        self._mpirun, self._script = mpirun, Path(__file__).parents[1] / "parallel" / script
+        self._run, self._script = run, Path(__file__).parents[1] / "parallel" / script
 
     def __missing__(self, ranks):
-        done = self._mpirun(ranks, self._script)
+        done = self._run(ranks, self._script)
         assert done.returncode == 0, done.stdout + done.stderr
         self[ranks] = json.loads(done.stdout.splitlines()[-1])
         return self[ranks]

@@ -34,6 +34,7 @@ class Case:
         tilt: Slopes of the plane.
         story: What the heights are.
         hardness: Hardness; None for elastic contacts.
+        tolerance: Relative tolerance of the tables of laws.
         free_tilt: Whether the plane turns without moment instead of keeping its slopes.
         units: Units that lengths and pressures are written in, with their size in mm and MPa;
             bare numbers without.
@@ -49,6 +50,7 @@ class Case:
     tilt: tuple
     story: str
     hardness: float | None = None
+    tolerance: float = 1e-3
     free_tilt: bool = False
     units: tuple = ()
 
@@ -91,13 +93,17 @@ class Case:
             "block": block,
             "patches": {"grid": list(self.patches)},
             "micro": dict(self.micro),
-            "coupling": {"kind": self.kind},
+            "coupling": {"kind": self.kind} | self._tables,
             "load": load,
             "output": {"check": "none"} | (output or {}),
         }
         if self.hardness is not None:
             data["micro"]["hardness"] = self._pressure(self.hardness)
         return run(Scene.from_dict(data))
+
+    @property
+    def _tables(self):
+        return {"table_tolerance": self.tolerance} if self.kind in KINDS[:2] else {}
 
     def mirrored(self):
         """Return the scene mirrored along x."""

@@ -10,7 +10,7 @@ from geometry import BlockShape, Control, Surface, reference_shapes
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel, HertzContact
 from micro.boundary_elements.body_modes import BodyPoints
-from multiscale.bodies.block import BlockTerms
+from multiscale.bodies.face_terms import BlockTerms
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 MODULUS = MATERIAL.contact_modulus

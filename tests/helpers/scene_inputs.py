@@ -8,7 +8,7 @@ import re
 import numpy as np
 from hypothesis import strategies as st
 
-from multiscale.couplings.cost import cost_statements, memory_parts
+from multiscale.couplings.cost import memory_parts
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
@@ -228,9 +228,9 @@ def planned(path, overrides=()):
         if takes_long(scene):
             return "not tried"
         setup = make_setup(scene)
-        made, cost = setup.work(), cost_statements(setup, 1e8, 1)
+        made, cost = setup.work(), setup.cost_statements(1e8, 1)
         told = [*(text for _, text in setup.statements(cost)), *setup.warnings()]
-        sizes = made.computing, *memory_parts(setup, made, 1e8).values()
+        sizes = made.computing, *memory_parts(setup, made, setup.memory_requests(), 1e8).values()
         assert all(np.isfinite(part) for part in sizes), told
     except InputError as error:
         told = str(error)

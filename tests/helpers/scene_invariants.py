@@ -9,7 +9,6 @@ TINY = 1e-6  # of the largest approach: just touched
 UNITS = ((("m", 1e3), ("GPa", 1e3)), (("um", 1e-3), ("Pa", 1e-6)))
 
 SHARED = 1e-6  # ellipses are shared among patches to 4e-7, and their cuts are other ones turned
-LAWS = 2e-3  # twice the tables' tolerance where two tables are compared
 
 
 class Found(NamedTuple):
@@ -164,6 +163,7 @@ def _stated(case):
     free sides, and few patches or a tilt want small bending.
     """
     cube = 0.5 <= case.block["height"] <= 2.0 and case.tilt == (0.0, 0.0)
+    laws = 2.0 * case.tolerance
     if case.micro["model"] == "half-space" and cube:
-        return LAWS + 0.003
-    return LAWS + (0.07 if min(case.patches) < 4 or case.micro["model"] != "half-space" else 0.02)
+        return laws + 0.003
+    return laws + (0.07 if min(case.patches) < 4 or case.micro["model"] != "half-space" else 0.02)

@@ -10,7 +10,7 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 
-QUICK = {"four_models", "kappa", "own_problem", "paper_figures"}
+QUICK = {"four_models", "own_problem", "paper_figures"}
 """Demos that take seconds; the others are among the long tests."""
 SLOW = {"compare"}
 """Demos that take minutes even in reduced size: some forty processes, each with its own imports."""
@@ -63,7 +63,7 @@ def test_demo_is_a_narrative_that_asserts_a_number(demo):
 
 
 @pytest.mark.long
-def test_demo_runs_under_mpi(mpirun, tmp_path):
-    done = mpirun(2, "demos/rough_block.py", "--quick", "--out", tmp_path)
+def test_demo_runs_under_mpi(waiting_ranks, tmp_path):
+    done = waiting_ranks(2, "demos/rough_block.py", "--quick", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("rough block  approach") == 1

@@ -55,15 +55,15 @@ FLOORS = {
         "figures machine",
         "laws loading",
         "exports results scene",
-        "inputs law_solvers",
+        "inputs",
         "bodies",
-        "measured_errors",
+        "law_solvers measured_errors",
         "couplings",
         "auto observers",
         "setup",
         "run",
         "doctor output restart",
-        "compiled_forms studies",
+        "studies",
         "cli",
         "__main__",
     ],
@@ -134,6 +134,21 @@ def test_no_module_needs_itself():
             names = {f"{node.module}.{alias.name}" for node in wanted for alias in node.names}
             needs[module] = ({node.module for node in wanted} | names) & set(modules)
     tuple(TopologicalSorter(needs).static_order())  # CycleError names a circle
+
+
+def test_only_the_dispatch_asks_which_coupling_a_scene_has():
+    """All others ask what a coupling has; rules between sections of a scene stand with these."""
+    for path in (ROOT / "multiscale").rglob("*.py"):
+        if path.name == "dispatch.py" or path.parent.name in ("scene", "studies"):
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            where = f"{path.name}: {ast.unparse(node)}"
+            if isinstance(node, ast.Compare):
+                parts = [one for one in ast.walk(node) if isinstance(one, ast.Attribute)]
+                kinds = [ast.unparse(one.value) for one in parts if one.attr == "kind"]
+                assert all(one.endswith("dtype") for one in kinds), where
+            elif isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
+                assert "Coupling" not in where, where
 
 
 def test_only_one_module_knows_dolfinx_releases():

@@ -22,9 +22,9 @@ def test_example_runs_and_prints_what_the_page_says():
     assert line == said.group(1)
 
 
-def test_example_runs_on_two_ranks(mpirun, tmp_path):
+def test_example_runs_on_two_ranks(waiting_ranks, tmp_path):
     script = tmp_path / "own.py"
     script.write_text(EXAMPLE, encoding="utf-8")
-    done = mpirun(2, script)
+    done = waiting_ranks(2, script)
     assert done.returncode == 0, done.stdout + done.stderr
     assert len(set(done.stdout.split("\n")) - {""}) == 1  # every rank prints the same

@@ -4,12 +4,9 @@ import json
 import sys
 from pathlib import Path
 
-import petsc4py
-
-petsc4py.init(["direct", *sys.argv[1:]])
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from helpers.user_problems import (  # noqa: E402
+from helpers.user_problems import (
     BOTTOM,
     HEXAHEDRA,
     PATCHES,
@@ -19,12 +16,13 @@ from helpers.user_problems import (  # noqa: E402
     box,
     marked,
 )
-from mpi4py import MPI  # noqa: E402
+from mpi4py import MPI
+from petsc4py import PETSc
 
-from geometry.face_frame import UPWARD  # noqa: E402
-from geometry.meshes.block import BlockShape  # noqa: E402
-from geometry.rigid_plane import Control  # noqa: E402
-from macro import (  # noqa: E402
+from geometry.face_frame import UPWARD
+from geometry.meshes.block import BlockShape
+from geometry.rigid_plane import Control
+from macro import (
     Block,
     LawContactProblem,
     LoadedFace,
@@ -36,37 +34,64 @@ from macro import (  # noqa: E402
     contact_facets,
 )
 
+CHOICES = {
+    "usual": {},
+    "mumps": {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
+    "lu": {"pc_type": "lu", "pc_factor_mat_solver_type": "mumps"},
+    "superlu": {
+        "ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "superlu_dist",
+    },
+    "bjacobi": {"pc_type": "bjacobi", "ksp_max_it": 9999},
+}  # fmt: skip
 COMM, MATERIAL = MPI.COMM_WORLD, Material(young_modulus=4000.0, poisson_ratio=0.3)
 LAWS = [PowerLaw(k, touch) for k, touch in ((9e5, 0.0), (3e5, 2e-3), (2e6, 1e-3), (6e5, 0.0))]
 
 
 def faces():
-    """Yield blocks and bodies, of linear and quadratic elements."""
+    """Yield blocks and bodies of linear and quadratic elements, laws by patches or at points."""
     for cell, name in ((TETRAHEDRA, "P"), (HEXAHEDRA, "Q")):
         for order in (1, 2):
+            cells = (5, 5, 3) if order == 1 else (3, 3, 2)
             shape = BlockShape(
-                interface=(1.0, 1.0), height=1.0, cells=(5, 5, 3), element=f"{name}{order}"
+                interface=(1.0, 1.0), height=1.0, cells=cells, element=f"{name}{order}"
             )
-            yield (
-                f"block {name}{order}",
-                LoadedFace.of_block(Block(block_mesh(shape, COMM), MATERIAL), PATCHES),
-            )
-            mesh = box(cells=(4, 4, 3), cell=cell, comm=COMM)
+            block = Block(block_mesh(shape, COMM), MATERIAL)
+            modes = ("patchwise", "pointwise") if name == "P" else ("pointwise", "patchwise")
+            yield f"block {name}{order}", LoadedFace.of_block(block, PATCHES), modes[0]
+            mesh = box(cells=(4, 4, 3) if order == 1 else (2, 2, 2), cell=cell, comm=COMM)
             tags = marked(mesh)
             body = MeshedBody(
                 TaggedMesh(mesh=mesh, facet_tags=tags), MATERIAL, [Support(tag=BOTTOM)], order=order
             )
             facets = contact_facets(mesh, tags.find(TOP), UPWARD)
-            yield f"body {name}{order}", LoadedFace(body, facets, PATCHES)
+            yield f"body {name}{order}", LoadedFace(body, facets, PATCHES), modes[1]
+
+
+def forces():
+    """Return the forces on all faces under an approach, and those of a plane that is free."""
+    found = {}
+    for name, face, mode in faces():
+        problem = LawContactProblem(face, LAWS, mode)
+        pressed = problem.solve(Control(approach=6e-3))
+        free = problem.solve(Control(force=4.0, tilt=None))
+        found[name] = [pressed.force, *pressed.patch_pressure, *free.patch_pressure]
+    return found
+
+
+def by_choice(choice):
+    """Return the forces by a solver that PETSc's options choose."""
+    options = PETSc.Options("patchlaw_")
+    for name, value in CHOICES[choice].items():
+        options[name] = value
+    try:
+        return forces()
+    finally:
+        for name in CHOICES[choice]:
+            options.delValue(name)
 
 
 if __name__ == "__main__":
-    found = {}
-    for kind, face in faces():
-        for mode in ("patchwise", "pointwise"):
-            problem = LawContactProblem(face, LAWS, mode)
-            pressed = problem.solve(Control(approach=6e-3))
-            free = problem.solve(Control(force=4.0, tilt=None))
-            found[f"{kind} {mode}"] = [pressed.force, *pressed.patch_pressure, *free.patch_pressure]
+    taken = ("usual", "mumps") if COMM.size == 1 else CHOICES.keys() - {"usual"}
+    result = {choice: by_choice(choice) for choice in sorted(taken)}
     if COMM.rank == 0:
-        sys.stdout.write(json.dumps(found) + "\n")
+        sys.stdout.write(json.dumps(result) + "\n")

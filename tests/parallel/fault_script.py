@@ -21,7 +21,7 @@ PLACES = {
     "surface": (sys.modules["multiscale.setup"], "on_root_alone"),
     "plan": (command.terminal, "show_plan"),
     "laws": (PatchLaws, "make_laws"),
-    "block": (PatchLaws, "_make_solver"),
+    "block": (PatchLaws, "_solver_of"),
     "load step": (CondensedLaws, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

@@ -84,7 +84,7 @@ def solved(block):
     return {
         "norm": found.norm(),
         "iterations": block.solver.its,
-        "preconditioner": block.solver.pc.getType(),
+        "preconditioner": block.solver.method,
     }
 
 

@@ -8,9 +8,9 @@ MODES = ["patchwise", "pointwise"]
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what was found on every number of ranks."""
-    return OnRanks(mpirun, "block_ranks_script.py")
+    return OnRanks(waiting_ranks, "block_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)

@@ -1,4 +1,4 @@
-"""A block's compliance in modes on 1, 2 and 3 ranks, solved for or from the cache, or failing."""
+"""A block's compliance in modes on 1 and 3 ranks, solved for or from the cache, or failing."""
 
 import json
 from pathlib import Path
@@ -9,11 +9,11 @@ SCRIPT = Path(__file__).with_name("body_ranks_script.py")
 
 
 @pytest.mark.long
-def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_path):
+def test_compliance_in_modes_is_the_same_on_any_ranks(waiting_ranks, monkeypatch, tmp_path):
     results = {}
-    for ranks in (1, 2, 3):
+    for ranks in (1, 3):
         monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / str(ranks)))
-        done = mpirun(ranks, SCRIPT)
+        done = waiting_ranks(ranks, SCRIPT)
         assert done.returncode == 0, done.stdout + done.stderr
         found = json.loads(done.stdout.splitlines()[-1])
         assert found["errors"] == ["no room"] * ranks
@@ -21,4 +21,4 @@ def test_compliance_in_modes_is_the_same_on_any_ranks(mpirun, monkeypatch, tmp_p
         assert len(list((tmp_path / str(ranks)).iterdir())) == 1
         assert results[ranks]["kept, first"] == results[ranks]["kept, again"]
     # whole families are solved by one rank each: to the last bit
-    assert results[1] == results[2] == results[3]
+    assert results[1] == results[3]

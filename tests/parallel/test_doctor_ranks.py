@@ -5,8 +5,8 @@ import json
 import pytest
 
 
-def test_doctor_tells_ranks_and_hosts_once(mpirun):
-    done = mpirun(2, "-m", "patchlaw", "doctor", "--json", timeout=100)
+def test_doctor_tells_ranks_and_hosts_once(waiting_ranks):
+    done = waiting_ranks(2, "-m", "patchlaw", "doctor", "--json", timeout=100)
     assert done.returncode == 0, done.stderr
     findings = {found["topic"]: found for found in json.loads(done.stdout)}
     assert findings["ranks"]["text"].startswith("2: 2 on ")

@@ -7,11 +7,11 @@ SCRIPT = "tests/parallel/four_ranks_script.py"
 
 
 @pytest.mark.long
-def test_four_ranks_give_what_one_gives(mpirun, tmp_path):
+def test_four_ranks_give_what_one_gives(waiting_ranks, tmp_path):
     found = {}
     for ranks in (1, 4):
         path = tmp_path / f"{ranks}.npz"
-        done = mpirun(ranks, SCRIPT, path)
+        done = waiting_ranks(ranks, SCRIPT, path)
         assert done.returncode == 0, done.stderr
         found[ranks] = dict(np.load(path))
     points = {ranks: numbers.pop("facet points") for ranks, numbers in found.items()}

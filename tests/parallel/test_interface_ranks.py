@@ -7,8 +7,8 @@ RANKS = [1, 2, pytest.param(3, marks=pytest.mark.long), pytest.param(4, marks=py
 
 
 @pytest.fixture(scope="module")
-def on_ranks(mpirun):
-    return OnRanks(mpirun, "interface_ranks_script.py")
+def on_ranks(waiting_ranks):
+    return OnRanks(waiting_ranks, "interface_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)

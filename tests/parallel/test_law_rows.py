@@ -5,9 +5,9 @@ from helpers.on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what every rank solved and the laws it got, by the number of ranks."""
-    return OnRanks(mpirun, "law_rows_script.py")
+    return OnRanks(waiting_ranks, "law_rows_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)

@@ -17,9 +17,9 @@ MORE = [2, *(pytest.param(ranks, marks=pytest.mark.long) for ranks in (3, 4))]
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what was found on every number of ranks."""
-    return OnRanks(mpirun, "mesh_ranks_script.py")
+    return OnRanks(waiting_ranks, "mesh_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", MORE)

@@ -6,8 +6,8 @@ from helpers.on_ranks import RANKS, OnRanks
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
-    return OnRanks(mpirun, "pair_ranks_script.py")
+def found(waiting_ranks):
+    return OnRanks(waiting_ranks, "pair_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", RANKS)

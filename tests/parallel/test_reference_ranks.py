@@ -44,7 +44,7 @@ def table(path, names):
         for name in SCENES
     ],
 )
-def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, ranks):
+def test_same_numbers_on_any_number_of_ranks(waiting_ranks, root, tmp_path, scene, ranks):
     path, text = tmp_path / "scene.toml", (root / PAPER).read_text(encoding="utf-8")
     if "load.tilt=free" in scene:
         text = text.replace('approach = "8 um"', 'force = "3 N"')
@@ -56,7 +56,7 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
         if count == 1:
             assert main(words) == 0
         else:
-            done = mpirun(count, "-m", "patchlaw", *words)
+            done = waiting_ranks(count, "-m", "patchlaw", *words)
             assert done.returncode == 0, done.stderr
         results.append([
             table(out / f"{name}.csv", columns)
@@ -71,11 +71,11 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, root, tmp_path, scene, rank
         assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
 
 
-def test_refusal_ends_all_ranks_with_one_message(mpirun, tmp_path):
+def test_refusal_ends_all_ranks_with_one_message(waiting_ranks, tmp_path):
     out = tmp_path / "out"
     low = "surface.spectrum.rms_slope=1.9", "block.height=0.2 mm"
     words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *low)
-    done = mpirun(2, *words, timeout=60)
+    done = waiting_ranks(2, *words, timeout=60)
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("patchlaw: ") == 1
     assert "valley of the roughness is too deep" in done.stderr

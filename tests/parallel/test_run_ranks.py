@@ -124,13 +124,16 @@ LONG = {
 }
 
 
-@pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize(
-    "scene", [pytest.param(name, marks=[pytest.mark.long] * (name in LONG)) for name in SCENES]
+    ("scene", "ranks"),
+    [
+        *((name, 2) for name in sorted(SCENES.keys() - LONG)),
+        *(pytest.param(name, 3, marks=pytest.mark.long) for name in SCENES),
+    ],
 )
-def test_same_numbers_on_any_number_of_ranks(mpirun, alone, tmp_path, scene, ranks):
+def test_same_numbers_on_any_number_of_ranks(waiting_ranks, alone, tmp_path, scene, ranks):
     words = ("-m", "patchlaw", "run", PAPER, "--out", tmp_path, "--set", *SMALL, *SCENES[scene])
-    done = mpirun(ranks, *words)
+    done = waiting_ranks(ranks, *words)
     assert done.returncode == 0, done.stderr
     for one, more in zip(alone(scene), numbers(tmp_path), strict=True):
         # residuals are driven to 1e-9 of the load; closures and pressures follow linearly
@@ -138,12 +141,13 @@ def test_same_numbers_on_any_number_of_ranks(mpirun, alone, tmp_path, scene, ran
 
 
 @pytest.mark.long
-def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
+def test_ranks_draw_the_figures_of_one(waiting_ranks, tmp_path):
     drawn = []
     for ranks in (1, 3):
         out = tmp_path / str(ranks)
         scene = ("coupling.kind=analytic", "output.figures=true")
-        done = mpirun(ranks, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        done = waiting_ranks(ranks, *words)
         assert done.returncode == 0, done.stderr
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
     assert set(drawn[0]) == {
@@ -153,16 +157,16 @@ def test_ranks_draw_the_figures_of_one(mpirun, tmp_path):
 
 
 @pytest.mark.long
-def test_a_rank_may_own_nothing_of_the_interface(mpirun):
+def test_a_rank_may_own_nothing_of_the_interface(waiting_ranks):
     """The premise of the wide block above: see that it holds."""
     code = (
         "from mpi4py import MPI; from multiscale import Run, Scene;"
         f"scene = Scene.load('{PAPER}', {SMALL + SCENES['wide block, tilted']});"
         "run = Run(scene, MPI.COMM_WORLD); list(run.load_steps());"
-        "counts = MPI.COMM_WORLD.gather(len(run.coupling._solver.face.quadrature.x));"
+        "counts = MPI.COMM_WORLD.gather(len(run.coupling.solver.face.quadrature.x));"
         "print('facet points', counts) if counts else None"
     )
-    done = mpirun(3, "-c", code)
+    done = waiting_ranks(3, "-c", code)
     assert "facet points" in done.stdout, done.stderr
     assert ", 0" in done.stdout or "[0" in done.stdout, done.stdout
 
@@ -201,9 +205,10 @@ def test_a_rank_may_own_nothing_of_the_interface(mpirun):
         ),
     ],
 )
-def test_wrong_input_ends_all_ranks_with_one_message(mpirun, tmp_path, override, text):
+def test_wrong_input_ends_all_ranks_with_one_message(waiting_ranks, tmp_path, override, text):
     out = tmp_path / "out"
-    done = mpirun(2, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", override, timeout=60)
+    words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", override)
+    done = waiting_ranks(2, *words, timeout=60)
     assert done.returncode == 2
     assert done.stderr.count("patchlaw: ") == 1
     assert text in done.stderr
@@ -269,7 +274,7 @@ def sorted_fields(folder):
 
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
-def test_fields_of_any_number_of_ranks(mpirun, tmp_path, ranks):
+def test_fields_of_any_number_of_ranks(waiting_ranks, tmp_path, ranks):
     scene = (
         "coupling.kind=concurrent", "micro.model=half-space", "block.cells=[8, 8, 5]",
         "output.fields=[1, 2]",
@@ -277,7 +282,8 @@ def test_fields_of_any_number_of_ranks(mpirun, tmp_path, ranks):
     found = []
     for count in (1, ranks):
         out = tmp_path / str(count)
-        done = mpirun(count, "-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
+        done = waiting_ranks(count, *words)
         assert done.returncode == 0, done.stderr
         found.append(sorted_fields(out))
     for name, values in found[0].items():

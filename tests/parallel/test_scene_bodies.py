@@ -9,13 +9,14 @@ from geometry import BlockShape
 
 
 @pytest.mark.long
-def test_bodies_of_scenes_on_one_to_four_ranks(mpirun, root, tmp_path):
+def test_bodies_of_scenes_on_one_to_four_ranks(waiting_ranks, root, tmp_path):
     x, y, z = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
     write_box(tmp_path / "cube.msh", (x, y, z))
     write_box(tmp_path / "above.msh", (x[::2], y, -z[::-1]))
     found = []
     for ranks in (1, 2, 4):
-        ended = mpirun(ranks, root / "tests/parallel/scene_body_script.py", tmp_path, timeout=900)
+        words = (root / "tests/parallel/scene_body_script.py", tmp_path)
+        ended = waiting_ranks(ranks, *words, timeout=900)
         assert ended.returncode == 0, ended.stderr
         found.append(json.loads(ended.stdout.splitlines()[-1]))
     for other in found[1:]:

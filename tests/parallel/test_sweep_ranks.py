@@ -35,10 +35,10 @@ def journals(out):
 
 
 @pytest.mark.parametrize("ranks", RANKS)
-def test_ranks_share_the_cases(mpirun, tmp_path, words, ranks):
+def test_ranks_share_the_cases(waiting_ranks, tmp_path, words, ranks):
     one, many = tmp_path / "one", tmp_path / "many"
     assert main([*words, "--out", str(one)]) == 0
-    done = mpirun(ranks, "-m", "multiscale", *words, "--out", str(many))
+    done = waiting_ranks(ranks, "-m", "multiscale", *words, "--out", str(many))
     assert done.returncode == 0, done.stderr
     assert tables(one) == tables(many)
     assert len(tables(one)[2]) > 10
@@ -47,17 +47,17 @@ def test_ranks_share_the_cases(mpirun, tmp_path, words, ranks):
 
 
 @pytest.mark.long
-def test_a_killed_sweep_goes_on_with_other_ranks(mpirun, tmp_path, words):
+def test_a_killed_sweep_goes_on_with_other_ranks(waiting_ranks, tmp_path, words):
     one, out = tmp_path / "one", tmp_path / "out"
     assert main([*words, "--out", str(one)]) == 0
-    assert mpirun(3, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    assert waiting_ranks(3, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
     first, second, third = journals(out)
     first.write_bytes(first.read_bytes()[:-30])  # as a kill leaves it
     second.write_bytes(second.read_bytes()[:20])  # not even its header is whole
     third.rename(third.with_name("rank-9.cases"))  # of a job with more ranks
     for table in out.glob("*.csv"):
         table.unlink()
-    assert mpirun(2, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
+    assert waiting_ranks(2, "-m", "multiscale", *words, "--out", str(out)).returncode == 0
     assert tables(out) == tables(one)
     kept = [mark for path in journals(out) for _, mark in unsealed(path.read_bytes())]
     assert len(kept) - len(journals(out)) == 7  # a head each, and no case is run twice

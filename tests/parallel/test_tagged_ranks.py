@@ -17,9 +17,9 @@ EXPECTED = {
 
 
 @pytest.fixture(scope="module")
-def found(mpirun):
+def found(waiting_ranks):
     """Return what was found on every number of ranks."""
-    return OnRanks(mpirun, "tagged_ranks_script.py")
+    return OnRanks(waiting_ranks, "tagged_ranks_script.py")
 
 
 @pytest.mark.parametrize("ranks", [1, *MORE])

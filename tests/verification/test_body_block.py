@@ -10,7 +10,7 @@ from geometry import BlockShape, PatchGrid
 from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
 from micro import FreeSides
 from micro.boundary_elements.body_modes import BodyPoints
-from multiscale.bodies.block import BlockTerms
+from multiscale.bodies.face_terms import BlockTerms
 
 COMM = MPI.COMM_SELF
 

@@ -88,11 +88,11 @@ def test_without_force_a_tilted_plane_touches_as_on_a_half_space(block):
     ("block", "way", "tilt", "patches"),
     [
         ("pancake", "decomposed", "tilted", 4),
-        ("cube", "decomposed", "level", 1),
-        ("cube", "decomposed", "tilted", 16),
+        pytest.param("cube", "decomposed", "level", 1, marks=pytest.mark.long),
+        ("cube", "decomposed", "tilted", 8),
         ("column", "decomposed", "tilted", 2),
-        ("cube", "finite-element", "tilted", 1),
-        ("cube", "finite-element", "level", 4),
+        pytest.param("cube", "finite-element", "tilted", 1, marks=pytest.mark.long),
+        pytest.param("cube", "finite-element", "level", 4, marks=pytest.mark.long),
     ],
 )
 def test_consistent_laws_find_the_contact_problem_again(root, block, way, tilt, patches):

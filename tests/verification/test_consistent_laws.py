@@ -44,7 +44,7 @@ def macro_force(table, distance):
 
 @pytest.mark.parametrize(
     ("name", "count"),
-    [("half-space", count) for count in (1, 2, 4, 8, 16)] + [("elliptic", 1), ("elliptic", 8)],
+    [("half-space", count) for count in (1, 4, 16)] + [("elliptic", 1), ("elliptic", 8)],
 )
 def test_force_of_the_whole_surface(name, count):
     surface = rough(1)
@@ -73,8 +73,7 @@ def test_no_more_rows_than_allowed():
     assert 1e-6 < more.force_error < 0.5 * few.force_error  # of 3e-3 and 4e-4
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize(("count", "allowed"), [(8, 0.03), (16, 0.01)])
+@pytest.mark.parametrize(("seed", "count", "allowed"), [(1, 8, 0.03), (2, 16, 0.01)])
 def test_tilted_plane(seed, count, allowed):
     """Laws of a level plane serve a plane tilted by 10 µm/mm: patches see little of the tilt."""
     # 8 × 8 cells to the smallest patch: with 4 × 4 the second seed misses by 1.1 % instead of 0.5 %
@@ -86,8 +85,9 @@ def test_tilted_plane(seed, count, allowed):
     assert macro_force(table, distance) == pytest.approx(force, rel=allowed)
 
 
-@pytest.mark.parametrize("count", [1, 2, 8])
-@pytest.mark.parametrize("name", ["half-space", "elliptic"])
+@pytest.mark.parametrize(
+    ("name", "count"), [("half-space", 1), ("half-space", 8), ("elliptic", 2), ("elliptic", 8)]
+)
 def test_laws_made_under_the_tilt(name, count):
     """They share the load as the tilted plane does: no patch is too large."""
     surface, tilt = rough(2), (10e-3, -4e-3)

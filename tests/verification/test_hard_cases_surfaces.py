@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.hard_cases import centred, from_file, history, scene
+from helpers.hard_cases import centred, coarse_tables, from_file, history, scene
 
 from geometry.files.reading import read_surface
 from geometry.filters import filled
@@ -24,12 +24,17 @@ SURFACES = {
 }
 
 
-@pytest.mark.parametrize("name", SURFACES)
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.long] * (n in ("step", "plateau"))) for n in SURFACES],
+)
 def test_couplings_agree_on_surfaces_that_are_not_smooth(name, tmp_path):
     # hard: whole flat regions touch at once, or a single cell carries all
     surface = from_file(tmp_path, SURFACES[name])
     found = {
-        kind: history(coupling__kind=kind, micro__finite_slopes=False, **surface)
+        kind: history(
+            coupling__kind=kind, micro__finite_slopes=False, **surface, **coarse_tables(kind)
+        )
         for kind in ("isolated", "consistent", "concurrent")
     }
     force = found["concurrent"].force_N[-1]
@@ -61,20 +66,18 @@ def test_a_flat_patch_alone_needs_the_condensed_newton(tmp_path):
     assert not any("not full" in note for note in asked.notes)
 
 
-def test_full_contact_is_as_stiff_as_a_flat_surface(tmp_path):
-    # hard: the law saturates; beyond full contact only the block yields
+@pytest.mark.parametrize("kind", ["concurrent", pytest.param("consistent", marks=pytest.mark.long)])
+def test_full_contact_is_as_stiff_as_a_flat_surface(kind, tmp_path):
+    # hard: the law saturates; beyond full contact only the block is compressed
     flat = from_file(tmp_path, np.zeros((16, 16)))
-    for kind in ("consistent", "concurrent"):
-        load = {
-            "coupling__kind": kind,
-            "block__height": "3 mm",
-            "patches__grid": [2, 2],
-            "load__approach": ["2 mm", "2.2 mm"],
-        }
-        rough, even = (history(**load, **one) for one in ({"surface__grid": [16, 16]}, flat))
-        stiffness = [float(np.diff(one.force_N)[0]) for one in (rough, even)]
-        assert rough.contact_area_fraction[-1] > 0.95
-        assert stiffness[0] == pytest.approx(stiffness[1], rel=5e-3)
+    load = {
+        "coupling__kind": kind, "block__height": "3 mm", "patches__grid": [2, 2],
+        "load__approach": ["2 mm", "2.2 mm"],
+    }  # fmt: skip
+    rough, even = (history(**load, **one) for one in ({"surface__grid": [16, 16]}, flat))
+    stiffness = [float(np.diff(one.force_N)[0]) for one in (rough, even)]
+    assert rough.contact_area_fraction[-1] > 0.95
+    assert stiffness[0] == pytest.approx(stiffness[1], rel=5e-3)
 
 
 def test_patches_with_nothing_in_them(tmp_path):

@@ -135,8 +135,12 @@ def test_yielding_does_not_depend_on_the_digits_of_hardness_and_modulus():
     """In units of E*, where nothing is left to round, the same cells yield to the same depth."""
     dice = np.random.default_rng(28)
     surface = Surface(heights=dice.standard_normal((4, 4)), lengths=(1.0, 1.0))
-    rounded_down = 0
-    for modulus, hardness in 10.0 ** dice.uniform((3.0, 0.0), (6.0, 3.0), (1000, 2)):
+    drawn = 10.0 ** dice.uniform((3.0, 0.0), (6.0, 3.0), (1000, 2))
+    back = drawn[:, 1] / drawn[:, 0] * drawn[:, 0]
+    # a comparison of products would miss those that are rounded down
+    chosen = [np.flatnonzero(way)[:20] for way in (back < drawn[:, 1], back >= drawn[:, 1])]
+    assert [len(some) for some in chosen] == [20, 20]
+    for modulus, hardness in drawn[np.concatenate(chosen)]:
         given = {"highest": surface.heights.max(), "hardness": hardness / modulus}
         alike = HalfSpaceModel(surface, contact_modulus=1.0, **given).press(Control(approach=2.0))
         given["hardness"] = hardness
@@ -150,8 +154,6 @@ def test_yielding_does_not_depend_on_the_digits_of_hardness_and_modulus():
         # the same numbers in the solver, but for the last digit of the bound
         np.testing.assert_allclose(state.plastic_depth, alike.plastic_depth, rtol=1e-9)
         assert state.plastic_work == pytest.approx(modulus * alike.plastic_work, rel=1e-9)
-        rounded_down += hardness / modulus * modulus < hardness
-    assert rounded_down > 20  # a comparison of products would have missed these
 
 
 def test_unloading_where_rounding_hid_the_hardness():
@@ -210,7 +212,10 @@ def test_stiffness_of_a_sphere_that_yields_is_that_of_full_plasticity():
     assert found.error < 0.7 * found.value  # eight cells of a circle come at a time
 
 
-@pytest.mark.parametrize(("hardness", "cells"), [(100.0, 64), (400.0, 64), (400.0, 128)])
+@pytest.mark.parametrize(
+    ("hardness", "cells"),
+    [(100.0, 64), (400.0, 64), pytest.param(400.0, 128, marks=pytest.mark.long)],
+)
 def test_stiffness_while_yielding_is_within_its_error(hardness, cells):
     """Against the slope of a parabola through forces from 15 % below to 15 % above."""
     worst = []
@@ -250,10 +255,9 @@ def test_stiffness_back_at_the_turning_point_is_elastic(by_force):
     assert found.value == pytest.approx((state.force - below.force) / step, rel=1e-5)
 
 
-@pytest.mark.parametrize("seed", [5, 6])
 @pytest.mark.parametrize("hardness", [None, 100.0, 400.0])
-def test_work_of_a_first_step_is_that_of_many(seed, hardness):
-    surface, ends = rough(seed, 48), []
+def test_work_of_a_first_step_is_that_of_many(hardness):
+    surface, ends = rough(5, 48), []
     for count in (1, 64):
         coupling = ContactSolver(model(surface, hardness), WHOLE, patch_means(surface, WHOLE))
         history, before = LoadHistory(approach=(8e-3,), steps=count), None

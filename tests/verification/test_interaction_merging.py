@@ -47,10 +47,15 @@ def curve(case, name, approaches):
     return respond(model, approaches, patches=PATCHES, mean_heights=np.zeros(16))
 
 
-@both_shapes
-@every_case
+@pytest.mark.parametrize(
+    ("case", "name"),
+    [
+        *((case, "elliptic") for case in CASES),
+        *((case, "circular") for case in ("two unequal", "hexagon", "coincident", "cluster")),
+    ],
+)
 def test_force_grows_without_a_jump(case, name):
-    approaches = np.linspace(0.0, 0.1, 201)
+    approaches = np.linspace(0.0, 0.1, 101)
     response = curve(case, name, approaches)
     assert response.overlapping_contacts[-1] > 0 and response.residual.max() <= 1e-10
     increments = np.diff(response.force)

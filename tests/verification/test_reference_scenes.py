@@ -1,6 +1,7 @@
 """The meshed rough block where it is hard: scenes on coarse meshes, and nearly incompressible."""
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 import pytest
@@ -64,8 +65,14 @@ def depths(block, surface, state):
     return plane - gap + state.displacement[top.dofs]
 
 
-@pytest.mark.parametrize("options", MESHES.values(), ids=MESHES)
-@pytest.mark.parametrize("case", CASES.values(), ids=CASES)
+@pytest.mark.parametrize(
+    ("case", "options"),
+    [
+        pytest.param(CASES[name], MESHES[mesh], id=f"{name}-{mesh}")
+        for name, mesh in product(CASES, MESHES)
+        if (name, mesh) != ("set 2", "hexahedra")  # as the tilted one
+    ],
+)
 def test_active_sets_meet_the_conditions(case, options):
     block, surface, states = curve(case, options)
     for state in states:
@@ -86,7 +93,10 @@ def test_active_sets_meet_the_conditions(case, options):
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(name, marks=[pytest.mark.long] * (name == "nu 0.49")) for name in CASES],
+    [
+        pytest.param(name, marks=[pytest.mark.long] * (name in ("nu 0.49", "set 2", "merged")))
+        for name in CASES
+    ],
 )
 def test_points_converge_where_nodes_do(name):
     """The wide spectrum on quadratic facets; on coarse linear ones summits between points hide."""

@@ -141,7 +141,7 @@ def test_measured_parts_are_mirrored():
     Near full contact the law knows little of what sample it came from, and all of its steps.
     """
     spectrum = Spectrum(hurst=0.8, waves=(4, 12), rms_slope=0.1, seed=1)
-    whole = synthesise(spectrum, grid=(64, 64), lengths=(2.0, 2.0))
+    whole = synthesise(spectrum, grid=(48, 48), lengths=(2.0, 2.0))
     quarters = [
         Surface(heights=part, lengths=(1.0, 1.0))
         for half in np.split(whole.heights, 2)

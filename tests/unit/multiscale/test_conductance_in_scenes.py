@@ -15,6 +15,7 @@ from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_
 from multiscale.results.reading import read_history
 from support.errors import InputError
 
+LAWS = ("isolated", "consistent")
 HEAT = {"conductivity": ["50 W/m/K", "0.2 W/m/K"]}
 PAIR = 1.0 / (1.0 / 50.0 + 1.0 / 0.2)
 GAPS = {"gas": "0.026 W/m/K", "temperature": "350 K", "emissivity": 0.4}
@@ -26,7 +27,7 @@ def scene(kind="analytic", conductance=HEAT, **sections):
         "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
         "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
         "patches": {"grid": [2, 2]},
-        "coupling": {"kind": kind},
+        "coupling": {"kind": kind} | ({"table_tolerance": 0.01} if kind in LAWS else {}),
         "load": {"approach": 0.008, "steps": 2},
         "output": {"check": "none", "figures": False, "report": False, "contact": "none"},
     }

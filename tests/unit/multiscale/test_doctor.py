@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from multiscale import compiled_forms, doctor
+from multiscale import doctor
 from multiscale.cli import doctor as command
 from multiscale.cli.command_line import main
 from multiscale.doctor import CheckResult, examine
@@ -143,11 +143,11 @@ def test_the_worst_result_of_all_ranks_counts():
 
 
 def test_left_lock_fails_and_names_the_command(tmp_path):
-    assert compiled_forms.form_cache(None, tmp_path).state == "ok"
+    assert doctor.form_cache(None, tmp_path).state == "ok"
     left = tmp_path / "libffcx_forms_1.c"
     left.touch()
     os.utime(left, (0, 0))
-    found = compiled_forms.form_cache(None, tmp_path)
+    found = doctor.form_cache(None, tmp_path)
     assert (found.state, "patchlaw warm" in found.remedy) == ("fail", True)
 
 
@@ -157,11 +157,11 @@ def test_cache_that_may_not_be_entered_is_a_warning(monkeypatch, tmp_path):
 
     monkeypatch.setattr(Path, "exists", refused)
     monkeypatch.setattr(Path, "glob", refused)
-    found = compiled_forms.form_cache(None, tmp_path)
+    found = doctor.form_cache(None, tmp_path)
     assert (found.state, "XDG_CACHE_HOME" in found.remedy) == ("warning", True)
 
 
 def test_compiler_that_is_missing_is_a_warning(monkeypatch, tmp_path):
     monkeypatch.setenv("CC", "no-such-compiler")
-    found = compiled_forms.form_cache(None, tmp_path)
+    found = doctor.form_cache(None, tmp_path)
     assert (found.state, "patchlaw warm" in found.remedy) == ("warning", True)

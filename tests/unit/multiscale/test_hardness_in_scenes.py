@@ -10,7 +10,7 @@ from geometry import Control
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, make_setup, run, sweep
 from multiscale.loading.energy import BALANCE, missing_energy
-from multiscale.observers.fields import FieldRecorder
+from multiscale.observers.step_observers import FieldRecorder
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
@@ -118,10 +118,10 @@ def test_fields_of_a_resumed_run_are_those_of_the_whole_path():
     steps = list(whole.load_steps())
     coupling, kept = whole.coupling, whole.fields.kept
     again = FieldRecorder(coupling)
-    start, latest = coupling.past
+    start, latest = coupling.solver.past
     again._complete(steps)
-    assert coupling.past[0] is start
-    assert coupling.past[1] is latest
+    assert coupling.solver.past[0] is start
+    assert coupling.solver.past[1] is latest
     assert again.kept.keys() == kept.keys()
     for step, pressures in again.kept.items():
         np.testing.assert_allclose(pressures, kept[step], atol=1e-6 * HARDNESS)

@@ -13,6 +13,7 @@ from mpi4py import MPI
 from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.couplings.dispatch import coupling_class
+from multiscale.inputs import memory
 from multiscale.inputs.memory import body_request, shortage_warnings
 from multiscale.machine import (
     ClusterNodes,
@@ -37,7 +38,7 @@ def requests(given):
 
 
 def check_memory(given, nodes):
-    coupling_class(given).check_memory(given, nodes)
+    memory.check_memory(given, nodes, requests(given))
 
 
 def of(count, *, ranks=1, memory=64.0):
@@ -257,7 +258,7 @@ def test_memory_that_runs_out_ends_with_5(capsys, monkeypatch):
     def hungry(*given):
         np.empty(1 << 50)
 
-    monkeypatch.setattr("multiscale.cli.describe.print_schema", hungry)
+    monkeypatch.setattr("multiscale.cli.keys.print_schema", hungry)
     assert main(["schema"]) == 5
     assert "patchlaw: memory ran out: Unable to allocate 8.00 PiB" in capsys.readouterr().err
 

@@ -16,7 +16,6 @@ from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
-from multiscale.couplings.cost import cost_statements
 from multiscale.output.results import write_results
 from multiscale.results.contact_record import ContactRecord
 
@@ -41,7 +40,7 @@ def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
     lines = [f"{name} = {_toml(section)}" for name, section in given.items()]
     scene = tmp_path / "scene.toml"
     scene.write_text("\n".join(lines))
-    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command == "run" else [])]
+    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command != "plan" else [])]
     code = (
         "import json, sys\nfrom multiscale.cli.command_line import main\n"
         f"code = main({words!r})\n"
@@ -69,7 +68,7 @@ def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(tmp_path,
 
 def test_figures_load_the_pictures_that_others_do_without(tmp_path):
     """The witness of the test above can fail."""
-    assert "matplotlib" in loaded(tmp_path, "run", data(output={"report": False}))
+    assert "matplotlib" in loaded(tmp_path, "surface", data())
 
 
 def never(*given, **options):
@@ -116,11 +115,11 @@ def test_a_plan_solves_nothing_of_the_scene(monkeypatch, kind, load):
     if kind != "isolated" or load == "approach":
         monkeypatch.setattr(HalfSpaceModel, "press", never)
     monkeypatch.setattr("multiscale.bodies.bodies.Bodies.contact_face", never)
-    monkeypatch.setattr("multiscale.bodies.block.BlockTerms.face", never)
+    monkeypatch.setattr("multiscale.bodies.face_terms.BlockTerms.face", never)
     monkeypatch.setattr("multiscale.couplings.micro_coupling.on_body", never)
     monkeypatch.setattr("multiscale.couplings.law_coupling.LawCoupling.make_laws", never)
     setup = make_setup(Scene.from_dict(data(kind, grid=128, load=LOADS[load])))
-    said = dict(setup.statements(cost_statements(setup, 1e8, 1)))
+    said = dict(setup.statements(setup.cost_statements(1e8, 1)))
     assert {"work", "cost", "load", "coupling", "contact"} <= set(said)
     assert all(isinstance(text, str) for text in setup.warnings())
 

@@ -138,9 +138,10 @@ def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
     basis = DisplacementBasis(pressed.equilibrium, interface.patchwise, size=3)
     stiffness = interface.body.stiffness
     loads = [interface.load(pressures) for pressures in np.eye(4)]
-    for load in (*loads, loads[-1]):
+    pressures = [*np.eye(4), np.eye(4)[-1]]
+    for load, pressure in zip((*loads, loads[-1]), pressures, strict=True):
         load.array[:] = interface.body.solve(load.copy()).x.array
-        basis.add(load)
+        basis.add(load, pressure[interface.patchwise.patch])
         vectors = [load.duplicate() for _ in basis.vectors]
         for vector, values in zip(vectors, basis.vectors, strict=True):
             vector.array[:] = values

@@ -213,6 +213,7 @@ def resident():
         return int(file.read().split()[1]) * 4096
 
 
+@pytest.mark.long
 def test_two_hundred_of_everything_leave_no_memory_behind():
     """A vector of the space has 24 kB, its matrix 1.4 MB, its factors 10 MB."""
     mesh = box(cells=(9, 9, 9))

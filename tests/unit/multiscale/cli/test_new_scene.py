@@ -6,7 +6,7 @@ import pytest
 
 from geometry import Control, Material, Spectrum, synthesise
 from micro import HalfSpaceModel
-from multiscale.cli.new_scene import (
+from multiscale.cli.init import (
     CONTACT_AREA,
     START,
     SYNTHESISED,

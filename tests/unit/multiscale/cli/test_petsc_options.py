@@ -8,6 +8,7 @@ import pytest
 
 SMALL = [
     "surface.grid=[64, 64]", "block.cells=[8, 8, 4]", "load.steps=2", "output.figures=false",
+    "output.report=false",
 ]  # fmt: skip
 
 

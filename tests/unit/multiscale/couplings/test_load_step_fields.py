@@ -95,7 +95,13 @@ def test_contacts_load_the_face_where_they_are(tmp_path):
     np.testing.assert_allclose(shown, np.sort(blocks.ravel()), atol=1e-9 * blocks.max())
 
 
-@pytest.mark.parametrize("name", ["half-space", "laws on the mesh", "laws, condensed", "reference"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "half-space", "laws on the mesh", "reference",
+        pytest.param("laws, condensed", marks=pytest.mark.long),
+    ],
+)  # fmt: skip
 def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
     more = (*COUPLINGS[name], "output.fields=[1, 3]")
     first = Run(scene(*more))

@@ -12,9 +12,8 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from micro.complementarity import solver
 from multiscale import Run, Scene, make_setup
-from multiscale.couplings import patch_laws, work
-from multiscale.couplings.cost import cost_statements, magnitude, memory_parts
-from multiscale.couplings.work import SOLUTIONS_OF_LAWS
+from multiscale.couplings import cost, patch_laws
+from multiscale.couplings.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
@@ -105,7 +104,7 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     list(run.load_steps())
     counted = run.coupling.work()
     assert counted.unknowns == (run.unknowns or counted.unknowns)
-    cycles = counted.cycles / counted.unknowns - work.SET_UP_CYCLES
+    cycles = counted.cycles / counted.unknowns - cost.SET_UP_CYCLES
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step
         assert cycles == patch_laws._CYCLES_PER_PATCH * 16
@@ -140,13 +139,15 @@ def test_steps_that_may_be_halved_are_counted():
 def test_the_plan_says_work_order_of_time_and_the_largest_part_of_the_memory():
     flat = {"model": "half-space", "finite_slopes": False}
     coupling = make_setup(scene(grid=512, cells=(4, 4, 4), micro=flat))
-    said = dict(cost_statements(coupling, 1e6, 1))
+    said = dict(coupling.cost_statements(1e6, 1))
     # 4 load steps of 30 products each on 512² cells
     assert "about 4 contact problems, on 262144 cells each: 31 million cells" in said["work"]
     assert "of the order of 3 s" in said["cost"]
     assert "most of it for the" in said["cost"]
     meshed = make_setup(scene(coupling={"kind": "consistent", "compliance": "finite-element"}))
-    assert memory_parts(meshed, meshed.work(), 1e6)["meshes and laws"] > 0.0
+    assert (
+        memory_parts(meshed, meshed.work(), meshed.memory_requests(), 1e6)["meshes and laws"] > 0.0
+    )
     assert f"{SOLUTIONS_OF_LAWS} of them rows of laws" in dict(meshed.work().statements())["work"]
 
 

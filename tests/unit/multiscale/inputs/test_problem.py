@@ -7,8 +7,7 @@ import pytest
 
 from geometry import InputError
 from multiscale import Scene, make_setup, run
-from multiscale.couplings.contact_solver import ContactSolver
-from multiscale.couplings.estimate import plane_at_largest_load
+from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from support.errors import NotConverged
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -19,11 +18,13 @@ PEAKS = {"hurst": 0.8, "waves": [2, 16], "rms_slope": 0.2, "seed": 2}
 def scene(seed=1, coupling="consistent", **load):
     small = [f"surface.spectrum.seed={seed}", "surface.grid=[33, 33]", "block.cells=[8, 8, 6]"]
     models = ["micro.model=half-space", f"coupling.kind={coupling}"]
+    if coupling != "concurrent":
+        models.append("coupling.table_tolerance=0.01")
     data = Scene.load(PAPER, [*small, *models]).to_dict()
     return Scene.from_dict(data | {"load": {"steps": 1} | load})
 
 
-@pytest.mark.parametrize(("seed", "coupling"), [(1, "isolated"), (3, "isolated")])
+@pytest.mark.parametrize(("seed", "coupling"), [(3, "isolated")])
 def test_small_force_on_the_lower_side_of_a_tilted_plane(seed, coupling):
     asked = scene(seed, coupling, force=5e-3, tilt=[0.01, 0.01])
     setup = make_setup(asked)

@@ -28,11 +28,19 @@ def scene(*overrides, **load):
     return Scene.from_dict(data)
 
 
-@pytest.mark.parametrize("load", FORCES.values(), ids=FORCES)
-@pytest.mark.parametrize("tilt", LOADS.values(), ids=LOADS)
+@pytest.mark.parametrize(
+    ("tilt", "load"),
+    [
+        pytest.param(LOADS[tilt], FORCES[load], id=f"{tilt}-{load}")
+        for tilt, load in (
+            ("level", "approach"), ("tilted", "force"), ("free", "approach"), ("free", "force"),
+        )
+    ],
+)  # fmt: skip
 def test_both_newtons_find_the_same_equilibrium(tilt, load):
+    small = ["block.cells=[4, 4, 3]", "load.steps=2", *tilt]
     full, condensed = (
-        run(scene(*tilt, f"coupling.newton={newton}", **load)) for newton in ("full", "condensed")
+        run(scene(*small, f"coupling.newton={newton}", **load)) for newton in ("full", "condensed")
     )
     # residuals of the mesh are driven to 1e-10 of the load, its solver for the compliance alike
     force = full.force_N.max()
@@ -51,7 +59,7 @@ def test_both_newtons_find_the_same_equilibrium(tilt, load):
         one, other = getattr(condensed, name)[loaded], getattr(full, name)[loaded]
         np.testing.assert_allclose(one, other, rtol=1e-7, atol=1e-12)  # Hertz: δ ~ P^(2/3), twice
     if "force" in load:
-        np.testing.assert_allclose(condensed.force_N, [2 / 3, 4 / 3, 2.0], rtol=1e-11)
+        np.testing.assert_allclose(condensed.force_N, [1.0, 2.0], rtol=1e-11)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 from geometry import InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.law_solvers.free_plane import FreePlaneLaws
+from multiscale.law_solvers.condensed import FreePlaneLaws
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw

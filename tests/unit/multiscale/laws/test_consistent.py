@@ -9,8 +9,7 @@ from helpers.along import respond
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import influence_matrix, micro_model
-from multiscale.law_solvers.condensed import CondensedLaws
-from multiscale.law_solvers.free_plane import FreePlaneLaws
+from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
 from multiscale.laws.consistent import WholeSurface, consistent_laws
 
 MODULUS = 4000.0

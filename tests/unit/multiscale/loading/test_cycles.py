@@ -18,7 +18,7 @@ CONTROLS = {
 COUPLINGS = {
     "analytic": {"coupling": {"kind": "analytic"}},
     "asperities": {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}},
-    "isolated": {"coupling": {"kind": "isolated"}},
+    "isolated": {"coupling": {"kind": "isolated", "table_tolerance": 0.01}},
     "consistent": {"coupling": {"kind": "consistent", "table_tolerance": 0.01}},
     "concurrent": {"coupling": {"kind": "concurrent"}},
     "reference": {
@@ -43,7 +43,7 @@ CASES = [
 def test_a_cycle_repeats_the_one_before(changes, load):
     data = tomllib.loads(SMALL_SCENE)
     data["block"]["cells"] = [4, 4, 3]
-    data["load"] = load | {"steps": 2, "cycles": 2}
+    data["load"] = load | {"steps": 1, "cycles": 2}
     for name, section in changes.items():
         data[name] = data.get(name, {}) | section
     if "law" in changes:
@@ -51,8 +51,8 @@ def test_a_cycle_repeats_the_one_before(changes, load):
         for name in ("coupling", "patches"):
             data.pop(name, None)
     history = run(Scene.from_dict(data))
-    assert len(history) == 8
+    assert len(history) == 4
     for name in ("force_N", "approach_mm", "contact_area_fraction"):
         values = getattr(history, name)
         # elastic: unloading follows loading; iterations end at 1e-8 of the load
-        np.testing.assert_allclose(values[[5, 7]], values[[1, 3]], rtol=1e-6)
+        np.testing.assert_allclose(values[2:], values[:2], rtol=1e-6)

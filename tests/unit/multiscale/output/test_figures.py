@@ -77,8 +77,9 @@ def test_surface_is_shown_with_heights_spectrum_and_bearing_ratio():
     surface = synthesise(spectrum, grid=(64, 64), lengths=(1.0, 1.0))
     whole = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
     _, heights, spectral, bearing = surface_figure(surface, None, whole, spectrum).axes
-    bars = heights.patches
-    assert sum(bar.get_height() * bar.get_width() for bar in bars) == pytest.approx(1.0)
+    (bars,) = heights.patches
+    shares, edges, _ = bars.get_data()
+    assert (shares * np.diff(edges)).sum() == pytest.approx(1.0)
     normal = heights.get_lines()[0]
     h, share = normal.get_data()
     assert np.sum(share) * (h[1] - h[0]) == pytest.approx(1.0, abs=0.02)

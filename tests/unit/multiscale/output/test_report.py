@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from multiscale.output.provenance import provenance
 from multiscale.output.report import citations, report_html
 from multiscale.readable import percent, quantity
 from multiscale.results.html_page import filled, table_html
@@ -125,7 +126,7 @@ def test_every_coupling_has_a_readable_report(words, force):
     run = Run(Scene.load(PAPER, [*SMALL, *words]))
     list(run.load_steps())
     run.finish()
-    page = parsed(report_html(run, {}, options=["-ksp_rtol", "1e-9"]))
+    page = parsed(report_html(run, {}, provenance(run, options=["-ksp_rtol", "1e-9"])))
     names = page.text[page.text.index("force") :]
     assert re.fullmatch(force, names[1])
     assert {"approach", "real contact area", "mean pressure"} <= set(names)

@@ -39,7 +39,7 @@ COUPLINGS = {
     | {"load": {"approach": "8 um", "steps": 2, "force_change": 0.4}},
     "consistent laws": CUBE
     | {"surface": {"grid": [32, 32]}, "micro": {"model": "half-space"}}
-    | {"coupling": {"kind": "consistent", "table_tolerance": 0.01}},
+    | {"coupling": {"kind": "consistent", "table_tolerance": 0.05}},
     "concurrent": CUBE
     | {"surface": {"grid": [72, 72]}, "coupling": {"kind": "concurrent"}}
     | {"micro": {"model": "half-space"}},
@@ -442,7 +442,8 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     """The limit on the size of files stands for a disk that is full."""
     out = tmp_path / "out"
     words = [*WORDS[:2], "--out", str(out), "--resume", *WORDS[2:]]
-    words[words.index("output.figures=false")] = "output.contact=none"  # which is larger than 40 kB
+    if file.endswith("png"):
+        words[words.index("output.figures=false")] = "output.contact=none"  # larger than 40 kB
     done = subprocess.run(
         [sys.executable, "-c", LIMITED, str(size), *words],
         capture_output=True,
@@ -456,7 +457,7 @@ def test_run_on_a_full_disk_ends_with_5_and_goes_on(capsys, tmp_path, size, file
     assert kept == (left | kept_of_run if left else set())
     assert main(words) == 0
     assert ("goes on after load step 2" in capsys.readouterr().out) == bool(left)
-    assert (out / "surface.png").exists()
+    assert (out / "history.csv").exists() and (out / "surface.png").exists() == bool(left)
     assert not list(out.glob("checkpoint*"))
 
 

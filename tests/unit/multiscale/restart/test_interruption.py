@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from multiscale import Run
-from multiscale.cli import describe
+from multiscale.cli import keys
 from multiscale.cli.command_line import main
 from multiscale.restart.interruption import Ended, Stopped, signals_raise, watching
 from support.errors import InputError
@@ -170,7 +170,7 @@ def test_what_is_told_to_end_clears_away(number):
 
 HUNG_UP = """
 import os, signal, sys
-from multiscale.cli import command_line, describe
+from multiscale.cli import command_line, keys
 
 def hung_up(choice, options, comm):
     import macro
@@ -178,7 +178,7 @@ def hung_up(choice, options, comm):
     os.kill(os.getpid(), signal.SIGHUP)
     print("went on")
 
-describe.print_schema = hung_up
+keys.print_schema = hung_up
 sys.exit(command_line.main(["schema"]))
 """
 
@@ -192,7 +192,7 @@ def test_petsc_does_not_take_the_signals(root):
 
 TOLD_WHILE_IMPORTING = """
 import os, signal, sys
-from multiscale.cli import command_line, describe
+from multiscale.cli import command_line, keys
 
 def importing(choice, options, comm):
     def told(event, arguments):
@@ -203,12 +203,18 @@ def importing(choice, options, comm):
     import macro
     print("went on")
 
-describe.print_schema = importing
+keys.print_schema = importing
 sys.exit(command_line.main(["schema"]))
 """
 
 
-@pytest.mark.parametrize("module", ["dolfinx.cpp", "basix._basixcpp", "petsc4py.PETSc", "cffi.api"])
+@pytest.mark.parametrize(
+    "module",
+    [
+        "dolfinx.cpp", "petsc4py.PETSc",
+        *(pytest.param(name, marks=pytest.mark.long) for name in ("basix._basixcpp", "cffi.api")),
+    ],
+)  # fmt: skip
 def test_a_signal_while_finite_elements_are_imported_ends_with_its_code(root, module):
     """Compiled modules turn what interrupts their import into an ImportError of their own."""
     done = subprocess.run(
@@ -225,10 +231,10 @@ def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, cap
         except KeyboardInterrupt:
             raise ImportError("initialization failed", name="dolfinx") from None
 
-    monkeypatch.setattr(describe, "print_schema", converted)
+    monkeypatch.setattr(keys, "print_schema", converted)
     assert main(["schema"]) == 143
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(describe, "print_schema", lambda *_: 1 / 0)
+    monkeypatch.setattr(keys, "print_schema", lambda *_: 1 / 0)
     assert main(["schema"]) == 1  # a signal of an earlier command is no excuse
     assert "ZeroDivisionError" in capsys.readouterr().err
 

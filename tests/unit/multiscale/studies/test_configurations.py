@@ -9,7 +9,7 @@ import pytest
 
 from micro import MODEL_NAMES
 from multiscale.auto.keys import auto_keys
-from multiscale.inputs.block import LAW_BLOCK_CELLS
+from multiscale.inputs.bodies import LAW_BLOCK_CELLS
 from multiscale.scene.scene import Scene
 from multiscale.studies.comparison import ranked, refinements, resolved_scene
 from multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations, pressure_grid

@@ -158,7 +158,7 @@ def test_damaged_journals_give_no_wrong_number(scene, tmp_path):
     marks = [START, *(mark for _, mark in unsealed(content))]
     records = [content[a.size : b.size] for a, b in pairwise(marks)]
     dice, ends = np.random.default_rng(8), {"refused": 0, "run again": 0}
-    for number in range(40):
+    for number in range(24):
         at, damaged = int(dice.integers(len(content))), bytearray(content)
         if number % 4 == 0:
             damaged[at] ^= 1 << int(dice.integers(8))

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
 from geometry.zero import Zero
-from multiscale.inputs.body_facts import BodyFacts
+from multiscale.inputs.bodies import BodyFacts
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.scene import Scene
 
@@ -75,6 +75,8 @@ class SceneParts:
         scene: The scene with its auto values resolved.
         surface: Its rough surface, with the heights of both sides where both are rough; under laws
             of samples the first sample.
+        counter_surface: What of it is the counter-body's; None where that is smooth, and under laws
+            of samples.
         patches: Partition of the interface.
         materials: The materials on both sides of the interface.
         body: What is known of the body below the surface.
@@ -88,9 +90,12 @@ class SceneParts:
     """Whether the surface is on a body instead of a half-space."""
     has_laws: ClassVar[bool] = False
     """Whether load steps use laws."""
+    meshes_roughness: ClassVar[bool] = False
+    """Whether the roughness is meshed, so that there is no micro model."""
 
     scene: Scene
     surface: Surface
+    counter_surface: Surface | None = None
     patches: PatchGrid
     materials: MaterialPair
     body: BodyFacts
@@ -116,8 +121,9 @@ class SceneParts:
 
     @property
     def shown_bodies(self) -> list[BodyFacts]:
-        """What is known of the bodies that the record of a run tells: those on meshes."""
-        return self.meshes
+        """What is known of the bodies that the record of a run tells: those loaded as meshes."""
+        loaded = self.meshes if self.regions is None else [self.body, self.counter]
+        return [one for one in loaded if one is not None]
 
     @property
     def both_elastic(self) -> bool:

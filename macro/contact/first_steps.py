@@ -1,0 +1,105 @@
+"""First steps of Newton's method, where laws are steep and the solution is far.
+
+Theory: section 11 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from petsc4py import PETSc
+
+from macro.contact.equations import Equilibrium
+from macro.contact.initial_guess import DisplacementBasis
+from macro.contact.law_lines import Lines, law_lines
+from macro.contact.sampling import Sampling
+from support.errors import NotConverged
+
+Array = NDArray[np.float64]
+
+NEAR = 0.03
+"""Residual over the contact forces from which Newton's method goes on alone."""
+_MOST_STEPS = 8
+_TOLERANCE = 0.01
+"""Relative tolerance of linear solves. With 0.03 another step was needed."""
+
+
+class FirstSteps:
+    """Brings displacements near the equilibrium.
+
+    Args:
+        equilibrium: The equations.
+        sampling: The samples that laws are evaluated at.
+        follow: Lets the preconditioner follow the tangent.
+
+    Note:
+        Everything is collective.
+    """
+
+    def __init__(
+        self, equilibrium: Equilibrium, sampling: Sampling, follow: Callable[[], None]
+    ) -> None:
+        self._equilibrium, self._sampling, self._follow = equilibrium, sampling, follow
+        self._forces = equilibrium.forces
+        self._residual, self._load = equilibrium.matrix.createVecs()
+
+    def take(
+        self, solver: PETSc.KSP, displacement: PETSc.Vec, basis: DisplacementBasis
+    ) -> tuple[list[float], int]:
+        """Take steps from the guess of a basis until Newton's method converges fast.
+
+        Args:
+            solver: The linear solver of Newton's method.
+            displacement: Receives the displacements with the least residual.
+            basis: Earlier solutions.
+
+        Returns:
+            The residuals before every step, relative to the contact forces, and the number of
+            linear iterations.
+        """
+        lines = basis.write_guess(displacement)
+        residuals = [self._relative_residual(displacement)]
+        if residuals[0] <= NEAR or self._forces.control.force == 0.0:
+            return [], 0
+        best, step, spent = displacement.copy(), displacement.duplicate(), 0
+        solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
+        while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
+            self._forces.linearise(lines.stiffness)
+            self._follow()
+            self._write_linear_residual(displacement, lines)
+            solver.setTolerances(rtol=_TOLERANCE)
+            solver.solve(self._residual, step)
+            if solver.reason < 0:
+                break
+            spent += int(solver.its)
+            displacement.axpy(-1.0, step)
+            closure = self._closure_on(lines, displacement)
+            lines = law_lines(self._forces, closure, lines.at(closure), basis.stiffness)
+            residuals.append(self._relative_residual(displacement))
+            if residuals[-1] <= min(residuals):
+                displacement.copy(best)
+        best.copy(displacement)
+        return residuals[:-1], spent
+
+    def _relative_residual(self, displacement: PETSc.Vec) -> float:
+        try:
+            self._equilibrium.residual(displacement, self._residual)
+        except NotConverged:  # the plane, on closures that are out of all proportion
+            return np.inf
+        return float(self._residual.norm() / (self._equilibrium.scale or 1.0))
+
+    def _closure_on(self, lines: Lines, displacement: PETSc.Vec) -> Array:
+        """Bring the plane into equilibrium on linearised laws, and return the closures."""
+        displaced = self._sampling.displacements(displacement)
+        return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
+
+    def _write_linear_residual(self, displacement: PETSc.Vec, lines: Lines) -> None:
+        """Write the residual K u − B p with pressures p of linearised laws."""
+        samples, matrix = self._sampling.values, self._equilibrium.matrix
+        pressure = lines.at(self._closure_on(lines, displacement))
+        samples.array[:] = pressure
+        self._sampling.operator.mult(samples, self._load)
+        matrix.mult(displacement, self._residual)
+        self._residual.axpy(-1.0, self._load)

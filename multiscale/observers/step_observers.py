@@ -1,0 +1,246 @@
+"""What sees the load steps of a run: contacts, stiffness, work, errors, and states of fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from geometry import Control, NotConverged
+from multiscale.couplings.coupling import Coupling
+from multiscale.loading.energy import with_work
+from multiscale.loading.load_step import LoadStep
+from multiscale.readable import Detail, quantity
+from multiscale.results.contact_record import ContactRecord
+
+_AFTER_UNLOADING = (
+    "errors of load steps after unloading are not measured: the plastic depth there is that of the "
+    "load steps before"
+)
+
+
+class StepObserver:
+    """Sees every load step as it is accepted, and may add to it; this one adds nothing.
+
+    Args:
+        coupling: What finds the load steps.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        self._coupling = coupling
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with what the observer adds.
+
+        Args:
+            step: The load step just accepted, counted from first touch.
+            before: The one before it; None for the first.
+            last: Whether no other follows.
+
+        Note:
+            Collective.
+        """
+        return step
+
+    def finish(self, step: LoadStep) -> LoadStep:
+        """Return the last load step of a run that ended early, with what the observer adds.
+
+        Args:
+            step: The load step that turned out to be the last.
+
+        Note:
+            Collective.
+        """
+        return step
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of what the observer saw.
+
+        Args:
+            steps: All load steps.
+        """
+        return iter(())
+
+    def release(self) -> None:
+        """Let go of what holds bodies in memory."""
+
+
+class WorkObserver(StepObserver):
+    """Adds the work of the plane since the start to load steps."""
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with the work of the plane."""
+        return with_work(step, before)
+
+
+class StiffnessObserver(StepObserver):
+    """Adds the interfacial stiffness to load steps, where it is known."""
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with its interfacial stiffness."""
+        stiffness = self._coupling.solver.stiffness()
+        return replace(
+            step,
+            stiffness_N_per_mm=stiffness.value,
+            stiffness_error_N_per_mm=None if stiffness.value is None else stiffness.error,
+            linear_iterations=step.linear_iterations + stiffness.iterations,
+        )
+
+
+class ContactRecorder(StepObserver):
+    """Records contacts as the scene's ``output.contact`` says.
+
+    Args:
+        coupling: What finds the load steps.
+
+    Attributes:
+        records: The contacts so far, the same on every rank.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        asked = coupling.scene.output.contact
+        self._asked = "none" if coupling.has_laws and asked == "auto" else asked
+        self.records: list[ContactRecord] = []
+        self._state: Any = None
+        self._seen = 0
+        self._failures: list[str] = []
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Record the contact of a load step if it is requested."""
+        self._state, self._seen = self._coupling.solver.latest, step.step
+        return self._recorded(step) if last or self._asked == "all" else step
+
+    def finish(self, step: LoadStep) -> LoadStep:
+        """Record the contact of the last load step of a run that ended early."""
+        return self._recorded(step)
+
+    def _recorded(self, step: LoadStep) -> LoadStep:
+        """Return the load step with the largest pressure of its contact, which is recorded once."""
+        known = bool(self.records) and self.records[-1].step == step.step
+        if self._asked == "none" or known:
+            return step
+        if self._seen != step.step and not self._coupling.has_laws:
+            return step  # a step of an earlier call, whose state is gone
+        try:
+            contact = self._coupling.contact(step, self._state)
+        except NotConverged as error:
+            self._failures.append(f"contact of load step {step.step} not found: {error}")
+            return step
+        if contact is not None:
+            step, detail = contact
+            shown = step.counted_from(self._coupling.zero)
+            lengths = self._coupling.surface.lengths
+            self.records.append(ContactRecord.of(detail, shown, lengths))
+        self.release()
+        return step
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of contacts that laws stand for, and of those not found."""
+        yield from self._failures
+        if self.records and self._coupling.has_laws:
+            last = self.records[-1]
+            yield Detail(
+                f"contact of load step {last.step}: the contact problem behind the laws, solved "
+                f"under the plane of the step, with a force of {quantity(last.force_N, 'N', 5)}"
+            )
+
+    def release(self) -> None:
+        """Let go of the contact, whose blocks stay in memory as long as it is held."""
+        self._state = None
+
+
+class ErrorCheck(StepObserver):
+    """Adds measured errors to load steps, as the scene's ``output.check`` says.
+
+    Args:
+        coupling: What finds the load steps.
+        has_unloaded: Tells whether the load was larger before.
+    """
+
+    def __init__(self, coupling: Coupling, has_unloaded: Callable[[], bool]) -> None:
+        super().__init__(coupling)
+        self._has_unloaded, self._check = has_unloaded, coupling.scene.output.check
+        self._notes: dict[str, None] = {}
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with its errors, where they are to be measured."""
+        asked = self._check == "all" or (self._check == "last" and last)
+        if not asked or self._coupling.cells is None:
+            return step
+        # the plastic depth is then not that of rising loads, which the check solves for
+        if self._coupling.scene.micro.hardness is not None and self._has_unloaded():
+            self._notes[_AFTER_UNLOADING] = None
+            return step
+        with self._coupling.clock.phase("check"):
+            try:
+                return self._coupling.checked(step)
+            except NotConverged as error:
+                self._notes[f"errors of load step {step.step} not measured: {error}"] = None
+                return step
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield why errors were not measured."""
+        yield from self._notes
+
+
+class FieldRecorder(StepObserver):
+    """Keeps the states that fields are written from.
+
+    Args:
+        coupling: What finds the load steps.
+
+    Attributes:
+        kept: States by number of the load step, see `StepSolver.field_state`.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        self._wanted = coupling.scene.output.wants_fields
+        self.kept: dict[int, Any] = {}
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Keep the state of a load step whose fields may be wanted."""
+        if self._coupling.has_body and self._wanted(step.step, last=True):
+            if not self._wanted(step.step, last=False):
+                self.kept.clear()  # only those of the last load step are wanted
+            parts = self._coupling.field_parts
+            self.kept[step.step] = self._coupling.solver.field_state(step, parts)
+        return step
+
+    def write(self, path: Path, steps: Sequence[LoadStep], *, finished: bool) -> None:
+        """Write the fields as XDMF and VTX; see `Coupling.write_fields`.
+
+        Args:
+            path: File to write, ending in ``.xdmf``.
+            steps: The load steps.
+            finished: Whether none follows. Steps of an earlier call are then pressed to again.
+
+        Note:
+            Collective.
+        """
+        if finished:
+            self._complete(steps)
+        self._coupling.write_fields(path, self.kept)
+
+    def _complete(self, steps: Sequence[LoadStep]) -> None:
+        """Press to load steps again whose fields are wanted, but were not kept by a resumed run."""
+        missing = [
+            step.step
+            for step in steps
+            if step.step not in self.kept and self._wanted(step.step, last=step is steps[-1])
+        ]
+        if not missing:
+            return
+        again, solver = [step for step in steps if step.step in missing], self._coupling.solver
+        past = solver.past
+        if past is not None and self._coupling.scene.micro.hardness is not None:
+            # what earlier load steps left behind depends on all of them, from the first
+            solver.past = (None, None)
+            again = [step for step in steps if step.step <= max(missing)]
+        for step in again:
+            solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+            if step.step in missing:
+                self.observe(step, None, last=step is steps[-1])
+        solver.past = past

@@ -1,0 +1,109 @@
+"""Newton steps and linear iterations of bodies under laws: parts, laws, controls.
+
+Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]`, also
+under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as those
+of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
+(mixed). Every line is one load: in a single step, and along a path of four steps. ``K`` counts the
+iterations to 1e-8 of the body without laws.
+"""
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = "1"
+
+import argparse
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from body_solvers import COMM, PARTS, iterations
+from helpers.machine_parts import part_body, read_part
+
+from geometry import PatchGrid
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, LoadedFace
+from macro.mesh.contact_face import contact_facets
+from macro.mesh.tagged import planar_face
+from support.errors import NotConverged
+
+PRESSURE = 10.0  # of the whole load, on average [MPa]
+
+
+class ExponentialLaw:
+    """p = 10 kPa (exp(c / 0.4 σ) − 1): 10 MPa at 2.8 roughnesses σ of closure."""
+
+    def __init__(self, roughness):
+        self._length = 0.4 * roughness
+
+    def pressure(self, closure):
+        return 1e-2 * np.expm1(np.clip(closure / self._length, 0.0, 200.0))
+
+    def stiffness(self, closure):
+        grown = np.exp(np.clip(closure / self._length, 0.0, 200.0))
+        return np.where(closure > 0.0, 1e-2 * grown / self._length, 0.0)
+
+
+SOFT, STIFF = ExponentialLaw(16e-3), ExponentialLaw(1e-3)
+LAWS = {"soft": [SOFT, SOFT], "stiff": [STIFF, STIFF], "mixed": [SOFT, STIFF]}
+
+
+def pressed(face, laws, controls):
+    """Return Newton steps and linear iterations of every load step, and the last state."""
+    problem, counts, state = LawContactProblem(face, laws, "pointwise"), [], None
+    for control in controls:
+        try:
+            state = problem.solve(control)
+        except NotConverged as error:
+            return f"{counts} {error.reason}", state
+        counts.append((state.iterations, state.linear_iterations))
+    newton, linear = (sum(part) for part in zip(*counts, strict=True))
+    steps = " ".join(str(count) for count, _ in counts)
+    return f"{steps:>9s} Newton, {linear / newton:4.1f} a solve", state
+
+
+def rows(face):
+    """Yield a name and the counts of every law and control."""
+    force = PRESSURE * float(face.areas.sum())
+    for name, laws in LAWS.items():
+        for free in (False, True):
+            tilt = None if free else (0.0, 0.0)
+            loads = [Control(force=force * k / 4, tilt=tilt) for k in (1, 2, 3, 4)]
+            one, state = pressed(face, laws, loads[3:])
+            yield f"{name}, force{', free tilt' * free}", one, pressed(face, laws, loads)[0]
+        if state is not None:
+            at = state.approach
+            loads = [Control(approach=at * k / 4) for k in (1, 2, 3, 4)]
+            yield (
+                f"{name}, approach",
+                pressed(face, laws, loads[3:])[0],
+                pressed(face, laws, loads)[0],
+            )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("parts", nargs="*")
+    parser.add_argument("--scale", type=float, default=0.6)
+    choice = parser.parse_args()
+    for name in choice.parts or PARTS:
+        part, *rest = PARTS[name]
+        tagged = read_part(replace(part, size=part.size / choice.scale), COMM)
+        body, tag = part_body(tagged, *rest), tagged.facet_names["contact"]
+        plane, facets = planar_face(tagged, tag), tagged.facet_tags.find(tag)
+        patches = PatchGrid(grid=(2, 1), lengths=plane.lengths)
+        face = LoadedFace(body, contact_facets(tagged.mesh, facets, plane.frame), patches)
+        alone = iterations(body, body.solver)
+        body.solver.setTolerances(rtol=1e-10)
+        if COMM.rank == 0:
+            print(f"{name}, {body.dofs} unknowns, K {alone}", flush=True)
+        for row in rows(face):
+            if COMM.rank == 0:
+                print(f"  {row[0]:24s} {row[1]:32s} {row[2]}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""Load steps from nothing: laws as lines, and few Newton steps on laws as steep as they come."""
+
+import numpy as np
+import pytest
+from helpers.body_meshes import box, standing
+from mpi4py import MPI
+from scipy.optimize import brentq
+
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, Material
+from macro.contact.law_lines import law_lines
+
+HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
+SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
+
+
+class Exponential:
+    """p = 10 kPa (exp(c / λ) − 1), the shape of laws of rough surfaces."""
+
+    def __init__(self, length):
+        self.length = length
+
+    def pressure(self, closure):
+        return 1e-2 * np.expm1(np.clip(closure / self.length, 0.0, 300.0))
+
+    def stiffness(self, closure):
+        grown = np.exp(np.clip(closure / self.length, 0.0, 300.0)) / self.length
+        return np.where(closure > 0.0, 1e-2 * grown, 0.0)
+
+
+class Forces:
+    """What `law_lines` asks of contact forces."""
+
+    comm = MPI.COMM_SELF
+
+    def __init__(self, law):
+        self.pressure, self.stiffness = law.pressure, law.stiffness
+
+
+def problem(laws):
+    face = standing(box((0, 0, -1), (3, 1, 0), (9, 4, 4)), SOFT, HALVES)
+    return LawContactProblem(face, laws, "pointwise")
+
+
+def test_lines_touch_the_law_where_the_bodys_stiffness_leads():
+    law, stiffness = Exponential(0.4e-3), 37.0
+    rng = np.random.default_rng(8)
+    closure = rng.uniform(-2e-3, 30e-3, 40)  # up to e⁷⁵ of pressure
+    pressure = rng.uniform(-5.0, 20.0, 40)
+    lines = law_lines(Forces(law), closure, pressure, stiffness)
+    for at, c, p in zip(lines.closure, closure, pressure, strict=True):
+        exact = brentq(
+            lambda x, c=c, p=p: float(law.pressure(x)) - p + stiffness * (x - c), -3.0, 40e-3,
+            xtol=1e-15,
+        )  # fmt: skip
+        assert at == pytest.approx(exact, abs=1e-5)
+    np.testing.assert_array_equal(lines.pressure, law.pressure(lines.closure))
+    np.testing.assert_array_equal(lines.stiffness, law.stiffness(lines.closure))
+    np.testing.assert_allclose(
+        lines.at(lines.closure + 1e-4), lines.pressure + 1e-4 * lines.stiffness
+    )
+
+
+@pytest.mark.parametrize("lengths", [(6e-3, 6e-3), (0.4e-3, 0.4e-3)])
+@pytest.mark.parametrize("tilt", [(0.0, 0.0), None])
+def test_any_load_takes_few_newton_steps(lengths, tilt):
+    laws = [Exponential(length) for length in lengths]
+    state = problem(laws).solve(Control(force=17.3, tilt=tilt))
+    assert state.force == pytest.approx(17.3, rel=1e-9)
+    assert state.reaction == pytest.approx(state.force, rel=1e-7)
+    assert state.iterations <= 6
+    again = problem(laws).solve(Control(approach=state.approach, tilt=state.tilt))
+    assert again.force == pytest.approx(17.3, rel=1e-7)
+    assert again.iterations <= 10
+
+
+def test_one_step_is_where_a_path_leads():
+    laws = [Exponential(6e-3), Exponential(0.4e-3)]
+    path = problem(laws)
+    counts = []
+    for share in (0.25, 0.5, 0.75, 1.0, 0.6):
+        state = path.solve(Control(force=22.9 * share, tilt=None))
+        counts.append(state.iterations)
+    single = problem(laws).solve(Control(force=22.9 * 0.6, tilt=None))
+    assert state.approach == pytest.approx(single.approach, rel=1e-8)
+    np.testing.assert_allclose(state.patch_pressure, single.patch_pressure, rtol=1e-7)
+    assert max(counts[1:]) <= 5
+
+
+def test_a_body_softer_than_its_laws_by_orders_is_solved():
+    # a soft foot on a stiff law: 9 µm of body for a newton, e-folds of 0.1 µm
+    laws = [Exponential(0.1e-3)] * 2
+    state = problem(laws).solve(Control(approach=30e-3))
+    assert state.reaction == pytest.approx(state.force, rel=1e-7)
+    assert state.iterations <= 15

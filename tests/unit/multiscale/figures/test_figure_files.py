@@ -1,0 +1,123 @@
+"""Figures are drawn once, by another process where one can, with room for every label."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from geometry import PatchGrid, Spectrum, synthesise
+from multiscale.cli.command_line import main
+from multiscale.figures import style
+from multiscale.figures.files import Drawing, FigureProcess, Pictures, file_kinds, pictures_of
+from multiscale.figures.surface import surface_figure
+
+PAPER = "demos/scenes/paper.toml"
+SMALL = (
+    "surface.grid=[32, 32]", "load.steps=2", "coupling.kind=analytic", "micro.model=half-space",
+    "output.report=false", "output.check=none",
+)  # fmt: skip
+
+
+def surface_drawing(**changes):
+    surface = synthesise(
+        Spectrum(hurst=0.8, waves=(2, 6), rms_height=1e-3), grid=(24, 24), lengths=(1.0, 1.0)
+    )
+    about = surface, None, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0))
+    given = {"name": "s", "function": "figures.surface.surface_figure", "arguments": about}
+    return Drawing(**(given | changes))
+
+
+@pytest.fixture
+def process():
+    made = FigureProcess()
+    yield made
+    made.close()
+
+
+def test_another_process_draws_the_same_bytes(process):
+    drawing = surface_drawing(kinds=("png", "svg"))
+    assert process.draw(drawing).result() == pictures_of(drawing)
+
+
+def test_an_error_while_drawing_is_told(process):
+    wrong = process.draw(surface_drawing(function="figures.surface.no_figure"))
+    with pytest.raises(RuntimeError, match="no_figure"):
+        wrong.result()
+    assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
+
+
+def test_figures_are_drawn_here_where_the_process_has_ended(process):
+    os.kill(process._process.pid, signal.SIGKILL)
+    assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
+
+
+def test_a_process_that_is_closed_draws_no_more(process):
+    begun = process.draw(surface_drawing())
+    process.close()
+    assert isinstance(begun, Future) and (begun.cancelled() or begun.result() == Pictures({}))
+
+
+def has_ended(status):
+    """Tell whether a process is gone, or waits to be collected by the system."""
+    try:
+        return "State:\tZ" in status.read_text()
+    except OSError:
+        return True
+
+
+def test_the_process_ends_with_a_killed_one():
+    script = (
+        "import os, signal\n"
+        "from multiscale.figures.files import FigureProcess\n"
+        "print(FigureProcess()._process.pid, flush=True)\n"
+        "os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    status, until = Path(f"/proc/{int(shown.stdout)}/status"), time.monotonic() + 60.0
+    while time.monotonic() < until and not has_ended(status):
+        time.sleep(0.05)
+    assert has_ended(status)
+
+
+@pytest.mark.parametrize(("asked", "ends"), [("true", {".png"}), ('"svg"', {".png", ".svg"})])
+def test_svg_is_written_where_it_is_asked_for(asked, ends, tmp_path):
+    words = ["run", PAPER, "--out", str(tmp_path), "--set", *SMALL, f"output.figures={asked}"]
+    assert main(words) == 0
+    figures = {path.stem: set() for path in tmp_path.iterdir() if path.suffix == ".png"}
+    assert {"overview", "surface", "curves", "pressures", "contact"} <= set(figures)
+    for path in tmp_path.iterdir():
+        if path.stem in figures and path.suffix in (".png", ".svg"):
+            figures[path.stem].add(path.suffix)
+    assert set(map(frozenset, figures.values())) == {frozenset(ends)}
+
+
+def test_other_values_are_refused(tmp_path, capsys):
+    words = ["run", PAPER, "--out", str(tmp_path / "x"), "--set", 'output.figures="pdf"']
+    assert main(words) == 2
+    told = " ".join(capsys.readouterr().err.split())
+    assert "output.figures" in told and "'all' or 'svg'" in told
+
+
+def test_kinds_of_files():
+    assert file_kinds(True) == file_kinds("all") == ("png",)
+    assert file_kinds("svg") == ("png", "svg")
+
+
+@pytest.mark.parametrize("lengths", [(1.0, 1.0), (0.2, 0.9), (4.0, 0.7), (1e-3, 1e-3)])
+@pytest.mark.parametrize("size", [1e-6, 1.0])
+def test_no_label_is_cut(lengths, size):
+    spectrum = Spectrum(hurst=0.8, waves=(2, 6), rms_height=size * min(lengths))
+    surface = synthesise(spectrum, grid=(96, 96), lengths=lengths)
+    figure = surface_figure(surface, None, PatchGrid(grid=(2, 2), lengths=lengths), spectrum)
+    figure.draw_without_rendering()
+    width, height = figure.get_size_inches() * figure.dpi
+    for axes in figure.axes:
+        box = axes.get_tightbbox()
+        assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height
+    np.testing.assert_array_equal(figure.get_size_inches(), [style.FULL_WIDTH, 5.4])
