@@ -55,7 +55,7 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     Returns:
         The colour bar.
     """
-    inches = axes.get_position().width * axes.figure.get_figwidth()
+    inches = axes.bbox.width / axes.figure.dpi
     wide = 0.05 * min(1.0, 2.2 / inches)
     beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
     beside.grid(False)
@@ -138,7 +138,7 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
     lengths = float(np.ptp(x)), float(np.ptp(y))
     scale = map_axes(axes, lengths)
     axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
-    inches = axes.get_position().width * axes.figure.get_figwidth()
+    inches = axes.bbox.width / axes.figure.dpi
     size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
     look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
     loaded = pressure > 0.0
