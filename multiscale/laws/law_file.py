@@ -107,6 +107,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
         InputError: When the file cannot be read, is no law file, damaged, lacks anything, was
             written before law files had a checksum, or with a micro model that is gone.
     """
+    import h5py  # takes longer than all else that a plan needs of laws
+
     path = Path(path) if isinstance(path, str) else path
     name = str(path) if isinstance(path, Path) else None
     if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
@@ -114,8 +116,6 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
     try:
         content = path.read_bytes() if isinstance(path, Path) else path.read()
         check_hdf5(content)
-        import h5py  # takes longer than all else that a plan needs of laws
-
         with h5py.File(BytesIO(content), "r") as file:
             if file.attrs.get("format") != FORMAT:
                 raise InputError("is not a law file of patchlaw", file=name)
