@@ -107,7 +107,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
         InputError: When the file cannot be read, is no law file, damaged, lacks anything, was
             written before law files had a checksum, or with a micro model that is gone.
     """
-    import h5py  # takes longer than all else that a plan needs of laws
+    with optional_packages():
+        import h5py  # takes longer than all else that a plan needs of laws
 
     path = Path(path) if isinstance(path, str) else path
     name = str(path) if isinstance(path, Path) else None
