@@ -22,6 +22,7 @@ from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.removed import refuse_removed_laws
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
+from support.packages import optional_packages
 from support.whole_files import write_bytes
 
 FORMAT = "patchlaw laws 3"
