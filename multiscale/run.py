@@ -86,6 +86,11 @@ class Run:
             from multiscale.observers.conductance import ConductanceObserver  # others do without
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
+        if self.scene.leak is not None:
+            from multiscale.observers.leak import LeakObserver
+
+            leak = LeakObserver(self.coupling, self.scene.leak, self._has_unloaded)
+            self._observers.append(leak)
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def phase(self, name: str) -> AbstractContextManager[None]:

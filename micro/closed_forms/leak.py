@@ -51,7 +51,7 @@ def slight_roughness(ratio: float, peklenik: float = 1.0) -> float:
         peklenik: Factor γ by which the surface is stretched along the flow.
 
     Source:
-        Tripp 1983, doi 10.1115/1.3254646.
+        Tripp 1983, Journal of Lubrication Technology 105, 458-463.
     """
     return 1.0 + 3.0 / ratio**2 * (1.0 - 3.0 / (1.0 + peklenik))
 
@@ -62,8 +62,6 @@ def slit_resistance(opening: float) -> float:
     Args:
         opening: Width of the slit over that of the strip, in whose middle it is.
 
-    Source:
-        The conformal map of a strip with a slit, w = sin(π z/W); Smythe 1950, Static and Dynamic
-        Electricity, section 6.15.
+    It follows from the conformal map w = sin(π z/W) of the half strip to the half plane.
     """
     return float(-2.0 / np.pi * np.log(np.sin(0.5 * np.pi * opening)))

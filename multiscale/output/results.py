@@ -30,7 +30,7 @@ from support.collective import on_root, shared
 from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
+_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face", "leak")
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
@@ -245,5 +245,9 @@ class RunFigures:
             if self._figures in ("all", "svg") and of_cells:
                 ratio = coupling.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
+        if run.scene.leak is not None:
+            gaps = run.contacts[-1] if run.contacts else None
+            about = history, gaps, run.scene.leak, run.scene.surface.periodic
+            figures["leak"] = "leak.leak_figure", about
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))

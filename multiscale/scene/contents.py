@@ -14,6 +14,7 @@ from multiscale.scene.bodies import (
     ConductanceSection,
     CounterBodySection,
 )
+from multiscale.scene.leak import LeakSection
 from multiscale.scene.sections import (
     CouplingSection,
     LawSection,
@@ -28,6 +29,10 @@ from support.fields import KEY, Limits
 
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
+
+
+_WITHOUT_CELLS = {"isolated", "consistent", "representative", "reference", "auto"}
+"""Couplings that know no gaps of the surface's cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +63,7 @@ class SceneSections:
         loading: The motion of the rigid plane, or the force on it.
         conductance: Thermal and electrical conductance of the interface, which are not found
             without it.
+        leak: Flow of a fluid through the gaps, which is not found without it.
         output: What is written beside the tables of results.
     """
 
@@ -74,6 +80,7 @@ class SceneSections:
     reference: ReferenceSection = field(default_factory=ReferenceSection)
     loading: LoadHistory = field(metadata={KEY: "load"})
     conductance: ConductanceSection | None = None
+    leak: LeakSection | None = None
     output: OutputSection = field(default_factory=OutputSection)
 
     @property
@@ -162,6 +169,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
 def _couplings(scene: SceneSections) -> Iterator[Problem]:
     """Yield what a coupling has no use for, and what it leaves out."""
     block = "which meshes a block under a rigid, smooth plane"
+    mapped = "which knows no gaps of cells"
     apart = "whose meshes do not tell the stiffness of the interface from that of the block"
     for key, value, kinds, reason in (
         ("body", scene.body, {"reference"}, block),
@@ -169,6 +177,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         ("counter_surface", scene.counter_surface, {"reference"}, block),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
+        ("leak", scene.leak, _WITHOUT_CELLS, mapped),
     ):
         if value is not None and scene.kind in kinds:
             others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))
@@ -242,6 +251,9 @@ def _micro_models(scene: SceneSections) -> Iterator[Problem]:
             "stiffness is that of contacts that yield, which conduct all the same",
             concurrent,
         )
+    if scene.leak is not None and model != "half-space":
+        problem = f"does not go with micro.model = '{model}', which knows no gaps beside summits"
+        yield "leak", problem, cells
     if conducts and model != "half-space" and not by_laws:
         problem = f"does not go with micro.model = '{model}' without laws"
         yield "conductance", problem, f"{cells}; or coupling.kind = 'consistent' or 'isolated'"

@@ -34,7 +34,7 @@ FLOORS = {
         "asperities contact_state meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms conductance",
+        "closed_forms conductance flow",
         "boundary_elements model",
         "asperities complementarity",
         "half_space",
@@ -52,7 +52,7 @@ FLOORS = {
     ],
     "multiscale": [
         "readable removed",
-        "figures machine",
+        "figures gap_flows machine",
         "laws loading",
         "exports results scene",
         "inputs",
