@@ -89,9 +89,10 @@ def network_flow(network: Network, preconditioner: Preconditioner = factorised) 
     imbalance = (float(np.abs(out[nodes]).sum()) + abs(entering - leaving)) / total
     if not imbalance <= MOST_IMBALANCE:
         raise NotConverged(
-            f"the flow through the gaps does not balance: {imbalance:.1e} of it after {iterations} "
-            f"iterations, more than {MOST_IMBALANCE:g}",
+            "the flow through the gaps",
+            reason=f"{imbalance:.1e} of it does not balance, more than {MOST_IMBALANCE:g}",
             iterations=iterations,
+            remedy="take other options of its multigrid (-patchlaw_leak_pc_type), or fewer cells",
         )
     everywhere = np.zeros(len(network.tail))
     everywhere[reached] = flow
