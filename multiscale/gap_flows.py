@@ -12,7 +12,7 @@ MOST_FACTORISED = 512**2
 
 
 def flow_solver(cells: int) -> Preconditioner:
-    """Return multigrid for many cells where PETSc is installed, and a factorisation otherwise.
+    """Return multigrid for many cells where PETSc has hypre, and a factorisation otherwise.
 
     Args:
         cells: Number of cells.
@@ -22,11 +22,14 @@ def flow_solver(cells: int) -> Preconditioner:
     """
     if cells > MOST_FACTORISED:
         try:
-            from macro.linear_solvers.scalar_multigrid import scalar_multigrid
-
-            return scalar_multigrid
+            from macro.linear_solvers.scalar_multigrid import (
+                has_scalar_multigrid,
+                scalar_multigrid,
+            )
         except ImportError:
-            pass
+            return factorised
+        if has_scalar_multigrid():
+            return scalar_multigrid
     return factorised
 
 

@@ -86,8 +86,8 @@ def network_flow(network: Network, preconditioner: Preconditioner = factorised) 
     out = part.divergence(flow)
     entering, leaving = out[part.inlet], -out[part.outlet]
     total = 0.5 * (entering + leaving)
-    imbalance = (float(np.abs(out[nodes]).sum()) + abs(entering - leaving)) / total
-    if not imbalance <= MOST_IMBALANCE:
+    imbalance = (float(np.abs(out[nodes]).sum()) + abs(entering - leaving)) / abs(total)
+    if not (imbalance <= MOST_IMBALANCE and total > 0.0):
         raise NotConverged(
             "the flow through the gaps",
             reason=f"{imbalance:.1e} of it does not balance, more than {MOST_IMBALANCE:g}",

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from geometry.spectrum import Spectrum, synthesise
 from micro import HalfSpaceModel
@@ -98,7 +99,6 @@ def test_shallow_roughness_of_any_stretch():
         expected = slight_roughness(20.0, stretch) - 1.0
         found = flow_factor(20.0, stretch, linear=False) - 1.0
         # three to eight cells on a correlation length across, and the scatter of three surfaces
-        print(stretch, found, expected)
         assert found == pytest.approx(expected, rel=0.1), stretch
 
 
@@ -134,10 +134,9 @@ def test_current_through_a_random_mixture():
 
 @pytest.mark.parametrize("stretch", [1.0 / 3.0, 1.0, 3.0])
 def test_flow_factors_are_those_of_patir_and_cheng(stretch):
-    """Within 2.1 % from 3 to 6 rms heights; their own surfaces had 200 times fewer asperities."""
+    """Within 2.4 % from 3 to 6 rms heights, of surfaces with a few dozen times their asperities."""
     for ratio in (3.0, 4.0, 6.0):
         expected = patir_cheng(ratio, stretch)
-        print(ratio, flow_factor(ratio, stretch) , expected)
         assert flow_factor(ratio, stretch) == pytest.approx(expected, rel=0.025), ratio
 
 
@@ -211,7 +210,10 @@ def _centres(mesh):
 
 
 def test_finite_elements_on_the_same_gaps_agree():
-    """Bilinear elements let too much through, and less the finer they are; so do ours."""
+    """Bilinear elements let too much through and harmonic means too little: they enclose T.
+
+    By 1.1 % on the cells themselves, 0.05 % with 8 × 8 parts of each.
+    """
     gap = contact_gaps()
     assert 0.1 < np.mean(gap == 0.0) < 0.25
     elements = [by_finite_elements(gap, parts) for parts in (1, 2, 4, 8)]
@@ -219,8 +221,76 @@ def test_finite_elements_on_the_same_gaps_agree():
         gap_flow(np.kron(gap, np.ones((parts, parts))), (1.0, 1.0)).transmissivity
         for parts in (1, 2, 4, 8)
     ]
-    print(elements, volumes)
-    assert (np.diff(elements) < 0.0).all()
-    apart = np.abs(np.array(elements) / volumes - 1.0)
-    assert (np.diff(apart) < 0.0).all()
-    assert apart[-1] < 0.02
+    assert (np.diff(elements) < 0.0).all() and (np.diff(volumes) > 0.0).all()
+    assert volumes[-1] < elements[-1] < 1.001 * volumes[-1]
+
+
+# --- percolation
+
+
+def effective_medium(gap):
+    """Return T of gaps in random order, by Bruggeman's self-consistent mean of g³."""
+    cubes = gap.ravel() ** 3
+
+    def lacking(mean):
+        return np.mean((cubes - mean) / (cubes + mean))
+
+    return brentq(lacking, 1e-16 * cubes.max(), cubes.max(), xtol=1e-30, rtol=1e-10)
+
+
+def share_at_closing(surface, axis):
+    """Return the contact area fraction at which no path is left, by bisection of the pressure."""
+    low, high, start, share = 0.005, 0.045, None, None
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        state = pressed(surface, middle, start)
+        start, gap = state.guess, state.open_gap
+        is_open = (gap.T if axis else gap) > 1e-7 * gap.max()
+        share = float(np.mean(gap == 0.0))
+        if cell_network(is_open.astype(float), (1.0, 1.0), periodic=True).percolates:
+            low = middle
+        else:
+            high = middle
+    return share
+
+
+@pytest.mark.parametrize(
+    ("cells", "waves", "seeds", "apart"),
+    [
+        (128, (4, 21), 4, 0.04),
+        # mean of ten surfaces 0.418 with a scatter of 0.025 between flows
+        pytest.param(256, (4, 42), 10, 0.015, marks=pytest.mark.long),
+    ],
+)
+def test_surfaces_close_at_42_per_cent_contact(cells, waves, seeds, apart):
+    """Dapp, Lücke, Persson & Müser 2012: isotropic self-affine surfaces, at about 42 %."""
+    shares = [
+        share_at_closing(self_affine(cells, waves, seed), axis)
+        for seed in range(seeds)
+        for axis in (0, 1)
+    ]
+    assert np.mean(shares) == pytest.approx(0.42, abs=apart)
+    assert np.std(shares) < 0.06
+
+
+def test_the_logarithm_of_the_leak_falls_in_proportion_to_the_pressure():
+    """From 2 to 26 % contact by 650 times, ln T ∝ −50 p/(E* h') on 128² and on 256² cells.
+
+    Up to 7 % contact a medium of the same gaps in random order lets through 10 to 20 % more.
+    """
+    pressures, logs = np.array([1.0, 3.0, 7.0, 10.0, 13.0]) * 1e-3, []
+    for seed in range(4):
+        surface, start = self_affine(128, (4, 21), seed), None
+        for pressure in pressures:
+            state = pressed(surface, pressure, start)
+            start, gap = state.guess, state.open_gap
+            leaks = [
+                gap_flow(gap, (1.0, 1.0), axis=axis, periodic=True).transmissivity
+                for axis in (0, 1)
+            ]
+            logs.append([np.mean(np.log(leaks)), np.log(effective_medium(gap))])
+    found, random = np.mean(np.reshape(logs, (4, len(pressures), 2)), axis=0).T
+    slope, start = np.polyfit(pressures / 0.1, found, 1)
+    assert slope == pytest.approx(-50.0, rel=0.1)  # the scatter of eight flows
+    assert np.abs(np.polyval((slope, start), pressures / 0.1) - found).max() < 0.25
+    assert 0.75 < np.exp(found - random)[1] < np.exp(found - random)[0] < 1.0

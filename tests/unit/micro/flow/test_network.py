@@ -127,6 +127,8 @@ def test_what_does_not_balance_is_refused():
 
     with pytest.raises(NotConverged, match="of it does not balance, more than 1e-10 after 500 it"):
         network_flow(net, diagonal)
+    with pytest.raises(NotConverged, match="the flow through the gaps did not converge"):
+        network_flow(net, lambda matrix: lambda residual: -1e30 * residual)
     assert network_flow(net).imbalance <= MOST_IMBALANCE
 
 
