@@ -1,6 +1,6 @@
 """Algebraic multigrid of scalar problems on this process, such as networks of conductances.
 
-Classical coarsening (hypre's BoomerAMG) sees jumps of the coefficients in the entries of the matrix.
+Classical coarsening (hypre's BoomerAMG) sees jumps of the coefficients in the entries of a matrix.
 On maps of the gaps between rough surfaces of 256² to 1024² cells, whose conductances differ by 10¹⁵
 and more, conjugate gradients took 15 to 19 iterations to 1e-12. Smoothed aggregation (PETSc's GAMG)
 took 28 to 71, and on gaps that are closed at random it failed.

@@ -17,8 +17,8 @@ _POWER = {3.0: (0.225, 1.5), 6.0: (0.520, 1.5), 9.0: (0.870, 1.5)}
 def patir_cheng(ratio: float, peklenik: float = 1.0) -> float:
     """Return Patir and Cheng's fit of the pressure flow factor of Gaussian roughness.
 
-    φ = 1 − C e^(−r h/σ) up to γ = 1, and 1 + C (h/σ)^(−r) beyond. It belongs to h/σ > ½, for γ = 1/3
-    and less to h/σ > 1, and to gaps g = max(h + z, 0) with heights z whose autocorrelation falls
+    φ = 1 − C e^(−r h/σ) up to γ = 1, and 1 + C (h/σ)^(−r) beyond. It belongs to h/σ > ½, for
+    γ ≤ 1/3 to h/σ > 1, and to gaps g = max(h + z, 0) with heights z whose autocorrelation falls
     linearly.
 
     Args:

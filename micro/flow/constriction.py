@@ -67,8 +67,8 @@ def critical_constriction(
     downwards = np.where(above[network.tail], flow, -flow)
     index = np.unravel_index(cell, gap.shape)
     x, y = (
-        float((i + 0.5) * length / n) for i, length, n in zip(index, lengths, gap.shape, strict=True)
+        float((i + 0.5) * length / n)
+        for i, length, n in zip(index, lengths, gap.shape, strict=True)
     )
     share = float(downwards[crossing].sum()) / solution.total
     return Constriction(place=(x, y), gap=float(gap.flat[cell]), share=min(share, 1.0))
-

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse import csgraph
 
@@ -68,9 +69,11 @@ class Network:
         return self.conductance * (potential[self.tail] - potential[self.head])
 
     @cached_property
-    def joined(self) -> Indices:
+    def joined(self) -> NDArray[np.integer]:
         """A number for each node that those share which links join, shape (n + 2,)."""
-        return csgraph.connected_components(self._matrix(np.ones(len(self.tail))), False)[1]
+        links = self._matrix(np.ones(len(self.tail)))
+        joined: NDArray[np.integer] = csgraph.connected_components(links, directed=False)[1]
+        return joined
 
     @property
     def percolates(self) -> bool:
@@ -138,7 +141,10 @@ class Network:
         ends = {int(self.tail[self.narrowest]), int(self.head[self.narrowest])}
         kept = ~(np.isin(tree.row, list(ends)) & np.isin(tree.col, list(ends)))
         # the terminals are one node here
-        rows, columns = np.append(tree.row[kept], self.inlet), np.append(tree.col[kept], self.outlet)
+        rows, columns = (
+            np.append(tree.row[kept], self.inlet),
+            np.append(tree.col[kept], self.outlet),
+        )
         forest = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), (size, size)).tocsr()
         before = csgraph.breadth_first_order(forest, self.inlet, directed=False)[1]
         nodes = np.flatnonzero(before >= 0)

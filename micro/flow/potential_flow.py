@@ -64,7 +64,7 @@ def factorised(matrix: sparse.csr_matrix) -> Inverse:
         diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
-    return factors.solve  # type: ignore[no-any-return]
+    return factors.solve
 
 
 def network_flow(network: Network, preconditioner: Preconditioner = factorised) -> NetworkFlow:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from geometry import Control, NotConverged
+from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.gap_flows import flow_solver, solved_gap_flow
 from multiscale.loading.load_step import LoadStep
@@ -54,10 +54,11 @@ class LeakObserver(StepObserver):
             step = replace(step, **found)
             return self._with_errors(step) if self._measures() else step
 
-    def _found(self, gap: Array | None) -> dict[str, float]:
+    def _found(self, gap: Array | None) -> dict[str, Any]:
         """Return the columns of a load step with a map of gaps."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
-        section, columns = self._section, {}
+        section = self._section
+        columns: dict[str, Any] = {}
         periodic = self._coupling.scene.surface.periodic
         for axis in section.directions:
             flow = solved_gap_flow(gap, self._coupling.surface.lengths, axis, periodic=periodic)
@@ -80,22 +81,14 @@ class LeakObserver(StepObserver):
     def _with_errors(self, step: LoadStep) -> LoadStep:
         """Return the load step with the error of its leak by the grid."""
         coupling = self._coupling
-        probe, (nx, ny) = coupling.error_probe(), coupling.cells
-        load: dict[str, Any] = {"approach": step.approach_mm}
-        if coupling.load_history.quantity == "force":
-            load = {"force": step.force_N}
-
-        def coarser() -> dict[str, float]:
-            model = probe.on_body(probe.model.resampled((nx // 2, ny // 2)), probe.order)
-            return self._found(model.press(Control(**load, tilt=step.tilt)).open_gap)
-
         try:
-            found = on_root_alone(coupling.comm, coarser)
+            gap = coupling.coarser_gap(step)
+            found = on_root_alone(coupling.comm, lambda: self._found(gap))
         except NotConverged as error:
             self._notes[f"error of the leak at load step {step.step} not measured: {error}"] = None
             return step
         names = {axis: f"leak_{axis}_mm3_per_s" for axis in self._section.directions}
-        errors = {
+        errors: dict[str, Any] = {
             f"leak_error_{axis}_mm3_per_s": abs(getattr(step, name) - found[name])
             for axis, name in names.items()
         }
@@ -105,4 +98,3 @@ class LeakObserver(StepObserver):
         """Yield what a report says of the leak."""
         yield from leak_notes(steps)
         yield from self._notes
-

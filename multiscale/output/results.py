@@ -30,7 +30,17 @@ from support.collective import on_root, shared
 from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face", "leak")
+_FIGURES = (
+    "overview",
+    "surface",
+    "curves",
+    "pressures",
+    "contact",
+    "laws",
+    "block",
+    "face",
+    "leak",
+)
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",

@@ -77,4 +77,4 @@ def _whole_text(step: LoadStep, direction: str) -> str:
 
 
 def _of(step: LoadStep, name: str, direction: str) -> float:
-    return getattr(step, f"{name}_{direction}_mm3_per_s")  # type: ignore[no-any-return]
+    return getattr(step, f"{name}_{direction}_mm3_per_s")

@@ -115,7 +115,9 @@ def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
     monkeypatch.setattr(observer, "solved_gap_flow", counted)
     history = run(scene(WATER | {"direction": "y"}, output={"check": "none"}))
     assert directions == ["y"] * 4
-    assert np.isnan(history.leak_x_mm3_per_s).all() and np.isnan(history.leak_error_y_mm3_per_s).all()
+    assert (
+        np.isnan(history.leak_x_mm3_per_s).all() and np.isnan(history.leak_error_y_mm3_per_s).all()
+    )
     np.testing.assert_array_equal(history.leak_y_mm3_per_s, ran().leak_y_mm3_per_s)
 
 
@@ -129,9 +131,7 @@ def test_multigrid_solves_large_maps(monkeypatch):
 def test_flow_turns_with_the_pressures_and_is_slower_in_oil():
     oil = {"viscosity": "0.1 Pa s", "pressures": ["0 bar", "4 bar"]}
     history = run(scene(oil, output={"check": "none"}))
-    np.testing.assert_allclose(
-        history.leak_x_mm3_per_s, -0.04 * ran().leak_x_mm3_per_s, rtol=1e-12
-    )
+    np.testing.assert_allclose(history.leak_x_mm3_per_s, -0.04 * ran().leak_x_mm3_per_s, rtol=1e-12)
 
 
 def test_a_block_has_walls_and_gaps_of_its_own():
@@ -204,5 +204,5 @@ def test_couplings_without_gaps_of_cells_are_refused(kind):
     text = rf"^leak: does not go with coupling.kind = '{kind}', which knows no gaps of cells"
     with pytest.raises(InputError, match=text):
         scene(kind=kind)
-    with pytest.raises(InputError, match="leak: .*'elliptic', which knows no gaps beside summits"):
+    with pytest.raises(InputError, match=r"leak: .*'elliptic', which knows no gaps beside summits"):
         scene(kind="concurrent", micro={"model": "elliptic"})

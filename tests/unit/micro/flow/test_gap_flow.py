@@ -64,9 +64,7 @@ def test_a_periodic_map_may_be_moved_across_the_flow():
     assert moved.transmissivity == pytest.approx(first.transmissivity, rel=1e-12)
     walled = gap_flow(gap, LENGTHS, periodic=False)
     assert walled.transmissivity < first.transmissivity
-    np.testing.assert_allclose(
-        moved.constriction.place[0], first.constriction.place[0], rtol=1e-12
-    )
+    np.testing.assert_allclose(moved.constriction.place[0], first.constriction.place[0], rtol=1e-12)
     assert moved.constriction.share == pytest.approx(first.constriction.share, rel=1e-9)
 
 
@@ -90,7 +88,9 @@ def test_a_closed_line_lets_nothing_through():
     gap[4] = 0.0
     flow = gap_flow(gap, LENGTHS)
     assert not flow.percolates
-    assert flow.transmissivity == flow.hydraulic_gap == flow.flow_factor == flow.rate(1.0, 1e-9) == 0
+    assert (
+        flow.transmissivity == flow.hydraulic_gap == flow.flow_factor == flow.rate(1.0, 1e-9) == 0
+    )
     assert flow.constriction is None
     np.testing.assert_array_equal(flow.pressure[:4], 1.0)
     np.testing.assert_array_equal(flow.pressure[5:], 0.0)

@@ -1,4 +1,4 @@
-"""Networks of conductances against resistors by hand, paths searched one by one, exact fractions."""
+"""Networks of conductances against resistors by hand, a search of paths, and exact fractions."""
 
 from fractions import Fraction
 from itertools import pairwise
@@ -17,8 +17,12 @@ IN, OUT = -2, -1
 def network(count, *links):
     """Return a network of links (tail, head, conductance)."""
     tail, head, conductance = zip(*links, strict=True)
-    ends = [np.array([one if one >= 0 else count + 2 + one for one in each]) for each in (tail, head)]
-    return Network(count=count, tail=ends[0], head=ends[1], conductance=np.array(conductance, float))
+    ends = [
+        np.array([one if one >= 0 else count + 2 + one for one in each]) for each in (tail, head)
+    ]
+    return Network(
+        count=count, tail=ends[0], head=ends[1], conductance=np.array(conductance, float)
+    )
 
 
 def lattice(seed, nx=4, ny=3, powers=12.0):
