@@ -57,8 +57,8 @@ class Network:
             flow: Flow through every link from tail to head, shape (m,).
         """
         size = self.count + 2
-        out = np.bincount(self.tail, flow, minlength=size)
-        return out - np.bincount(self.head, flow, minlength=size)
+        out, into = (np.bincount(ends, flow, minlength=size) for ends in (self.tail, self.head))
+        return np.subtract(out, into, dtype=float)
 
     def flow(self, potential: Array) -> Array:
         """Return the flow through every link under potentials of all nodes, shape (m,).

@@ -4,6 +4,11 @@ The error of the grid is measured like that of the force: the contact and the fl
 are solved again on half as many cells a side, under the same load. Channels close as cells become
 coarser, so that most of the error is that of the gaps, not that of the flow through them.
 
+On 12 surfaces with 8 and 16 cells along the shortest wave, under 6 loads each of up to half of the
+area in contact, the error was no less than the true one on 93 and 92 % of 144 flows, no less than
+half of it on 97 and 98 %, and 1.6 to 2.9 times as large in the median
+(`tests/benchmarks/leak_error.py`).
+
 Theory: docs/theory.md, section 15.
 """
 
