@@ -12,7 +12,7 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.html_page import filled
-from multiscale.results.leak_notes import DIRECTIONS, known_leaks, leak_text
+from multiscale.results.leak_notes import WAYS, known_leaks, leak_text
 from multiscale.run import Run
 
 PAPER = (
@@ -101,9 +101,9 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    for direction in DIRECTIONS:
-        if known_leaks([last], direction):
-            yield f"leak along {direction}", leak_text(last, direction), ""
+    for way, where in WAYS.items():
+        if known_leaks([last], way):
+            yield f"leak {where}", leak_text(last, way), ""
     for name, (text, unit) in _MORE.items():
         if value := getattr(last, name):
             yield text, quantity(value, unit), ""

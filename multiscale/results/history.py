@@ -226,6 +226,12 @@ class History:
     )  # fmt: skip
     percolates_y = Column("1 where an open path leads along y, 0 where the gap is closed")
 
+    leak_mm3_per_s = Column(
+        "Flow rate of the leak over the contact face, 0 where the gap is closed", "mm³/s",
+        heading="leak", table="more", error="leak_error_mm3_per_s",
+    )  # fmt: skip
+    leak_error_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
+
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)

@@ -31,7 +31,7 @@ Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
 
 
-_WITHOUT_CELLS = {"isolated", "consistent", "representative", "reference", "auto"}
+_WITHOUT_CELLS = {"isolated", "consistent", "reference", "auto"}
 """Couplings that know no gaps of the surface's cells."""
 
 
@@ -112,7 +112,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     problems = chain(
-        *(rule(scene) for rule in (_bodies, _surfaces, _couplings)),
+        *(rule(scene) for rule in (_bodies, _surfaces, _couplings, _leak)),
         _representative_laws(scene, of_coupling),
         _micro_models(scene),
     )
@@ -200,6 +200,21 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
             "leave it out, and state them",
         )
+
+
+def _leak(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what does not fit of the flow over a face, between its edges."""
+    leak, second = scene.leak, scene.counter_body
+    if leak is None:
+        return
+    over_face = "law.kind = 'representative' on a [body]"
+    if leak.between_edges and (scene.body is None or not scene.law.representative):
+        yield "leak.inlet", f"needs {over_face}, whose face has edges", "leave out both edges"
+    if scene.law.representative and not leak.between_edges:
+        problem = "is required with law.kind = 'representative': the fluid flows over the face"
+        yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
+    if scene.law.representative and second is not None and second.mesh is not None:
+        yield "leak", "does not go with a counter-body on a mesh", "a rigid side or a half-space"
 
 
 def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:

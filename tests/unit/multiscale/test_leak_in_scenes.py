@@ -95,9 +95,9 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
     assert "leak along x at load step 6: closed, nothing leaks: the surfaces touch" in notes
     assert "the gap is closed along x at" in notes
     step = history.steps[0]
-    assert leak_text(replace(step, leak_error_x_mm3_per_s=None), "x").endswith("mm³/s")
+    assert leak_text(replace(step, leak_error_x_mm3_per_s=None), "x_").endswith("mm³/s")
     unsure = replace(step, leak_x_mm3_per_s=0.0, leak_error_x_mm3_per_s=2.0)
-    assert leak_text(unsure, "x") == "closed, nothing leaks (or 2 mm³/s)"
+    assert leak_text(unsure, "x_") == "closed, nothing leaks (or 2 mm³/s)"
 
 
 def test_coarse_grids_are_warned_of():
