@@ -20,7 +20,9 @@ class _Unit(NamedTuple):
 
 _UNITS = {
     "mm": _Unit('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3}),
-    "MPa": _Unit('"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3, "bar": 0.1}),
+    "MPa": _Unit(
+        '"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3, "bar": 0.1}
+    ),
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
     "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6}),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,17 @@ from matplotlib.figure import Figure
 
 from micro.flow.gap_flow import GapFlow
 from multiscale.figures.maps import coarsened, colour_bar, map_axes
-from multiscale.figures.style import BLUE, INK, ORANGE, VERMILLION, panels, show_unit, styled
+from multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    ONE_COLUMN,
+    ORANGE,
+    VERMILLION,
+    panels,
+    show_unit,
+    styled,
+)
 from multiscale.gap_flows import solved_gap_flow
 from multiscale.readable import percent, usual_unit
 
@@ -19,7 +30,8 @@ _CONTACT = "0.5"
 """Grey of what is in contact."""
 _FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="fluid")
 """Colours of fluid pressures, on which flow lines are seen."""
-_COLOURS = {"x": BLUE, "y": ORANGE}
+_COLOURS = {"x_": BLUE, "y_": ORANGE, "": BLUE}
+"""Colours of curves by what stands for the way of the flow in names of columns."""
 
 
 @styled()
@@ -33,18 +45,21 @@ def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figu
         section: A `multiscale.scene.leak.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
     """
-    shown = section.directions if record is not None else ()
-    title = "" if record is None else f"flow at load step {record.step}"
+    ways = [""] if section.between_edges else [f"{one}_" for one in section.directions]
+    shown = section.directions if record is not None and any(ways) else ()
+    title = f"flow at load step {record.step}" if shown else ""
     rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
-    figure, axes = panels(rows, 2, height, bars=range(len(shown)), title=title)
+    columns, width = (2, FULL_WIDTH) if any(ways) else (1, ONE_COLUMN)
+    bars = range(len(shown))
+    figure, axes = panels(rows, columns, height, width=width, bars=bars, title=title)
     for place, direction in zip(axes, shown, strict=False):
         gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
         flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
         _draw_flow(place, flow, section)
         place.set_title(f"along {direction}: {_channel_text(flow)}")
-    _draw_leak(axes[len(shown)], history, section.directions)
-    if len(shown) != 1:
-        _draw_factors(axes[-1], history, section.directions)
+    _draw_leak(axes[len(shown)], history, ways)
+    if len(axes) > len(shown) + 1:
+        _draw_factors(axes[-1], history, ways)
     return figure
 
 
@@ -103,18 +118,18 @@ def _means(field: Any, steps: list[int]) -> Any:
     return part.reshape(nx, steps[0], ny, steps[1]).mean(axis=(1, 3))
 
 
-def _draw_leak(axes: Any, history: Any, directions: Any) -> None:
+def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
     """Draw the leak over the mean pressure, with error bars; closed load steps at the bottom."""
     pressure = history.mean_pressure_MPa
-    for direction in directions:
-        rate = np.abs(getattr(history, f"leak_{direction}_mm3_per_s"))
-        error = np.nan_to_num(getattr(history, f"leak_error_{direction}_mm3_per_s"))
+    for way in ways:
+        rate = np.abs(getattr(history, f"leak_{way}mm3_per_s"))
+        error = np.nan_to_num(getattr(history, f"leak_error_{way}mm3_per_s"))
         leaks = rate > 0.0
-        look: dict[str, Any] = {"color": _COLOURS[direction]}
+        look: dict[str, Any] = {"color": _COLOURS[way]}
         low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
         axes.errorbar(
             pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt="o-", ms=3.0, lw=1.2,
-            elinewidth=0.8, label=f"along {direction}", **look,
+            elinewidth=0.8, label=f"along {way[:1]}", **look,
         )  # fmt: skip
         closed = ~leaks & ~np.isnan(rate)
         axes.plot(
@@ -124,17 +139,17 @@ def _draw_leak(axes: Any, history: Any, directions: Any) -> None:
     axes.set(yscale="log", ylabel="leak [mm³/s]", title="leak; triangles: closed")
     axes.set_xlim(0.0, None)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
-    if len(directions) > 1:
+    if len(ways) > 1:
         axes.legend()
 
 
-def _draw_factors(axes: Any, history: Any, directions: Any) -> None:
+def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
     """Draw the flow factors over the mean pressure."""
     pressure = history.mean_pressure_MPa
-    for direction in directions:
-        factor = getattr(history, f"flow_factor_{direction}")
+    for way in ways:
+        factor = getattr(history, f"flow_factor_{way[0]}")
         leaks = factor > 0.0
-        axes.plot(pressure[leaks], factor[leaks], "o-", ms=3.0, color=_COLOURS[direction])
+        axes.plot(pressure[leaks], factor[leaks], "o-", ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
     axes.set_xlim(0.0, None)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)

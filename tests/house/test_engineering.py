@@ -43,7 +43,7 @@ def test_numbers_of_the_page():
 @pytest.mark.long
 def test_the_leak_on_the_page_is_that_of_its_scene():
     history = run(Scene.load(ROOT / "demos" / "scenes" / "leak.toml", ["output.figures=false"]))
-    rows = re.findall(r"^\| (\d+) N \| (.*) % \| (.*) \| (.*) \| (.*) \|$", PAGE, re.MULTILINE)
+    rows = re.findall(r"^\| (\d+) N \| (.*) % \| (.*?) \| (.*?) \|(.*)\|$", PAGE, re.MULTILINE)
     assert len(rows) == 5
     for force, area, *leaks, shares in rows:
         index = int(np.argmin(np.abs(history.force_N - float(force))))

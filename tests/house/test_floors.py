@@ -51,8 +51,8 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "readable removed",
-        "figures gap_flows machine",
+        "gap_flows readable removed",
+        "figures machine",
         "laws loading",
         "exports results scene",
         "inputs",

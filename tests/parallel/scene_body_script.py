@@ -31,6 +31,9 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
+    leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
+    edges = {"inlet": "left", "outlet": "right"}
+    yield "leak", {**sample, **load, "body": body, "leak": leak | edges, "output": QUIET}
     yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": QUIET}
 
 
@@ -40,7 +43,8 @@ def main(folder):
     for name, content in sections(folder):
         run = Run(Scene.from_dict(content), comm)
         list(run.load_steps())
-        found[name] = run.steps[-1].force_N, run.steps[-1].approach_mm
+        last = run.steps[-1]
+        found[name] = last.force_N, last.approach_mm, last.leak_mm3_per_s or 0.0
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))
