@@ -7,8 +7,8 @@ from micro.flow.potential_flow import Preconditioner, factorised
 from support.arrays import Array
 
 MOST_FACTORISED = 512**2
-"""Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with it
-and 0.7 to 0.9 s with multigrid; on 1024² cells 5 to 15 s and 1.5 GB, and 4 to 7 s."""
+"""Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with
+it and 0.7 to 0.9 s with multigrid; on 1024² cells 5 to 15 s and 1.5 GB, and 4 to 7 s."""
 
 
 def flow_solver(cells: int) -> Preconditioner:

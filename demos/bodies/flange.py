@@ -12,13 +12,14 @@ Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raise
 
 Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
 rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names:
-volume `flange`, surfaces `raised face`, `washers` and `pipe end`.
+volume `flange`, surfaces `raised face`, `bore` and `rim` (the walls inside and outside of it),
+`washers` and `pipe end`.
 """
 
 from math import cos, pi, sin
 
 import gmsh
-from meshing import in_plane, name, set_size, write_body
+from meshing import in_box, in_plane, name, set_size, write_body
 
 DISC, RAISED, NECK = 18.0, 2.0, 40.0
 TOP = DISC + RAISED
@@ -53,6 +54,11 @@ def build(size: float) -> None:
     name(2, in_plane(TOP, FACE + 1), "raised face")
     name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
     name(2, in_plane(-NECK, PIPE + 1), "pipe end")
+    bore = in_box((-BORE, -BORE, -NECK), (BORE, BORE, TOP))
+    flat = {*bore, *in_plane(TOP, FACE), *in_plane(DISC, FACE)}
+    beside = in_box((-FACE, -FACE, DISC), (FACE, FACE, TOP))
+    name(2, bore, "bore")
+    name(2, [tag for tag in beside if tag not in flat], "rim")
 
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
     set_size(f"{size} * (1 + 0.15 * {away})")  # coarser with the distance from the face's rim

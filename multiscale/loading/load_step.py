@@ -94,8 +94,8 @@ class LoadStep:
         leak_error_y_mm3_per_s: Its error [mm³/s].
         transmissivity_y_mm3: Transmissivity along y [mm³].
         constriction_y_fraction: Part of the flow along y through its narrowest constriction.
-        leak_mm3_per_s: Flow rate over a contact face from the inlet to the outlet; 0 where the gap is
-            closed, None where the scene asks for none [mm³/s].
+        leak_mm3_per_s: Flow rate over a contact face from the inlet to the outlet; 0 where the gap
+            is closed, None where the scene asks for none [mm³/s].
         leak_error_mm3_per_s: What it differs by with gaps of samples on half as many cells a side
             [mm³/s].
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].

@@ -64,7 +64,7 @@ CASES = {  # edges; contact face; volumes; areas
     ),
 }
 
-WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}}
+WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim": 51.0}}
 """Radii of cylindrical faces about z."""
 
 

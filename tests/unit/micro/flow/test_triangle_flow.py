@@ -1,4 +1,4 @@
-"""Flow over triangles of a face: closed forms of rings and strips, closed rings, finite elements."""
+"""Flow over triangles of a face: closed forms of rings and strips, and finite elements."""
 
 import numpy as np
 import pytest
