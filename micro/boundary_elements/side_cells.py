@@ -61,13 +61,7 @@ class _SidePair:
         """
         length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
         step, period = length / rows, 2 * cells
-        # with 1/16 the mean stress over the cell in a corner of constant pressure errs by 8 % of
-        # the largest one, with 1/256 by 0.4 %
-        nodes = distance_nodes(step / (256.0 if stress else 16.0), length)
-        lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
-        low, high = (float(there) for there in sides.pair(axis))
-        both = csr_array(hstack([low * lower, high * lower[::-1]]))
-        means = both.toarray() if rows <= 128 else both  # full matrices are quicker
+        nodes = _nodes(length, rows, stress=stress)
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):
@@ -79,7 +73,14 @@ class _SidePair:
             else:
                 kernel = sides.compliance(axis, nodes, np.abs(waves))
             parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
+        means = _means(sides, axis, rows, nodes)
         return cls(means, _transposed(means), np.sum(parts, axis=0), np.arange(cells))
+
+    def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
+        """Return the sides across y of a square from those across x: waves do the same there."""
+        rows = len(self.place)
+        means = _means(sides, 1, rows, _nodes(sides.lengths[1], rows, stress=stress))
+        return _SidePair(means, _transposed(means), self.kernels, self.place)
 
     def among(self, rows: Indices, cells: Indices) -> _SidePair:
         """Return the same sides with some of these rows, and some of the cells of each."""
@@ -121,6 +122,22 @@ class _SidePair:
         return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves), 1)[0]
 
 
+def _nodes(length: float, rows: int, *, stress: bool) -> Array:
+    """Return distances from a side at which stresses or displacements are known [mm]."""
+    # with 1/16 the mean stress over the cell in a corner of constant pressure errs by 8 % of the
+    # largest one, with 1/256 by 0.4 %
+    return distance_nodes(length / rows / (256.0 if stress else 16.0), length)
+
+
+def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> Means:
+    """Return means over rows of cells of values at the nodes of both sides, (rows, 2 a)."""
+    length = sides.lengths[axis]
+    lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
+    low, high = (float(there) for there in sides.pair(axis))
+    both = csr_array(hstack([low * lower, high * lower[::-1]]))
+    return both.toarray() if rows <= 128 else both  # full matrices are quicker
+
+
 def _transposed(means: Means) -> Means:
     """Return the transpose of a full or sparse matrix, of the same kind."""
     return csr_array(means.T) if isinstance(means, csr_array) else means.T
@@ -146,8 +163,10 @@ def _pairs(
 ) -> tuple[_SidePair, _SidePair]:
     """Return the sides across x and those across y, around cells that fill the rectangle."""
     nx, ny = (round(length / step) for length, step in zip(sides.lengths, spacing, strict=True))
-    across_x, across_y = (_SidePair.of(sides, axis, (nx, ny), stress=stress) for axis in (0, 1))
-    return across_x, across_y
+    across_x = _SidePair.of(sides, 0, (nx, ny), stress=stress)
+    if nx == ny and sides.lengths[0] == sides.lengths[1]:
+        return across_x, across_x.turned(sides, stress=stress)
+    return across_x, _SidePair.of(sides, 1, (nx, ny), stress=stress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
