@@ -175,8 +175,6 @@ class Bodies:
         """Return the compliance of the meshes under the patches, of the first body or of both."""
         if self.parts.scene.decomposed:
             return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
-        from mpi4py import MPI
-
         from macro import patch_compliance_matrix
         from macro.compliance.cache import cached
         from macro.linear_solvers.options import users_options
@@ -185,7 +183,7 @@ class Bodies:
             return {"compliance": patch_compliance_matrix(self.contact_face())}
 
         key = (*self._as_text(), self.parts.patches, users_options())
-        return cached("plain", key, compute, self.comm or MPI.COMM_SELF)["compliance"]
+        return cached("plain", key, compute, self.comm)["compliance"]
 
     def mean_compliance(self) -> float:
         """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
