@@ -193,11 +193,6 @@ class LawContactProblem:
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
 
-_MOVED = 0.5
-"""Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
-"""
-
-
 class ContactPreconditioner:
     """The preconditioner of a body's tangents, with the stiffness of laws at points.
 
@@ -222,24 +217,20 @@ class ContactPreconditioner:
         self._knows_laws = face is not None and equilibrium.body.lattice is None
         self._with_laws: PETSc.KSP | None = None
         self._stiffened: Stiffened | None = None
-        self._slope: Array | None = None
+        self._slope = np.zeros_like(equilibrium.forces.slope)
 
     def update(self) -> None:
         """Follow the tangent."""
         if not self._knows_laws:
             return
-        body, slope = self._equilibrium.body, self._equilibrium.forces.slope
-        comm = self._face.comm
-        known = np.zeros_like(slope) if self._slope is None else self._slope
-        both = (np.abs(slope - known).max(initial=0.0), slope.max(initial=0.0))
-        change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
-        if change <= _MOVED * largest:
+        body, forces = self._equilibrium.body, self._equilibrium.forces
+        if not forces.moved_from(self._slope):
             return
-        self._slope = slope.copy()
+        slope = self._slope = forces.slope.copy()
         if self._with_laws is not None:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
-        if largest:
+        if forces.comm.allreduce(slope.any(), op=MPI.LOR):
             springs = springs_at(self._face.points_by_dofs, slope)
             self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
             self._with_laws = body.solver_of(self._stiffened)

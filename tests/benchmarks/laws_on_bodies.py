@@ -1,11 +1,11 @@
 """Newton steps and linear iterations of bodies under laws: parts, laws, controls.
 
 Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]
-[--slab]`, also under mpirun; without parts all of `body_solvers.py`. With ``--slab`` an elastic slab
-of other cells is pressed on every part in place of a rigid plane. Laws grow exponentially with closure, as those
-of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
-(mixed). Every line is one load: in a single step, and along a path of four steps. ``K`` counts the
-iterations to 1e-8 of the body without laws.
+[--slab]`, also under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with
+closure, as those of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves
+of the face (mixed). Every line is one load: in a single step, and along a path of four steps. ``K``
+counts the iterations to 1e-8 of the body without laws. With ``--slab`` an elastic slab of other
+cells is pressed on the part in place of a rigid plane.
 """
 
 import os
@@ -88,7 +88,7 @@ def rows(face):
 
 def slab_on(face, plane, degree, size):
     """Return the face of a slab of steel that hangs over a part's face."""
-    low, high = plane.frame.origin, plane.frame.origin + [*plane.lengths, 10.0]
+    low, high = plane.frame.origin, plane.frame.origin + np.array([*plane.lengths, 10.0])
     cells = [max(2, round(length / (1.3 * size))) for length in high - low]
     tagged = box(low, high, cells, "tetrahedron" if face.body.hexahedral else "hexahedron", COMM)
     body = MeshedBody(tagged, STEEL, [Support(tag=HIGH)], order=degree, normal=(0, 0, -1))
