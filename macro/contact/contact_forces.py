@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -26,6 +27,9 @@ Indices = NDArray[np.intp]
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
 
+
+_MOVED = 0.5
+"""Change of the slopes, relative to the largest, that a preconditioner does not overlook."""
 
 _MATRIX = "patchlaw matrix"
 
@@ -114,6 +118,7 @@ class ContactForces:
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
         control: What the load step prescribes of the plane.
         slope: p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵].
+        assembled: The part of it that the user's matrix holds, which `add_product` leaves out.
         comm: MPI communicator of the mesh.
 
     Note:
@@ -138,6 +143,7 @@ class ContactForces:
         self.control = Control(approach=0.0)
         self._unloaded = False
         self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
+        self.assembled: Array = np.zeros_like(self.slope)
         self._border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
@@ -239,14 +245,27 @@ class ContactForces:
         self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 
+    def moved_from(self, slope: Array) -> bool:
+        """Return whether the slopes differ from earlier ones by half of the largest or more."""
+        both = np.abs(self.slope - slope).max(initial=0.0), self.slope.max(initial=0.0)
+        change, largest = (self.comm.allreduce(each, op=MPI.MAX) for each in both)
+        return bool(change > _MOVED * largest)
+
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y."""
+        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y, less the part that is assembled."""
+        self._add_product(x, y, self.slope - self.assembled, self._border)
+
+    def subtract_assembled(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Take the product of the part that is assembled with x from y."""
+        self._add_product(x, y, -self.assembled, self._border[:, :0])
+
+    def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
         operator, samples = self._sampling.operator, self._sampling.values
         operator.multTranspose(x, samples)
         stretch = samples.array_r
-        pressure = self.slope * stretch
-        if self._border.shape[1]:
-            pressure -= self._border @ self.levers.summed(self._border.T @ stretch)
+        pressure = slope * stretch
+        if border.shape[1]:
+            pressure -= border @ self.levers.summed(border.T @ stretch)
         samples.array[:] = pressure
         operator.multAdd(samples, y, y)
 
@@ -354,10 +373,6 @@ class ContactTangent:
     """
 
     def __init__(self, contacts: Sequence[AddsProduct]) -> None:
-        self.follow(contacts)
-
-    def follow(self, contacts: Sequence[AddsProduct]) -> None:
-        """Take the derivatives of other contacts from now on."""
         self._contacts = [weakref.proxy(contact) for contact in contacts]
 
     def shell(self, matrix: PETSc.Mat) -> PETSc.Mat:

@@ -83,12 +83,12 @@ class UserEquations:
         bcs: Dirichlet conditions, also set to the interfaces.
         tangent: Derivative of F as UFL; None: `ufl.derivative`.
         interfaces: The interfaces.
-        in_matrix: Whether tangents of pointwise interfaces are assembled too.
+        in_matrix: Whether the matrix keeps springs of pointwise interfaces.
 
     Attributes:
         displacement: u.
         matrix: The derivative of F, with unit rows for constrained unknowns, rigid body modes
-            attached, and the assembled tangents.
+            attached, and with springs of the interfaces.
         tangent: The whole derivative, a PETSc matrix without entries.
 
     Raises:
@@ -121,12 +121,11 @@ class UserEquations:
         space = displacement.function_space
         nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
         self.matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
-        self._interfaces, self._assembling = interfaces, in_matrix
+        self._interfaces, self._keeping = interfaces, in_matrix
         for interface in interfaces:
             interface.constrain(self._bcs)
-        self._assembled = list[Interface]()
-        self._applied = ContactTangent(interfaces)
-        self.tangent = self._applied.shell(self.matrix)
+            interface.keep_in(self.matrix, fresh=True)
+        self.tangent = ContactTangent(interfaces).shell(self.matrix)
         self._contact = self.matrix.createVecRight()
         self._inner, self._largest = self._contact.duplicate(), 0.0
 
@@ -141,10 +140,8 @@ class UserEquations:
         return compat.petsc_vector(self.displacement)
 
     def begin(self) -> None:
-        """Decide which tangents are assembled: those that can be, under their indenters now."""
+        """Forget the inner forces of earlier solves."""
         self._largest = 0.0
-        self._assembled = [each for each in self._interfaces if self._assembling and each.assembles]
-        self._applied.follow([each for each in self._interfaces if each not in self._assembled])
 
     def take(self, x: PETSc.Vec) -> None:
         """Put a vector of PETSc into the displacement."""
@@ -171,25 +168,25 @@ class UserEquations:
     def scale(self) -> float:
         """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
         self.matrix.mult(self.vector, self._inner)
+        for interface in self._interfaces:
+            interface.subtract_kept(self.vector, self._inner)
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(self._contact.norm(), self._largest)
 
     def update_tangent(self, _x: PETSc.Vec) -> None:
         """Move the tangent to the displacement.
 
-        The derivative of F is assembled anew where a function or constant in it has changed, or
-        where tangents of contact were added to it.
+        The derivative of F is assembled anew where a function or constant in it has changed.
         """
         values = self._values()
-        same = all(map(np.array_equal, values, self._known))
-        if self._assembling or not self.comm.allreduce(same, min):
+        same = self.comm.allreduce(all(map(np.array_equal, values, self._known)), min)
+        if not same:
             compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
             self._known = values
         for interface in self._interfaces:
-            if interface in self._assembled:
-                interface.add_tangent(self.displacement, self.matrix)
-            else:
-                interface.move_tangent(self.displacement)
+            interface.move_tangent(self.displacement)
+            if self._keeping:
+                interface.keep_in(self.matrix, fresh=not same)
 
     def reaction(self) -> Array:
         """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""

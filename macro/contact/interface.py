@@ -233,9 +233,7 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        added = springs_at(self._points_by_free, self.forces.slope)
-        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        added.destroy()
+        self._add_springs(self.forces.slope, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
@@ -252,17 +250,49 @@ class Interface:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
         self.forces.update(self._vector(x))
 
+    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
+        """Keep the springs of pointwise laws in a matrix that preconditioners are made of.
+
+        They follow the tangent once they differ much from it. What they differ by is left to
+        `add_product`, so that matrix and product together are the derivative at any time.
+
+        Args:
+            matrix: An assembled matrix of elasticity.
+            fresh: Whether the matrix holds none of them, as it was assembled anew.
+        """
+        forces = self.forces
+        if fresh:
+            forces.assembled = np.zeros_like(forces.slope)
+        if self.mode == "pointwise" and forces.moved_from(forces.assembled):
+            self._add_springs(forces.slope - forces.assembled, matrix)
+            forces.assembled = forces.slope.copy()
+
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product of the derivative with a vector x to y, as a shell does."""
+        self._add_product(self.forces.add_product, x, y)
+
+    def subtract_kept(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Take the product of the springs that a matrix keeps with a vector x from y."""
+        self._add_product(self.forces.subtract_assembled, x, y)
+
+    def _add_product(
+        self, add: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec
+    ) -> None:
+        """Add a product between unconstrained unknowns."""
         if self._free is None:
-            self.forces.add_product(x, y)
+            add(x, y)
             return
         product = self._load
         self._masked.pointwiseMult(x, self._free)
         product.set(0.0)
-        self.forces.add_product(self._masked, product)
+        add(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
+
+    def _add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
+        added = springs_at(self._points_by_free, slope)
+        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
 
     def evaluate(self, x: Any) -> FaceContactState:
         """Evaluate the contact at displacements; the properties then give its parts.

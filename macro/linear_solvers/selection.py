@@ -47,7 +47,7 @@ from scipy import sparse
 
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
-from macro.linear_solvers.node_matrices import Stiffened, for_displacements
+from macro.linear_solvers.node_matrices import Stiffened, for_displacements, with_springs
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
 from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 
@@ -232,10 +232,8 @@ def vertex_grid(
     """
     transfer, matrix = vertex_transfer(space, linear.space, free), linear.stiffness
     if springs is not None:
-        matrix, modes = matrix.copy(), matrix.getNearNullSpace()
         there = springs.ptap(transfer)
-        matrix.axpy(1.0, there, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        matrix.setNearNullSpace(modes)
+        matrix = with_springs([matrix], there)
         there.destroy()
     return [CoarserGrid(transfer, matrix)]
 

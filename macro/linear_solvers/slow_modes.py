@@ -71,7 +71,11 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
     beside = -np.sqrt(ratio) / length[:-1]
     values, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
     slow = np.flatnonzero(values < _SLOW)[:_MOST_MODES]
-    return np.column_stack(basis) @ vectors[:, slow]
+    modes = np.zeros((residual.local_size, slow.size), order="F")
+    for vector, shares in zip(basis, vectors[:, slow], strict=True):
+        for k, share in enumerate(shares):
+            modes[:, k] += share * vector
+    return modes
 
 
 class Balanced:

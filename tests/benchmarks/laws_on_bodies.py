@@ -1,10 +1,11 @@
 """Newton steps and linear iterations of bodies under laws: parts, laws, controls.
 
-Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]`, also
-under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as those
-of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
-(mixed). Every line is one load: in a single step, and along a path of four steps. ``K`` counts the
-iterations to 1e-8 of the body without laws.
+Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]
+[--slab]`, also under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with
+closure, as those of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves
+of the face (mixed). Every line is one load: in a single step, and along a path of four steps. ``K``
+counts the iterations to 1e-8 of the body without laws. With ``--slab`` an elastic slab of other
+cells is pressed on the part in place of a rigid plane.
 """
 
 import os
@@ -21,11 +22,12 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from body_solvers import COMM, PARTS, iterations
-from helpers.machine_parts import part_body, read_part
+from helpers.body_meshes import HIGH, LOW, box
+from helpers.machine_parts import STEEL, part_body, read_part
 
 from geometry import PatchGrid
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace
+from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
 from macro.mesh.contact_face import contact_facets
 from macro.mesh.tagged import planar_face
 from support.errors import NotConverged
@@ -84,10 +86,22 @@ def rows(face):
             )
 
 
+def slab_on(face, plane, degree, size):
+    """Return the face of a slab of steel that hangs over a part's face."""
+    low, high = plane.frame.origin, plane.frame.origin + np.array([*plane.lengths, 10.0])
+    cells = [max(2, round(length / (1.3 * size))) for length in high - low]
+    tagged = box(low, high, cells, "tetrahedron" if face.body.hexahedral else "hexahedron", COMM)
+    body = MeshedBody(tagged, STEEL, [Support(tag=HIGH)], order=degree, normal=(0, 0, -1))
+    lower = tagged.facet_tags.find(LOW)
+    facets = contact_facets(tagged.mesh, lower, plane.frame, opposed=True)
+    return FacePair(face, LoadedFace(body, facets, face.patches))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*")
     parser.add_argument("--scale", type=float, default=0.6)
+    parser.add_argument("--slab", action="store_true")
     choice = parser.parse_args()
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]
@@ -97,9 +111,11 @@ def main():
         patches = PatchGrid(grid=(2, 1), lengths=plane.lengths)
         face = LoadedFace(body, contact_facets(tagged.mesh, facets, plane.frame), patches)
         alone = iterations(body, body.solver)
+        if choice.slab:
+            face = slab_on(face, plane, rest[0], part.size / choice.scale)
         body.solver.setTolerances(rtol=1e-10)
         if COMM.rank == 0:
-            print(f"{name}, {body.dofs} unknowns, K {alone}", flush=True)
+            print(f"{name}, {face.body.dofs} unknowns, K {alone}", flush=True)
         for row in rows(face):
             if COMM.rank == 0:
                 print(f"  {row[0]:24s} {row[1]:32s} {row[2]}", flush=True)
