@@ -118,7 +118,6 @@ class ContactForces:
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
         control: What the load step prescribes of the plane.
         slope: p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵].
-        assembled: The part of it that the user's matrix holds, which `add_product` leaves out.
         comm: MPI communicator of the mesh.
 
     Note:
@@ -143,7 +142,6 @@ class ContactForces:
         self.control = Control(approach=0.0)
         self._unloaded = False
         self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
-        self.assembled: Array = np.zeros_like(self.slope)
         self._border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
@@ -251,13 +249,19 @@ class ContactForces:
         change, largest = (self.comm.allreduce(each, op=MPI.MAX) for each in both)
         return bool(change > _MOVED * largest)
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y, less the part that is assembled."""
-        self._add_product(x, y, self.slope - self.assembled, self._border)
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
+        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.
 
-    def subtract_assembled(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Take the product of the part that is assembled with x from y."""
-        self._add_product(x, y, -self.assembled, self._border[:, :0])
+        Args:
+            x: A vector.
+            y: What it is added to.
+            known: A part of p'/w that is left out, as y holds its product already, shape (n,).
+        """
+        self._add_product(x, y, self.slope - known, self._border)
+
+    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product B diag(s) Bᵀ x with other slopes s, shape (n,), to y."""
+        self._add_product(x, y, slope, self._border[:, :0])
 
     def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
         operator, samples = self._sampling.operator, self._sampling.values

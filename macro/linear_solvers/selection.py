@@ -10,7 +10,7 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,
                     the supports and the jump of the moduli; with their slow modes solved for
-                    (`slow_modes`) 14 to 18 on flat tetrahedra, 19 to 21 on flat hexahedra, 26 to 31
+                    (`slow_modes`) 14 to 17 on flat tetrahedra, 16 to 18 on flat hexahedra, 26 to 31
                     on a quadratic brake pad held at the rim of its piston
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
