@@ -113,6 +113,10 @@ class Motions:
         """Return the motions on a part of the cells, which carries all loads."""
         return replace(self, along_x=self.along_x[:, box[0]], along_y=self.along_y[:, box[1]])
 
+    def among(self, cells: Indices) -> Motions:
+        """Return the motions on a column of some cells, which carry all loads."""
+        return replace(self, along_x=self.modes_of(cells), along_y=np.ones((self.count, 1)))
+
     def coarsened(self, factors: Sequence[int]) -> Motions:
         """Return the motions on blocks of cells; see `coarsened`."""
         return Motions(
