@@ -28,7 +28,7 @@ _CAUTION = 4.0
 """Factor on the rate at which changes by finite slopes fell last, for the next one."""
 _BY_SLOPES = 0.1
 """Largest part of the displacements that finite slopes add."""
-_CONVERGED = 1e-9
+_CONVERGED = 3e-9
 """Change by finite slopes at which the iteration ends, over the largest interference."""
 _MEMORY = 2
 """Steps that the mixing remembers."""
@@ -126,7 +126,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         rate = min(1.0, _CAUTION * left / before) if 0.0 < before < np.inf else _AHEAD
         ahead = rate * left + _BY_SLOPES * solution.residual
         displaced = mixing.next(displaced, change)
-        accuracy = tolerance if ahead <= last else min(_FIRST, ahead)
+        accuracy = tolerance if ahead <= last else max(tolerance, min(_FIRST, ahead, 0.1 * left))
     raise NotConverged(
         "the displacements by finite slopes",
         reason=f"they still change by {left:.1e} of the displacement",
