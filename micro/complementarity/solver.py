@@ -81,13 +81,24 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
         solution = _solve_nested(problem.coarsened(factors, _ESTIMATE))
         most = _MARGIN * (float(solution.motion[0]) + top)
     while True:
-        least = min(top - most, np.nextafter(top, -np.inf))
+        least = min(top - most, np.nextafter(top, -np.inf), _bearing(problem))
         place = _place(problem, interference > least)
         solution = _solve_growing(problem, place, first)
         approach, used = float(solution.motion[0]) + top, used + solution.iterations
         if approach <= most or _is_whole(place, interference):
             return solution._replace(iterations=used)
         first, most = solution.pressure, _MARGIN * approach
+
+
+def _bearing(problem: CellProblem) -> float:
+    """Return an interference that enough cells exceed to bear the force at their hardness [mm]."""
+    if problem.hardness == np.inf:
+        return np.inf
+    most = problem.interference.size
+    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.hardness) + 1
+    last = most - min(needed, most)
+    highest = float(np.partition(problem.interference, last, axis=None)[last])
+    return float(np.nextafter(highest, -np.inf))
 
 
 def touches_few_cells(problem: CellProblem) -> bool:

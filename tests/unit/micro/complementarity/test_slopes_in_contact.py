@@ -83,6 +83,28 @@ def test_costs_less_than_two_more_solutions(control):
     assert MODEL.press(control).iterations < 3.0 * without.iterations
 
 
+@pytest.mark.parametrize("approach", [1e-3, 0.3])
+def test_slopes_of_a_flat_surface_add_nothing(approach):
+    """Slopes then change nothing at all, which asks for no better solution than the tolerance."""
+    flat = replace(SURFACE, heights=np.zeros(SURFACE.grid))
+    slopes = FiniteSlopes(flat, SLOPES.material)
+    state = replace(MODEL, surface=flat, highest=0.0, slopes=(slopes,)).press(
+        Control(approach=approach)
+    )
+    without = replace(MODEL, surface=flat, highest=0.0, slopes=()).press(Control(approach=approach))
+    assert state.in_contact.all()
+    assert state.force == pytest.approx(without.force, rel=1e-10)
+
+
+def test_full_contact_pressed_on():
+    """Slopes add more the deeper the plane: what they change falls slowly, from any start."""
+    there = Control(approach=1.0)
+    before = MODEL.press(Control(approach=0.9))
+    states = [MODEL.press(there, start=start) for start in (None, before.guess)]
+    assert all(state.in_contact.all() for state in states)
+    assert states[0].force == pytest.approx(states[1].force, rel=1e-8)
+
+
 def test_slopes_that_do_not_agree_are_told():
     class Unsteady:
         """Displacements that are other ones at every call: there is no fixed point."""
