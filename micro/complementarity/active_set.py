@@ -193,7 +193,7 @@ class ActiveSet:
         )
         old, residual, energy = self.pressure, self.residual, self._energy
         for halving in range(_MOST_HALVINGS):
-            admissible = self._moved(cells, 0.5**halving * change)
+            admissible = self._moved(old, cells, 0.5**halving * change)
             if admissible is None:
                 continue
             self._accept(admissible)
@@ -202,14 +202,15 @@ class ActiveSet:
                 return True
         return False
 
-    def _moved(self, cells: Indices, change: Array) -> Array | None:
-        """Return admissible pressures near the present ones and a change; None if there are none.
+    def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:
+        """Return admissible pressures near old ones and a change; None if there are none.
 
         Args:
+            old: Pressures / E* before, shape (nx, ny).
             cells: Flat indices of the cells that change, shape (n,).
             change: Their change, shape (n,).
         """
-        problem, moved = self.problem, self.pressure.copy()
+        problem, moved = self.problem, old.copy()
         wanted = moved.ravel()[cells] + change
         moved.ravel()[cells] = np.clip(wanted, 0.0, problem.hardness)
         admissible = problem.admissible(moved.copy(), self._yielding)
