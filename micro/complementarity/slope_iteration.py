@@ -28,8 +28,13 @@ _CAUTION = 4.0
 """Factor on the rate at which changes by finite slopes fell last, for the next one."""
 _BY_SLOPES = 0.1
 """Largest part of the displacements that finite slopes add."""
-_CONVERGED = 3e-9
-"""Change by finite slopes at which the iteration ends, over the largest interference."""
+_CONVERGED, _EXPECTED = 3e-9, 1e-9
+"""Change by finite slopes at which the iteration ends, over the largest interference: one that was
+evaluated, and one that is expected of the next evaluation, which is then left out. With 3e-9 for
+both a force under a hardness erred by 1e-8 after unloading, with 1e-9 by 7e-11."""
+_PART = 0.1
+"""Residual of a solution over the last change, at most: the mixing takes differences of changes.
+Without it a plane 800 µm into heights of 10 µm took 2070 iterations, with it 207."""
 _MEMORY = 2
 """Steps that the mixing remembers."""
 _NOISE = 2.0
@@ -95,7 +100,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         displaced = compliance.slope_displacement(start.pressure) if known is None else known
         first = _FIRST**2
     accuracy, iterations, left, ahead = max(tolerance, first), 0, np.inf, np.inf
-    last = max(_CONVERGED, 10.0 * tolerance)
+    last, least = (max(size, 10.0 * tolerance) for size in (_CONVERGED, _EXPECTED))
     for _ in range(_MOST_SOLUTIONS):
         lowered = replace(
             problem, interference=interference - displaced, lowered=displaced, tolerance=accuracy
@@ -115,7 +120,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         # bodies without interference do not touch, and their pressures have an energy
         sound = largest > 0.0 and np.vdot(solution.pressure, nearer) > 0.0
         exact = sound and accuracy <= tolerance
-        if exact and ahead <= last:
+        if exact and ahead <= least:
             return found._replace(residual=max(solution.residual, ahead))
         change = compliance.slope_displacement(solution.pressure) - displaced
         before, left = left, np.inf
@@ -126,7 +131,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         rate = min(1.0, _CAUTION * left / before) if 0.0 < before < np.inf else _AHEAD
         ahead = rate * left + _BY_SLOPES * solution.residual
         displaced = mixing.next(displaced, change)
-        accuracy = tolerance if ahead <= last else max(tolerance, min(_FIRST, ahead, 0.1 * left))
+        accuracy = max(tolerance, min(_FIRST, ahead, _PART * left)) if ahead > least else tolerance
     raise NotConverged(
         "the displacements by finite slopes",
         reason=f"they still change by {left:.1e} of the displacement",
