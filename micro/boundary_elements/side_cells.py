@@ -26,6 +26,8 @@ from support.cores import in_threads
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
+_LINES = 2**20
+"""Numbers that the waves between rows of cells hold at most at a time."""
 _SWAPPED = [1, 0, 2]
 """Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
 _SHEAR = np.array([-1j, 1j])
@@ -105,6 +107,22 @@ class _SidePair:
         means = self.means @ lines.reshape(self.means.shape[1], -1)
         return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
 
+    def between(self, row: Indices, cell: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
+        used, row = np.unique(row, return_inverse=True)
+        means = np.asarray(_full(self.means)[used])
+        low, high = np.split(means, 2, axis=1)
+        matrix = np.empty((len(row), len(row)))
+        step = max(1, _LINES // (len(used) * len(self.kernels)))
+        for first in range(0, len(used), step):  # some rows at a time, for the memory
+            here = slice(first, first + step)
+            waves = sum(one[here] @ self.kernels @ one.T for one in (low, high))
+            lines = fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)
+            some = np.flatnonzero((row >= first) & (row < first + step))
+            apart = np.abs(cell[some][:, None] - cell)
+            matrix[some] = lines[apart, row[some][:, None] - first, row]
+        return matrix
+
     def displacement(self, pressure: Array) -> Array:
         """Return displacements of the cells by pressures on them, shape (rows, cells)."""
         return self.on_cells(_multiplied(self.kernels, self.loaded(pressure[None])), 1)[0]
@@ -136,6 +154,11 @@ def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> Means:
     low, high = (float(there) for there in sides.pair(axis))
     both = csr_array(hstack([low * lower, high * lower[::-1]]))
     return both.toarray() if rows <= 128 else both  # full matrices are quicker
+
+
+def _full(means: Means) -> Array:
+    """Return a full or sparse matrix as a full one."""
+    return means.toarray() if isinstance(means, csr_array) else means
 
 
 def _transposed(means: Means) -> Means:
@@ -189,6 +212,10 @@ class SideCells:
             pressure.size,
         )
         return np.asarray(one + other.T)
+
+    def between(self, row: Indices, column: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, (n, n) [mm]."""
+        return self.across_x.between(row, column) + self.across_y.between(column, row)
 
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""
