@@ -138,7 +138,9 @@ class MicroCoupling(PressedSurface):
 
     def checked(self, step: LoadStep) -> LoadStep:
         """Return a load step of contacts on cells with its errors measured."""
-        return checked(step, self.error_probe(), self.load_history, self.comm)
+        known = None if self.has_laws else self.solver.latest
+        start = None if known is None else known.guess
+        return checked(step, self.error_probe(), self.load_history, self.comm, start=start)
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
         """Return the gaps under the load of a step on half as many cells a side."""
