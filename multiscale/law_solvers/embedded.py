@@ -76,9 +76,8 @@ class EmbeddedLaws(LawSolver):
     @property
     def point_separations(self) -> Array:
         """Mean gaps of the laws at this rank's points at the latest load step, (n,) [mm]."""
-        gaps = [lambda c, law=law: law.at(c, extend=True).separation for law in self.table.laws]
-        sampling = self.face.sampling("pointwise")
-        return sampling.by_patch(gaps, self._known.sample_closure)
+        patch = self.face.sampling("pointwise").patch
+        return self._laws.at(patch, self._known.sample_closure, extend=True).separation
 
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `StepSolver`."""
