@@ -21,6 +21,7 @@ from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.side_cells import side_cells
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
@@ -101,14 +102,13 @@ class GridCompliance:
                 moved += term.displacement(some).ravel()[place]
         return moved
 
-    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
-        """Return very roughly the pressures / E* on some cells that displace them, shape (n,).
+    def inverse_on(self, cells: Cells) -> ContactInverse:
+        """Return an approximate inverse of the compliance of some cells.
 
         Args:
             cells: The cells.
-            displacement: Their displacements, shape (n,) [mm].
         """
-        return self._half_space.inverse.on_cells(cells, displacement)
+        return contact_inverse(self._half_space, cells)
 
     def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
