@@ -82,7 +82,7 @@ def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Ar
     return np.divide(2.0, q, out=np.zeros_like(q), where=q > 0.0)
 
 
-_MANY = 2**14
+_MANY = 2**15
 """Cells of a grid from which on an accurate inverse pays."""
 
 
