@@ -62,7 +62,7 @@ class CellProblem:
         hardness: Largest pressure H / E*; infinite where contacts are elastic. Pressures of a
             solution that are at the bound equal it exactly.
         corner: Corner of the first cell on the surface [mm].
-        coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+        coarse: Whether these are no cells of the surface but coarser ones, where free sides may be
             left out.
     """
 
