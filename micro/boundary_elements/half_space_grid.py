@@ -83,7 +83,8 @@ def periodic_spectrum(grid: tuple[int, int], spacing: tuple[float, float]) -> Ar
 
 
 _MANY = 2**15
-"""Cells of a grid from which on an accurate inverse pays."""
+"""Cells of a grid from which on an accurate inverse pays. With it solutions took 0.6 to 1.6 times
+the core time on 128² cells, 0.7 to 1.5 on 192² and 0.5 to 1.2 on 256²; 1 to 60 % touched."""
 
 
 class Cells(NamedTuple):
@@ -201,8 +202,8 @@ class Convolution:
 class HalfSpaceGrid:
     """Compliance of nx × ny cells of a half-space, and its approximate inverse.
 
-    The inverse is that of the kernel on a period: that of the cells, or a larger one where pressures
-    do not continue periodically, so that images are far. See `micro.boundary_elements.inverse`.
+    The inverse is that of the kernel on a period. Where pressures do not continue periodically, it
+    is larger than the grid, so that images are far. See `micro.boundary_elements.inverse`.
 
     Args:
         grid: Numbers of cells (nx, ny).

@@ -1,4 +1,4 @@
-"""Approximate inverse of the compliance of the cells in contact, which preconditions their solution.
+"""Approximate inverse of the compliance of the cells in contact, a preconditioner.
 
 It is that of the half-space, by transforms on a period, as in the multigrid smoother of Zhao,
 Vollebregt & Oosterlee 2014 (Numer. Linear Algebra Appl. 21, 256-274). There, displacements are
