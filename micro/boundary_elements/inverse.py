@@ -23,7 +23,7 @@ class ContactInverse(Protocol):
     """Symmetric, positive approximate inverse of the compliance of n cells.
 
     Attributes:
-        accurate: Whether it is as good for long waves as for short ones.
+        accurate: Whether it needs no pressures by free motions to project with.
     """
 
     accurate: bool
