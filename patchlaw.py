@@ -30,7 +30,9 @@ if TYPE_CHECKING:  # the names that this module has, see `LazyPackage`
     from macro import ContactProblem, Interface, LawOperator, vector_space
     from micro import HalfSpaceModel
     from multiscale import (
+        BodyFields,
         Comparison,
+        ContactHistory,
         History,
         LawTable,
         LoadStep,
@@ -39,6 +41,8 @@ if TYPE_CHECKING:  # the names that this module has, see `LazyPackage`
         compare,
         export_laws,
         make_setup,
+        read_contact,
+        read_fields,
         read_history,
         read_laws,
         representative_law,
