@@ -68,7 +68,8 @@ def _draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> N
         look: Look of the line, with its label.
     """
     turns = [0, *np.flatnonzero(np.diff(falls.astype(int))), len(x) - 1]
-    falling = {"ls": "--", "mfc": "white", "label": "unloading"}
+    # above the others, with which it may coincide
+    falling = {"color": "0.6", "ls": "--", "mfc": "white", "label": "unloading", "zorder": 3}
     labelled = set()
     for start, end in pairwise(turns):
         here = look | (falling if falls[end] else {})
