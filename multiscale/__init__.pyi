@@ -28,5 +28,7 @@ from multiscale.scene.scene import Scene as Scene
 from multiscale.setup import make_setup as make_setup
 from multiscale.studies.comparison import Comparison as Comparison
 from multiscale.studies.comparison import compare as compare
+from multiscale.studies.difference import Difference as Difference
+from multiscale.studies.difference import difference as difference
 from multiscale.studies.sweep import SweepResults as SweepResults
 from multiscale.studies.sweep import sweep as sweep

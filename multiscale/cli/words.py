@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiscale.exports import FORMATS
-from multiscale.studies import AGAINST
+from multiscale.studies import AGAINST, AT
 from support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"
@@ -19,6 +19,10 @@ SWEEP_ENDING = "-sweep"
 
 COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
+
+
+DIFF_ENDING = "-diff"
+"""What the results folder of two runs beside each other is called after their names."""
 
 
 class UsageError(Exception):
@@ -164,6 +168,17 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
+    beside = "Set the results of two runs beside each other: curves, ratios with both errors."
+    diff = command("diff", "diff.diff_results", beside)
+    folders = "folder that patchlaw run wrote"
+    diff.add_argument("first", metavar="RESULTS", type=Path, help=folders)
+    diff.add_argument("second", metavar="RESULTS", type=Path, help="the other one")
+    equal = (
+        f"what is equal where they are compared: {' or '.join(AT)}; by default what both prescribe"
+    )
+    diff.add_argument("--at", choices=AT, help=equal)
+    where = f"folder of the comparison (default: results/FIRST-SECOND{DIFF_ENDING})"
+    diff.add_argument("--out", type=Path, metavar="DIR", help=where)
     plan = "Say what a run would do, and why; run nothing expensive."
     unused = "accepted so that the words of a run can be reused: a plan writes nothing"
     _add_scene(command("plan", "plan.plan_scene", plan), folder=unused)

@@ -42,10 +42,10 @@ def history_figure(history: Any, kind: str) -> Figure:
     touch = -history.steps[0].zero_mm if level and len(history) else np.nan
     approach = 1e3 * np.append(touch, history.approach_mm)
     falls = history.unloading
-    _draw_path(force, approach, pressure, np.append(False, falls), look)
+    draw_path(force, approach, pressure, np.append(False, falls), look)
     share = 100 * np.append(0.0, history.contact_area_fraction)
-    _draw_path(area, pressure, share, np.append(False, falls), look)
-    _draw_path(gap, 1e3 * history.mean_separation_mm, history.mean_pressure_MPa, falls, look)
+    draw_path(area, pressure, share, np.append(False, falls), look)
+    draw_path(gap, 1e3 * history.mean_separation_mm, history.mean_pressure_MPa, falls, look)
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
     area.set(ylabel="contact area fraction [%]")
@@ -57,7 +57,7 @@ def history_figure(history: Any, kind: str) -> Figure:
     return figure
 
 
-def _draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:
+def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:
     """Draw points along a path: where the load falls, dashed and with hollow markers.
 
     Args:

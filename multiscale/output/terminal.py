@@ -228,17 +228,31 @@ def show_history(comm: Any, history: History) -> None:
     if not speaks(comm):
         return
     header, rows = history.table(most=60)
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for name in header:
-        table.add_column(escape(name.replace(" [", "\n[")), justify="right")
-    for row in rows:
-        table.add_row(*row)
     # A reference has one more column.
     console = _console(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
-    console.print(table)
+    console.print(_table([name.replace(" [", "\n[") for name in header], rows))
     for note in history.notes:
         label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
         console.print(f"{label} {escape(note)}")
+
+
+def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> None:
+    """Print a table whose first column is text.
+
+    Args:
+        comm: MPI communicator, or None.
+        table: Its headings and rows.
+    """
+    _console(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for index, name in enumerate(header):
+        table.add_column(escape(name), justify="left" if index < text_columns else "right")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:
