@@ -40,6 +40,8 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     for note in both.notes:
         terminal.say(comm, f"note: {note}")
     terminal.show_files(comm, files)
+    if choice.open:
+        terminal.open_page(comm, files)
 
 
 def _write(folder: Path, both: Difference) -> list[Path]:
