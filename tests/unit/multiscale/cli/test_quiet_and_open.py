@@ -8,6 +8,7 @@ import sys
 import webbrowser
 
 import pytest
+from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
@@ -67,7 +68,9 @@ def test_colours_are_off_where_the_user_says_so(scene, tmp_path, ranks, colour):
     told, terminal = pty.openpty()
     program = [sys.executable, "-m", "multiscale", "plan", str(scene)]
     launcher = [] if ranks == 1 else ["mpirun", "-n", str(ranks), "--oversubscribe"]
-    environment = os.environ | {"TERM": "xterm"} | ({} if colour else {"NO_COLOR": "1"})
+    environment = (
+        os.environ | BESIDE_OTHERS | {"TERM": "xterm"} | ({} if colour else {"NO_COLOR": "1"})
+    )
     if colour:
         environment.pop("NO_COLOR", None)
     done = subprocess.Popen(
