@@ -1,7 +1,7 @@
 """Sets the results of two runs beside each other: ratios at equal loads, with both errors.
 
-Only the first rise of the load is compared, up to where it first falls. Both runs are read at all
-loads of either that lie within the range of both.
+Only the first rise of the load is compared, up to where it first falls. Both runs are read at the
+loads that both have or, without any, at all loads of either that lie within the range of both.
 """
 
 from __future__ import annotations

@@ -1,7 +1,10 @@
 """Quantities of a run over a load that rises, read at any load within its range.
 
-Between load steps, values are those of a monotone cubic in logarithms. Its distance from linear
-interpolation, in logarithms too, counts as an error there.
+Between load steps, values are those of a monotone cubic in logarithms. Contact areas and
+stiffnesses are not smooth, because contacts are made one by one, so that the error of that is
+measured: each load step but the first and the last is left out in turn and interpolated from the
+others. Twice the largest deviation counts as the error. From fewer than five load steps that cannot be told, and the
+error is the distance to the neighbouring load steps, between which a value lies.
 """
 
 from __future__ import annotations
@@ -19,6 +22,12 @@ from support.errors import InputError
 
 SAME = 1e-6
 """Relative difference below which loads are the same."""
+
+_LEAST_STEPS = 5
+"""Load steps from which the error of interpolation can be told by leaving one out."""
+_SAFETY = 2.0
+"""Factor on deviations of load steps left out. Measured on a map of ground steel and on a law of a
+sample, 6 and 8 of 48 load steps kept: the errors held 89 to 100 % of all values between them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -115,13 +124,15 @@ class Curves:
             return np.full(loads.shape, np.nan), np.full(loads.shape, np.nan)
         load, values = self.load[known], values[known]
         errors = self._errors(quantity)[known]
-        found, between = _interpolated(loads, load, values)
+        found, between = interpolated(loads, load, values)
         relative = errors / np.abs(np.where(values, values, np.nan))
         nearest = np.abs(loads[:, None] - load).argmin(axis=1)
         on_step = np.abs(loads - load[nearest]) <= SAME * load[nearest]
         carried = np.interp(loads, load, relative)
         relative = np.where(on_step, relative[nearest], carried)
-        return found, relative * np.abs(found) + between
+        measured = relative * np.abs(found)
+        unknown = np.isnan(measured) & (between == 0.0)
+        return found, np.where(unknown, np.nan, np.nan_to_num(measured) + between)
 
     def _errors(self, quantity: Quantity) -> Array:
         """Return errors at the load steps, at exactly their loads; NaN where not measured."""
@@ -139,27 +150,66 @@ class Curves:
         return np.where(neither, np.nan, both)
 
 
-def _interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:
-    """Return values at loads and the errors of interpolation, 0 at the load steps themselves."""
+def interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:
+    """Return values at loads, and the errors of interpolation, 0 at the load steps themselves.
+
+    Args:
+        at: The loads, shape (n,); NaN is returned for those beyond the range.
+        load: Loads of the load steps, rising.
+        values: Values there.
+    """
     inside = (at >= load[0] * (1.0 - SAME)) & (at <= load[-1] * (1.0 + SAME))
     nearest = np.abs(at[:, None] - load).argmin(axis=1)
     found, between = values[nearest], np.zeros(len(at))
     on_step = np.abs(at - load[nearest]) <= SAME * load[nearest]
     if len(load) > 1:
-        scale, back = (np.log, np.exp) if (values > 0.0).all() else (np.asarray, np.asarray)
-        where = np.clip(np.log(at), np.log(load[0]), np.log(load[-1]))
-        linear = back(np.interp(where, np.log(load), scale(values)))
-        cubic = back(PchipInterpolator(np.log(load), scale(values))(where))
+        where, steps = np.clip(np.log(at), np.log(load[0]), np.log(load[-1])), np.log(load)
+        cubic = _cubic(steps, values)(where)
         found = np.where(on_step, found, cubic)
-        between = np.where(on_step, 0.0, np.abs(cubic - linear))
+        between = np.where(on_step, 0.0, _error(where, steps, values, cubic))
     return np.where(inside, found, np.nan), between
 
 
+def _cubic(steps: Array, values: Array) -> Callable[[Array], Array]:
+    """Return a monotone cubic, of logarithms where all values have some."""
+    if (values > 0.0).all():
+        return lambda where: np.exp(PchipInterpolator(steps, np.log(values))(where))
+    return PchipInterpolator(steps, values)
+
+
+def _error(where: Array, steps: Array, values: Array, found: Array) -> Array:
+    """Return the errors of values found between load steps; see the module."""
+    if len(steps) < _LEAST_STEPS:
+        after = np.clip(np.searchsorted(steps, where), 1, len(steps) - 1)
+        return np.maximum(np.abs(found - values[after]), np.abs(found - values[after - 1]))
+    missed = np.zeros(len(steps))
+    for left_out in range(1, len(steps) - 1):
+        others = np.arange(len(steps)) != left_out
+        missed[left_out] = abs(
+            _cubic(steps[others], values[others])(steps[left_out]) - values[left_out]
+        )
+    scale = np.where(values, np.abs(values), np.inf)
+    return np.asarray(_SAFETY * np.max(missed / scale) * np.abs(found))
+
+
 def common_loads(curves: Sequence[Curves], names: Sequence[str], load: Quantity) -> Array:
-    """Return all loads of both runs that lie within the range of both, rising."""
-    low = max(curve.load[0] for curve in curves) * (1.0 - SAME)
-    high = min(curve.load[-1] for curve in curves) * (1.0 + SAME)
-    both = np.sort(np.concatenate([curve.load for curve in curves]))
+    """Return loads that both runs have or, without any, those of either in the range of both.
+
+    Args:
+        curves: The runs.
+        names: What they are called.
+        load: The load.
+
+    Raises:
+        InputError: When the ranges do not overlap.
+    """
+    first, second = (curve.load for curve in curves)
+    nearest = second[np.abs(first[:, None] - second).argmin(axis=1)]
+    shared = first[np.abs(first - nearest) <= SAME * nearest]
+    if shared.size:
+        return shared
+    low, high = max(first[0], second[0]), min(first[-1], second[-1])
+    both = np.sort(np.concatenate([first, second]))
     both = both[(both >= low) & (both <= high)]
     if not both.size:
         name, size = usual_unit([float(curve.load[-1]) for curve in curves], load.unit)
@@ -169,5 +219,4 @@ def common_loads(curves: Sequence[Curves], names: Sequence[str], load: Quantity)
         )
         problem = f"the runs have none in common: {ranges}"
         raise InputError(problem, key=load.text, allowed="runs whose loads overlap")
-    fresh = np.append(True, np.diff(both) > SAME * both[1:])
-    return both[fresh]
+    return both

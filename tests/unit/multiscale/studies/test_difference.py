@@ -14,6 +14,7 @@ from geometry.patches import PatchGrid
 from multiscale import History, Scene, difference, run
 from multiscale.cli.command_line import main
 from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.studies.run_curves import interpolated
 from support.errors import InputError
 
 ONES = PatchState(closure_mm=np.ones(1), pressure_MPa=np.ones(1), contact_area_fraction=np.ones(1))
@@ -53,11 +54,44 @@ def test_ratios_of_powers_are_exact():
         both.of("force_N")
 
 
-@pytest.mark.parametrize("steps", [4, 8, 16])
+def test_loads_of_both_are_taken_where_there_are_any():
+    both = difference(power(7e4, 1.5, [1.0, 2.3, 5.1]), power(3e4, 1.4, [0.7, 2.3, 4.0, 5.1]))
+    np.testing.assert_allclose(both.loads, [2.3, 5.1])
+    assert np.isnan(both.of("contact_area_fraction").error).all()  # nothing is interpolated
+
+
+def test_noise_is_seen_by_leaving_load_steps_out():
+    """Against values between load steps: a power with 3 % of noise, which no curve follows."""
+    random = np.random.default_rng(4)
+    inside = []
+    for _ in range(50):
+        load = np.sort(random.uniform(1.0, 10.0, 40))
+        values = load**0.9 * (1.0 + 0.03 * random.standard_normal(40))
+        kept = np.arange(0, 40, 5)
+        at = load[kept[0] : kept[-1]]
+        found, error = interpolated(at, load[kept], values[kept])
+        true = values[kept[0] : kept[-1]]
+        inside.append(np.mean(np.abs(found - true) <= error + 1e-12 * true))
+    assert np.mean(inside) > 0.9
+
+
+@pytest.mark.parametrize("steps", [2, 3, 4])
+def test_of_few_load_steps_values_lie_between_their_neighbours(steps):
+    load = np.geomspace(1.0, 8.0, steps)
+    at = np.linspace(1.0, 8.0, 30)
+    for exponent in (0.3, 0.9, 2.5):
+        found, error = interpolated(at, load, load**exponent + 0.2 * load)
+        true = at**exponent + 0.2 * at
+        assert (np.abs(found - true) <= error + 1e-9).all()
+        on_step = np.isclose(at[:, None], load, rtol=1e-9).any(axis=1)
+        assert (error[on_step] == 0.0).all() and (error[~on_step] > 0.0).all()
+
+
+@pytest.mark.parametrize("steps", [6, 8, 16])
 def test_errors_of_interpolation_contain_the_truth(steps):
     """Curves p = aδ + bδ² have no straight picture in logarithms; their inverse is known."""
     constants = (3.0e3, 4.0e5), (5.0e3, 1.0e5)
-    loads = [np.linspace(10.0, 40.0, steps), np.linspace(7.0, 43.0, steps + 1)]
+    loads = [np.linspace(10.0, 40.0, steps), np.linspace(7.3, 43.1, steps + 1)]
 
     def approach(pressure, a, b):
         return (-a + np.sqrt(a * a + 4.0 * b * pressure)) / (2.0 * b)
@@ -75,7 +109,7 @@ def test_errors_of_interpolation_contain_the_truth(steps):
     missed = np.abs(ratio.ratio - true)
     assert (missed <= ratio.error + 1e-12).all()
     assert missed.max() > 1e-9  # interpolated, not evaluated
-    assert ratio.error.max() < 0.02
+    assert ratio.error.max() < 0.1
 
 
 def test_errors_of_both_runs_add_up():
@@ -124,7 +158,7 @@ def test_faces_of_different_area_are_compared_by_pressure():
 def test_first_rise_alone_is_compared():
     pressure, approach = [1.0, 2.0, 1.5, 0.0, 3.0], [1e-3, 2e-3, 1.9e-3, 1e-3, 3e-3]
     both = difference(history(pressure, approach), power(7e4, 1.5, [1.0, 3.0]))
-    np.testing.assert_allclose(both.loads, [1.0, 2.0])
+    np.testing.assert_allclose(both.loads, [1.0])
     assert any("first: 3 load steps without a force or after" in note for note in both.notes)
 
 
