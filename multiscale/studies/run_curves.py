@@ -3,8 +3,8 @@
 Between load steps, values are those of a monotone cubic in logarithms. Contact areas and
 stiffnesses are not smooth, because contacts are made one by one, so that the error of that is
 measured: each load step but the first and the last is left out in turn and interpolated from the
-others. Twice the largest deviation counts as the error. From fewer than five load steps that cannot be told, and the
-error is the distance to the neighbouring load steps, between which a value lies.
+others. Twice the largest deviation counts as the error. From fewer than five load steps that cannot
+be told, and the error is the distance to the neighbouring ones, between which a value lies.
 """
 
 from __future__ import annotations
