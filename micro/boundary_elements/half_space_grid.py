@@ -9,6 +9,7 @@ Theory: docs/theory.md, section 4.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -226,6 +227,22 @@ class HalfSpaceGrid:
         self.compliance = Convolution(spectrum, grid, padded, work)
         self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
         self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)
+
+    def between(self, row: Indices, column: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, shape (n, n) [mm].
+
+        Args:
+            row: Their rows.
+            column: Their columns.
+        """
+        return self._kernel[np.abs(row[:, None] - row), np.abs(column[:, None] - column)]
+
+    @cached_property
+    def _kernel(self) -> Array:
+        """Displacement of all cells by unit pressure on the first one."""
+        one = np.zeros(self.compliance.grid)
+        one[0, 0] = 1.0
+        return np.asarray(self.compliance(one))
 
 
 def _good(counts: Iterable[int]) -> tuple[int, int]:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import GridCompliance
 from micro.boundary_elements.half_space_grid import Cells
 from support.arrays import Array
@@ -25,7 +26,9 @@ class ContactCells:
         modes: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
     """
 
-    def __init__(self, compliance: GridCompliance, cells: Cells, modes: Array) -> None:
+    def __init__(
+        self, compliance: GridCompliance | ComplianceMatrix, cells: Cells, modes: Array
+    ) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
         # pressures by each free motion, and the inverse of their loads, by the approximate inverse
         resistance = [compliance.apply_inverse(cells, mode) for mode in modes]

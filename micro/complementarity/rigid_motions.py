@@ -113,6 +113,10 @@ class Motions:
         """Return the motions on a part of the cells, which carries all loads."""
         return replace(self, along_x=self.along_x[:, box[0]], along_y=self.along_y[:, box[1]])
 
+    def among(self, cells: Indices) -> Motions:
+        """Return the motions on a column of some cells, which carry all loads."""
+        return replace(self, along_x=self.modes_of(cells), along_y=np.ones((self.count, 1)))
+
     def coarsened(self, factors: Sequence[int]) -> Motions:
         """Return the motions on blocks of cells; see `coarsened`."""
         return Motions(
@@ -157,6 +161,30 @@ class Motions:
         scaled = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
         scaled.ravel()[cells] = values
         return scaled
+
+    def shifted_to_load(self, wanted: Array, hardness: float, acting: float) -> Array | None:
+        """Return the pressures nearest to given ones, between 0 and H, that meet the only load.
+
+        They are p_i = min(max(p_i⁰ + μ, 0), H), and their sum is linear in μ between the values
+        of it at which a cell meets a bound.
+
+        Args:
+            wanted: Pressures / E* of some cells, of either sign, shape (n,).
+            hardness: Largest pressure / E*, finite.
+            acting: Sum of the pressures of all other cells.
+
+        Returns:
+            The pressures; None where motions turn or these cells cannot meet the load.
+        """
+        load = float(self.loads[0]) - acting
+        if self.turns or not 0.0 <= load <= wanted.size * hardness:
+            return None
+        shifts = np.concatenate((-wanted, hardness - wanted))
+        order = np.argsort(shifts, kind="stable")
+        moving = np.cumsum(np.repeat((1.0, -1.0), wanted.size)[order])  # cells between the bounds
+        sums = np.append(0.0, np.cumsum(moving[:-1] * np.diff(shifts[order])))
+        shift = float(np.interp(load, sums, shifts[order]))
+        return np.clip(wanted + shift, 0.0, hardness)
 
 
 class _Scaled(NamedTuple):

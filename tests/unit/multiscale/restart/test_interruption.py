@@ -173,7 +173,7 @@ import os, signal, sys
 from multiscale.cli import command_line, keys
 
 def hung_up(choice, options, comm):
-    import macro
+    import macro.bodies
     from petsc4py import PETSc
     os.kill(os.getpid(), signal.SIGHUP)
     print("went on")
@@ -200,7 +200,7 @@ def importing(choice, options, comm):
             os.kill(os.getpid(), signal.SIGTERM)
 
     sys.addaudithook(told)
-    import macro
+    import macro.bodies
     print("went on")
 
 keys.print_schema = importing
