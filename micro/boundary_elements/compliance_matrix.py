@@ -51,9 +51,9 @@ class ComplianceMatrix:
         self.products += 1
         return np.asarray(self._among(cells)[0] @ pressure)
 
-    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
-        """Return the pressures on some cells that displace them so, shape (m,)."""
-        return np.asarray(cho_solve(self._among(cells)[1], displacement, check_finite=False))
+    def inverse_on(self, cells: Cells) -> FactoredInverse:
+        """Return the inverse of the compliance of some cells."""
+        return FactoredInverse(self._among(cells)[1])
 
     def _among(self, cells: Cells) -> tuple[Array, tuple[Array, bool]]:
         """Return the matrix of some cells, and its factors."""
@@ -65,3 +65,20 @@ class ComplianceMatrix:
                 factors = cho_factor(np.diag(np.diag(part)), lower=True)
             self._last = cells, part, factors
         return self._last[1:]
+
+
+class FactoredInverse:
+    """Inverse of the compliance of n cells by Cholesky's factors; see `ContactInverse`.
+
+    Args:
+        factors: The factors.
+    """
+
+    accurate = False  # pressures by free motions are not to be left out: they cost little
+
+    def __init__(self, factors: tuple[Array, bool]) -> None:
+        self._factors = factors
+
+    def __call__(self, displacement: Array) -> Array:
+        """Return the pressures that displace the cells so, shape (n,)."""
+        return np.asarray(cho_solve(self._factors, displacement, check_finite=False))

@@ -21,7 +21,8 @@ from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid, many
+from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.side_cells import side_cells
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
@@ -110,14 +111,13 @@ class GridCompliance:
                 moved += term.displacement(some).ravel()[place]
         return moved
 
-    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
-        """Return very roughly the pressures / E* on some cells that displace them, shape (n,).
+    def inverse_on(self, cells: Cells) -> ContactInverse:
+        """Return an approximate inverse of the compliance of some cells.
 
         Args:
             cells: The cells.
-            displacement: Their displacements, shape (n,) [mm].
         """
-        return self._half_space.inverse.on_cells(cells, displacement)
+        return contact_inverse(self._half_space, cells)
 
     def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
         """Return the compliance of some cells alone as a matrix.
@@ -178,8 +178,9 @@ class Compliance:
             grid: Numbers of cells (nx, ny).
             spacing: Sides of a cell [mm].
             corner: Corner of the first cell on the surface [mm].
-            coarse: Whether these are no cells of the surface but coarser ones, where free sides are
-                left out.
+            coarse: Whether these are no cells of the surface but coarser ones. Free sides are left
+                out where these are few, which solutions start from quickly, or do not fill the
+                surface.
         """
         terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
         return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
@@ -212,12 +213,13 @@ class Compliance:
         self, grid: tuple[int, int], spacing: Pair, corner: Pair, coarse: bool
     ) -> list[ComplianceTerm]:
         terms: list[ComplianceTerm] = []
-        if self.sides is not None and not coarse:
+        if self.sides is not None and (not coarse or many(grid)):
             rows, columns = (
                 round(start / step) + np.arange(n)
                 for start, step, n in zip(corner, spacing, grid, strict=True)
             )
-            terms.append(side_cells(self.sides, spacing).among(rows, columns))
+            if not coarse or _fill(self.sides.lengths, spacing, (rows[-1], columns[-1])):
+                terms.append(side_cells(self.sides, spacing).among(rows, columns))
         if self.body is not None:
             terms.append(self.body_on((grid[0], grid[1]), spacing, corner))
         return terms
@@ -271,3 +273,10 @@ class Compliance:
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""
         return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))
+
+
+def _fill(lengths: Pair, spacing: Pair, last: tuple[int, int]) -> bool:
+    """Return whether cells fill a rectangle, of which one by its indices is to be part."""
+    counts = np.divide(lengths, spacing)
+    whole = np.round(counts)
+    return bool(np.allclose(counts, whole, rtol=1e-9) and np.all(np.less(last, whole)))

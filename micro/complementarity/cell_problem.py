@@ -67,7 +67,7 @@ class CellProblem:
             solution that are at the bound equal it exactly.
         lowered: What finite slopes have taken off the interference [mm].
         corner: Corner of the first cell on the surface [mm].
-        coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+        coarse: Whether these are no cells of the surface but coarser ones, where free sides may be
             left out.
         matrix: Compliance of the cells where they are few, here and there on the surface; they are
             a column then.

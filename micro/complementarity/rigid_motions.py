@@ -100,11 +100,13 @@ class Motions:
             pressure: Pressures, by which cells are weighted, shape (nx, ny).
             gap: Gaps, shape (nx, ny) [mm].
         """
+        if not self.turns:  # the approach, whose mode is 1
+            return np.array([np.vdot(pressure, gap) / pressure.sum()])
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
         modes, left = self.modes_of(cells), gap.ravel()[cells]
         motion = np.zeros(self.count)
-        for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
+        for _ in range(2):  # again for what rounding leaves of light cells
             change = np.linalg.lstsq((modes * root).T, left * root, rcond=1e-10)[0]
             motion, left = motion + change, left - change @ modes
         return motion

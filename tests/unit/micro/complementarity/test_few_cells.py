@@ -122,7 +122,7 @@ def test_matrix_that_errs_is_still_solved():
     turn = np.linalg.qr(dice.standard_normal((6, 6)))[0]
     singular = turn @ np.diag([3.0, 2.0, 1.0, 0.5, 0.2, -1e-13]) @ turn.T
     cells = Cells.of(np.arange(6), (6, 1))
-    found = ComplianceMatrix(singular).apply_inverse(cells, np.ones(6))
+    found = ComplianceMatrix(singular).inverse_on(cells)(np.ones(6))
     assert found == pytest.approx(1.0 / np.diag(singular), rel=1e-12)
 
 
