@@ -20,7 +20,12 @@ from macro.contact.face_pair import FacePair
 from macro.contact.interface import Interface
 from macro.contact.law_operator import LawOperator, LawsAtPoints
 from macro.contact.law_problem import LawContactProblem
-from macro.contact.loaded_face import LoadedFace, displacements_under, patch_compliance_matrix
+from macro.contact.loaded_face import (
+    LoadedFace,
+    displacements_under,
+    largest_rise,
+    patch_compliance_matrix,
+)
 from macro.contact.rough_face import RoughFace
 from macro.contact.unilateral_problem import (
     UnilateralContactProblem,
@@ -31,7 +36,7 @@ from macro.fields import write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
-from macro.mesh.supports import Support, Traction, check_supports
+from macro.mesh.supports import Loads, Support, Traction, check_loads, check_supports
 from macro.mesh.tagged import TaggedMesh, planar_face
 from macro.mesh.xdmf import write_mesh
 
@@ -52,6 +57,7 @@ __all__ = [
     "LawOperator",
     "LawsAtPoints",
     "LoadedFace",
+    "Loads",
     "Material",
     "MeshQuality",
     "MeshedBody",
@@ -61,10 +67,12 @@ __all__ = [
     "Traction",
     "UnilateralContactProblem",
     "block_mesh",
+    "check_loads",
     "check_supports",
     "contact_facets",
     "displacements_under",
     "face_compliance",
+    "largest_rise",
     "nodal_contact",
     "patch_compliance_matrix",
     "planar_face",

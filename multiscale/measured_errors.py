@@ -251,7 +251,8 @@ def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: 
     Note:
         Collective.
     """
-    by_force, turns = load_history.quantity == "force", load_history.slopes is None
+    by_force = load_history.quantity_in(step.stage) == "force"
+    turns = load_history.slopes is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
     force, approach = (

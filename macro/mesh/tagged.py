@@ -202,6 +202,20 @@ def planar_face(
     )
 
 
+def surface_area(tagged: TaggedMesh, tag: int) -> float:
+    """Return the area of a body's outer surface with a tag, of straight facets [mm²].
+
+    Args:
+        tagged: The mesh.
+        tag: Tag of the facets.
+
+    Note:
+        Collective.
+    """
+    areas = np.linalg.norm(_facets(tagged, tag)[1], axis=1)
+    return float(tagged.comm.allreduce(float(areas.sum())))
+
+
 def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     """Return this rank's outer facets of a face.
 

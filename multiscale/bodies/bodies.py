@@ -201,6 +201,23 @@ class Bodies:
             total += float(moved @ one.areas / one.areas.sum())
         return total
 
+    def largest_preload(self) -> float:
+        """Return how far loads besides the contact raise the faces towards each other at most [mm].
+
+        It is the sum of the largest displacements out of both faces at any point, in any state of
+        the loads.
+
+        Note:
+            Collective.
+        """
+        from macro import FacePair, largest_rise
+
+        face = self.contact_face()
+        faces = (face.first, face.second) if isinstance(face, FacePair) else (face,)
+        return sum(
+            max(largest_rise(one, state) for state in range(len(one.body.loads))) for one in faces
+        )
+
     def _as_text(self) -> tuple[Any, ...]:
         """Return all that the compliance of the meshes depends on, besides the patches."""
         parts, scene, found = self.parts, self.parts.scene, list[Any]()

@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
-from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import on_body
@@ -55,6 +54,8 @@ class PatchLaws(LawCoupling, MicroCoupling):
         coupling, patches = self.scene.coupling, self.patches.count
         if self.scene.decomposed:
             return NewtonChoice(True, "the decomposed block is its compliance")
+        if self.scene.loads_bodies:
+            return NewtonChoice(False, "loads besides the contact deform the mesh")
         flat = 0 if table is None else sum(law.is_flat for law in table.laws)
         if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
             why = (
@@ -112,7 +113,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
     def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         solver = self.contact_solver(self.model_behind_laws())
-        solved = solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        solved = solver.press(step.under_its_plane)
         detail = solver.detail(solver.latest)
         with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
         return None if detail is None else (with_peak, detail)
@@ -173,7 +174,8 @@ class ConsistentCoupling(PatchLaws):
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
-        free = table.path is not None and self.load_history.slopes is None
+        turns = self.load_history.slopes is None and not self.scene.loads_bodies
+        free = table.path is not None and turns
         if free and self.scene.coupling.interface == "patchwise":
             return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
         return super()._solver_of(table)
@@ -208,7 +210,7 @@ class IsolatedCoupling(PatchLaws):
     @property
     def _closes_at_corners(self) -> bool:
         """Whether closures at corners count: contacts under a force may lie at a corner."""
-        return super()._closes_at_corners or self.scene.loading.force is not None
+        return super()._closes_at_corners or self.load_history.quantity == "force"
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         return isolated_laws(

@@ -65,7 +65,7 @@ class RepresentativeCoupling(LawCoupling):
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        history, plane = load_history_on(scene, surfaces), None
+        history, plane = load_history_on(scene, surfaces, body.area), None
         check_load(scene, history, surfaces, body.area, body)
         modulus, hardness = materials.contact_modulus, scene.micro.hardness
         model = HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, hardness=hardness)
@@ -189,12 +189,11 @@ class RepresentativeCoupling(LawCoupling):
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
         tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
+        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
-        first = self.bodies.first
-        preloaded = first is not None and first.body.preload is not None
-        return pressure, None if preloaded else 1.15 * approach
+        return pressure, None if self.scene.loads_bodies else 1.15 * approach
 
     def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
         """Return the largest local pressure that laws are made for [MPa].

@@ -43,6 +43,7 @@ class EmbeddedLaws(LawSolver):
         super().__init__(table)
         self._problem, self.face = problem, face
         self._last: FaceContactState | None = None
+        self._body_state = 0.0
 
     @property
     def _known(self) -> FaceContactState:
@@ -116,13 +117,15 @@ class EmbeddedLaws(LawSolver):
             problem = "a flat patch, whose pressure is a function of closure nowhere"
             raise self.beyond_law(control, problem) from error
         step = self._step(control, state)
-        self._last = state
+        self._last, self._body_state = state, control.body_state
         return step
 
     def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return None if last is None else (last.approach, last.tilt, last.patch_pressure)
+        if last is None:
+            return None
+        return last.approach, last.tilt, last.patch_pressure, self._body_state
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -130,9 +133,10 @@ class EmbeddedLaws(LawSolver):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
-            approach, tilt, pressure = state
+            approach, tilt, pressure, body_state = state
             self._problem.start_from(pressure)
-            self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
+            control = Control(approach=approach, tilt=tilt, body_state=body_state)
+            self._last, self._body_state = self._problem.solve(control), body_state
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""

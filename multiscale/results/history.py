@@ -190,6 +190,10 @@ class History:
         heading="from first touch", table="more",
     )  # fmt: skip
 
+    stage = Column(
+        "Number of the stage, where the load history has stages", heading="stage", table="more"
+    )
+
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)
