@@ -151,7 +151,7 @@ class _Reader:
         for bolt in stated.pretension:
             tag = mesh.facet_tag(bolt.surface, key=self._key_of("pretension", bolt.surface))
             area = surface_area(mesh, tag) or 1.0  # a face without facets is refused later
-            x, y, z = (float(part) * bolt.force / area for part in frame.normal)
+            x, y, z = (float(part) * bolt.pull / area for part in frame.normal)
             pulls.append(Traction(tag=tag, stress=(x, y, z)))
         return Loads(
             tractions=tuple(tractions),

@@ -124,7 +124,7 @@ def load(parts: SceneParts) -> str:
 
 def stages(parts: SceneParts) -> Iterator[str]:
     """Yield what every stage of the load history does."""
-    history, lengths = parts.load_history, parts.zero
+    history = parts.load_history
     for number, stage in enumerate(parts.scene.loading.stage):
         legs = [leg for leg in history.ways if leg.stage == number]
         first, loads = legs[0], []
@@ -133,7 +133,7 @@ def stages(parts: SceneParts) -> Iterator[str]:
         elif first.end is None:
             loads.append(f"{first.quantity} as before")
         elif first.quantity == "approach":
-            loads.append(f"approach to {quantity(first.end - lengths, 'mm', 6)}")
+            loads.append(f"approach to {quantity(first.end - parts.zero, 'mm', 6)}")
         else:
             loads.append(f"force to {quantity(first.end, 'N', 6)}")
         for name, part in (("body", stage.body), ("counter-body", stage.counter_body)):
@@ -158,7 +158,7 @@ def body_loads(loads: BodyLoads, name: str) -> Iterator[str]:
             how = f"({', '.join(f'{part:.6g}' for part in one.stress)}) MPa"
         yield f"{how} on {one.surface!r} of the {name}"
     for bolt in loads.pretension:
-        yield f"bolts on {bolt.surface!r} pulling with {quantity(bolt.force, 'N', 6)}"
+        yield f"bolts on {bolt.surface!r} pulling with {quantity(bolt.pull, 'N', 6)}"
     for volume, rise in loads.rises.items():
         yield f"{rise:+.6g} K in {f'{volume!r} of ' if volume else ''}the {name}"
 

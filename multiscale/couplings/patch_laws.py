@@ -10,9 +10,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
+from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import on_body
+from multiscale.couplings.contact_solver import plane_at_largest_load
 from multiscale.couplings.describe import times
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -35,6 +37,10 @@ _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 @dataclass(kw_only=True, eq=False)
 class PatchLaws(LawCoupling, MicroCoupling):
     """A coupling with a law for every patch of the surface."""
+
+    def _rise(self) -> float:
+        """Return how far loads besides the contact raise the face at most [mm]; collective."""
+        return self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
 
     @property
     def table_rows(self) -> int:
@@ -155,11 +161,11 @@ class ConsistentCoupling(PatchLaws):
             self._model = self.model_on_body()
 
     def _make_table(self, observe: Observer | None) -> LawTable:
-        history, displacements = self.load_history, self._displacements(self.newton().condensed)
+        displacements = self._displacements(self.newton().condensed)
         return consistent_laws(
             self._model,
             self.patches,
-            largest=history.control(history.largest),
+            largest=self._largest_control(),
             displacements=displacements,
             pointwise=self.scene.coupling.interface == "pointwise",
             mean_heights=self.mean_heights,
@@ -168,6 +174,16 @@ class ConsistentCoupling(PatchLaws):
             comm=self.comm,
             observe=observe,
         )
+
+    def _largest_control(self) -> Control:
+        """Return the load that laws are made up to: other loads of the body raise its face."""
+        controls, rise = self.load_history.largest_controls, self._rise()
+        if len(controls) == 1 and not rise:
+            return controls[0]
+        solver = self.contact_solver(self._model)
+        plane = plane_at_largest_load(self.load_history, solver, self.surface)
+        assert plane is not None
+        return Control(approach=plane.approach + rise, tilt=self.load_history.slopes)
 
     def _displacements(self, dense: bool) -> Any:
         return self.bodies.patch_displacements(dense=dense, solutions=self.table_rows)
@@ -216,7 +232,7 @@ class IsolatedCoupling(PatchLaws):
         return isolated_laws(
             self.model_alone(),
             self.patches,
-            closure_ends=self.largest_closures,
+            closure_ends=self.largest_closures + self._rise(),
             love=self.scene.coupling.love,
             mean_heights=self.mean_heights,
             tolerance=self.table_tolerance,

@@ -39,11 +39,11 @@ class PretensionSection:
 
     Args:
         surface: Physical name or number of the face, such as that of all washers.
-        force: Pull of all bolts on the face, along the normal of the contact face.
+        pull: Force of all bolts on the face, along the normal of the contact face.
     """
 
     surface: Tag
-    force: Annotated[float, Unit("N"), Limits(ge=0)]
+    pull: Annotated[float, Unit("N"), Limits(ge=0)]
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -69,7 +69,7 @@ class BodyLoads:
     @property
     def pull(self) -> float:
         """Pull of all bolts [N]."""
-        return sum(one.force for one in self.pretension)
+        return sum(one.pull for one in self.pretension)
 
     @property
     def rises(self) -> dict[str | None, float]:

@@ -116,15 +116,15 @@ class LoadHistory:
 
         Forces are those of the contact: bolts pull besides the force on the plane.
         """
-        if not self.stage:
-            points = self.approach or self.force or self.pressure or ()
-            pull = self._pull(0.0) if self.quantity == "force" else 0.0
-            return tuple(point + pull for point in points)
-        known, quantity = [], self.quantity
-        for leg in self.ways:
+        return self._ends(self.quantity)
+
+    def _ends(self, quantity: Quantity) -> tuple[float, ...]:
+        """Return the values of a quantity at the ends of the legs that prescribe it."""
+        known = []
+        for leg in self.ways if self.stage else self.ways[: len(self.ways) // self.cycles]:
             if leg.quantity == quantity and leg.end is not None:
-                end = 2.0 * leg.stage + leg.there
-                known.append(leg.end + (self._pull(end) if quantity == "force" else 0.0))
+                pull = self._pull(self._state(leg, 1.0)) if quantity == "force" else 0.0
+                known.append(leg.end + pull)
         return tuple(known)
 
     @property
@@ -171,10 +171,26 @@ class LoadHistory:
         return any(leg.end < leg.start for leg in self.ways)  # type: ignore[operator]
 
     @property
-    def up_to_largest(self) -> LoadHistory:
-        """The history of one load step, straight to the largest load."""
-        load = {self.quantity: (self.largest,)}
-        return LoadHistory(**load, steps=1, tilt=self.tilt)  # type: ignore[arg-type]
+    def largest_controls(self) -> list[Control]:
+        """What prescribes the largest approach and the largest force, as far as there are any."""
+        ends = {quantity: self._ends(quantity) for quantity in ("approach", "force")}  # type: ignore[arg-type]
+        found = {quantity: max(values, default=0.0) for quantity, values in ends.items()}
+        return [
+            Control(**{quantity: value}, tilt=self.slopes)  # type: ignore[arg-type]
+            for quantity, value in found.items()
+            if value > 0.0
+        ]
+
+    def straight_to(self, control: Control) -> LoadHistory:
+        """Return the history of one load step, straight to an approach or a force.
+
+        Args:
+            control: What it prescribes.
+        """
+        tilt = "free" if control.tilt is None else control.tilt
+        if control.approach is None:
+            return LoadHistory(force=(control.force or 0.0,), steps=1, tilt=tilt)
+        return LoadHistory(approach=(control.approach,), steps=1, tilt=tilt)
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""
@@ -234,8 +250,7 @@ class LoadHistory:
         return float(np.interp(state, np.arange(len(self.pulls)), self.pulls))
 
     def on_face(self, depth: float, area: float, pulls: Sequence[float]) -> LoadHistory:
-        """Return the history on a contact face: approaches from first touch, forces instead of
-        pressures, and pulls.
+        """Return the history on a contact face, with approaches from first touch and with forces.
 
         Args:
             depth: How far the zero lies below the highest point of the surface [mm].
@@ -245,6 +260,7 @@ class LoadHistory:
         Raises:
             InputError: When the force that is left for the contact is negative.
         """
+
         def lowered(points: Sequence[float] | None, by: float) -> tuple[float, ...] | None:
             return None if points is None else tuple(point + by for point in points)
 

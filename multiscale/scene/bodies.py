@@ -161,9 +161,7 @@ class CounterBodySection(BodyLoads):
     @property
     def is_loaded(self) -> bool:
         """Whether loads, or supports that move, deform the body without contact."""
-        moved = any(
-            part not in ("free", 0.0) for one in self.supports for part in one.displacement
-        )
+        moved = any(part not in ("free", 0.0) for one in self.supports for part in one.displacement)
         return moved or bool(self.tractions or self.pretension or any(self.rises.values()))
 
     @property

@@ -11,7 +11,7 @@ from support.errors import InputError
 @pytest.mark.parametrize(
     ("load", "words"),
     [
-        ({}, "needs exactly one load (allowed: either 'approach' or 'force')"),
+        ({}, "needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')"),
         ({"approach": (1.0,), "force": (1.0,)}, "needs exactly one load"),
         ({"force": ()}, 'force = []: is an empty list (allowed: a quantity such as "5 N"'),
         ({"force": (1.0, 1.0)}, "force = [1.0, 1.0]: repeats a turning point"),
@@ -33,5 +33,7 @@ def test_approaches_from_the_mean_plane_may_be_negative():
 
 
 def test_the_history_to_the_largest_load_is_one_step():
-    history = LoadHistory(force=(2.0, 3.0, 1.0), steps=4, tilt="free").up_to_largest
-    assert (history.targets, history.slopes) == ([3.0], None)
+    whole = LoadHistory(force=(2.0, 3.0, 1.0), steps=4, tilt="free")
+    (largest,) = whole.largest_controls
+    history = whole.straight_to(largest)
+    assert (history.points, history.count, history.slopes) == ((3.0,), 1, None)
