@@ -32,7 +32,7 @@ from macro.contact.unilateral_problem import (
     nodal_contact,
 )
 from macro.elastic_body import ElasticBody
-from macro.fields import write_fields, write_rough_fields
+from macro.fields import FieldStep, write_fields, write_rough_fields
 from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.from_file import read_mesh
@@ -52,6 +52,7 @@ __all__ = [
     "FaceCompliance",
     "FaceContactState",
     "FacePair",
+    "FieldStep",
     "Interface",
     "LawContactProblem",
     "LawOperator",

@@ -320,6 +320,18 @@ class ElasticBody:
             found = (1.0 - share) * found + share * self._preload_by(self.loads[first + 1])
         return found
 
+    def free_strain(self, state: float = 0.0) -> Array:
+        """Return the strain of this rank's cells by temperature alone, shape (cells,).
+
+        Args:
+            state: Position among the states in `loads`, see `preload`.
+        """
+        first = min(int(state), len(self.loads) - 1)
+        found, share = self._cell_strain(self.loads[first]), state - first
+        if share:
+            found = (1.0 - share) * found + share * self._cell_strain(self.loads[first + 1])
+        return found
+
     @property
     def is_preloaded(self) -> bool:
         """Whether anything but contact moves the body."""

@@ -124,10 +124,10 @@ def load(parts: SceneParts) -> str:
 
 def stages(parts: SceneParts) -> Iterator[str]:
     """Yield what every stage of the load history does."""
-    history = parts.load_history
-    for number, stage in enumerate(parts.scene.loading.stage):
-        legs = [leg for leg in history.ways if leg.stage == number]
-        first, loads = legs[0], []
+    ways = parts.load_history.ways
+    for index, stage in enumerate(parts.scene.loading.stage):
+        legs = [leg for leg in ways if leg.stage == index]
+        first, loads = legs[0], list[str]()
         if stage.hold is not None:
             loads.append(f"{stage.hold} held")
         elif first.end is None:
@@ -139,9 +139,9 @@ def stages(parts: SceneParts) -> Iterator[str]:
         for name, part in (("body", stage.body), ("counter-body", stage.counter_body)):
             if part is not None:
                 loads += body_loads(part, name)
-        times_ = f", {stage.cycles} times there and back" if stage.cycles else ""
+        cyclic = f", {stage.cycles} times there and back" if stage.cycles else ""
         steps = sum(leg.steps for leg in legs)
-        yield f"stage {stage.name or number + 1} in {steps}: {', '.join(loads)}{times_}"
+        yield f"stage {stage.name or index + 1} in {steps}: {', '.join(loads)}{cyclic}"
 
 
 def body_loads(loads: BodyLoads, name: str) -> Iterator[str]:

@@ -81,7 +81,7 @@ class EmbeddedLaws(LawSolver):
         """Return this rank's displacements, and the pressures of patches or at its points."""
         of_patches = isinstance(self.table.patches, PatchGrid)
         shown = step.patches.pressure_MPa if of_patches else self.point_pressures
-        return self.displacement, shown
+        return (self.displacement, step.body_state), shown
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
