@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -64,7 +64,13 @@ def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | 
 class _Reader:
     """Reads one body of a scene."""
 
-    def __init__(self, scene: Scene, section: CounterBodySection, key: str, comm: Any) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        section: CounterBodySection,
+        key: Literal["body", "counter_body"],
+        comm: Any,
+    ) -> None:
         from mpi4py import MPI
 
         self._scene, self._section, self._key = scene, section, key

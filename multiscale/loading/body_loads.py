@@ -77,7 +77,7 @@ class BodyLoads:
         if self.temperature is None:
             return {}
         if isinstance(self.temperature, dict):
-            return dict(self.temperature)
+            return {name: rise for name, rise in self.temperature.items()}
         return {None: self.temperature}
 
     def followed_by(self, later: BodyLoads | None) -> BodyLoads:

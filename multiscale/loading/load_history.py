@@ -173,7 +173,7 @@ class LoadHistory:
     @property
     def largest_controls(self) -> list[Control]:
         """What prescribes the largest approach and the largest force, as far as there are any."""
-        ends = {quantity: self._ends(quantity) for quantity in ("approach", "force")}  # type: ignore[arg-type]
+        ends = {quantity: self._ends(quantity) for quantity in ("approach", "force")}
         found = {quantity: max(values, default=0.0) for quantity, values in ends.items()}
         return [
             Control(**{quantity: value}, tilt=self.slopes)  # type: ignore[arg-type]
@@ -187,7 +187,7 @@ class LoadHistory:
         Args:
             control: What it prescribes.
         """
-        tilt = "free" if control.tilt is None else control.tilt
+        tilt: Tilt = "free" if control.tilt is None else control.tilt
         if control.approach is None:
             return LoadHistory(force=(control.force or 0.0,), steps=1, tilt=tilt)
         return LoadHistory(approach=(control.approach,), steps=1, tilt=tilt)
