@@ -16,6 +16,7 @@ from geometry import InputError, Material
 from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.inputs.bodies import BodyFacts, SceneBody
 from multiscale.inputs.loads import body_states
+from multiscale.inputs.surfaces import located
 from multiscale.loading.body_loads import BodyLoads
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
@@ -223,9 +224,12 @@ class _Reader:
         curved = self._scene.law.representative
         # a gap counts as one between planes up to here: a sphere has slopes of 2 % at its edge
         allowed = 5e-3 * self._shortest(mesh) if curved else 0.0
-        faces = [
-            planar_face(mesh, tag, deviation=allowed, key=f"{self._key}.contact") for tag in tags
-        ]
+        along = getattr(self._section, "first_axis", None)
+        key = f"{self._key}.contact"
+        with located(self._scene, f"{self._key}.first_axis"):
+            faces = [
+                planar_face(mesh, tag, deviation=allowed, along=along, key=key) for tag in tags
+            ]
         first, corners = faces[0], []
         for face, tag in zip(faces, tags, strict=True):
             height = float(first.frame.height(face.frame.origin[None])[0])
@@ -237,7 +241,7 @@ class _Reader:
                     key="law.regions",
                 )
             corners += [face.frame.in_space([[0.0, 0.0], face.lengths])]
-        frame = FaceFrame.through(np.concatenate(corners), first.frame.normal)
+        frame = FaceFrame.through(np.concatenate(corners), first.frame.normal, along)
         lengths = frame.in_plane(np.concatenate(corners)).max(axis=0)
         return PlanarFace(
             frame=frame,

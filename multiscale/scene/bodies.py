@@ -212,11 +212,15 @@ class BodySection(CounterBodySection):
         place: Lower corner of the surface's rectangle in the coordinates of the contact face, which
             count from the lower corner of its bounding rectangle; in the middle of the face when
             not given.
+        first_axis: Direction in the mesh that the first axis of the contact face has, where it is
+            made perpendicular to the normal: that of x, or of y where the face looks along x, when
+            not given.
     """
 
     mesh: Annotated[str, NAMES_A_FILE]
     contact: Tag
     place: tuple[Length, Length] | None = None
+    first_axis: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
