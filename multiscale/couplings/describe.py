@@ -107,8 +107,10 @@ def load(parts: SceneParts) -> str:
         way = ", ".join(quantity(point, unit, 6) for point in points)
         again = f", {history.cycles} times" * (history.cycles > 1)
         text = f"{history.count} steps to {what} of {way}{again}"
-    if pull := next(iter(parts.load_history.pulls), 0.0):
-        text += f", bolts pulling with {quantity(pull, 'N', 6)} from the start"
+    sections = (("body", parts.scene.body), ("counter-body", parts.scene.counter_body))
+    known = [one for name, section in sections if section for one in body_loads(section, name)]
+    if known:
+        text += f"; from the start {', '.join(known)}"
     if parts.zero:
         depth = quantity(parts.zero, "mm", 4)
         text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
@@ -127,21 +129,22 @@ def stages(parts: SceneParts) -> Iterator[str]:
     ways = parts.load_history.ways
     for index, stage in enumerate(parts.scene.loading.stage):
         legs = [leg for leg in ways if leg.stage == index]
-        first, loads = legs[0], list[str]()
+        loads: list[str] = []
         if stage.hold is not None:
             loads.append(f"{stage.hold} held")
-        elif first.end is None:
-            loads.append(f"{first.quantity} as before")
-        elif first.quantity == "approach":
-            loads.append(f"approach to {quantity(first.end - parts.zero, 'mm', 6)}")
-        else:
-            loads.append(f"force to {quantity(first.end, 'N', 6)}")
+        elif stage.approach is not None:
+            loads.append(f"approach to {quantity(stage.approach, 'mm', 6)}")
+        elif stage.pressure is not None:
+            loads.append(f"mean pressure to {quantity(stage.pressure, 'MPa', 6)}")
+        elif stage.force is not None:
+            loads.append(f"force to {quantity(stage.force, 'N', 6)}")
         for name, part in (("body", stage.body), ("counter-body", stage.counter_body)):
             if part is not None:
                 loads += body_loads(part, name)
         cyclic = f", {stage.cycles} times there and back" if stage.cycles else ""
         steps = sum(leg.steps for leg in legs)
-        yield f"stage {stage.name or index + 1} in {steps}: {', '.join(loads)}{cyclic}"
+        what = ", ".join(loads) or "nothing changes"
+        yield f"stage {stage.name or index + 1} in {steps}: {what}{cyclic}"
 
 
 def body_loads(loads: BodyLoads, name: str) -> Iterator[str]:

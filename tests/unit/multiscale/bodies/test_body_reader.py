@@ -69,7 +69,7 @@ def read(tmp_path, monkeypatch):
         ),
         (
             {"pretension": [{"surface": "bottom", "pull": "1 N"}]},
-            r"body\.pretension: the surface 'bottom' is held along z, where a traction of 0\.01 MPa",
+            r"body\.pretension: the surface 'bottom' is held along z, where a traction of 0\.01",
         ),
         (
             {"stage": {"tractions": [{"surface": "top", "pressure": 1}]}},
