@@ -39,7 +39,7 @@ class Control:
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
             the plane turn until the pressures have the prescribed moment about the middle.
         moment: First moments of the pressures about the middle where the plane turns, as bolts
-            prescribe them [N mm].
+            prescribe them [N mm]; laws on a mesh alone follow them.
         body_state: Position among the states of what else loads the bodies, which none of them
             changes by itself: 0.25 is a quarter of the way from the first state to the second.
 

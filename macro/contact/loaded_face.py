@@ -216,17 +216,20 @@ class LoadedFace(ContactFace):
         Returns:
             First moments of the pull along the axes of the face [N mm].
         """
-        loads = getattr(self.body, "loads", ())
-        if not any(one.pulls for one in loads):
-            return 0.0, 0.0
-        first = min(int(state), len(loads) - 1)
-        share, frame = state - first, self.facets.frame
+        known = self._pull_moments
+        x, y = (float(np.interp(state, np.arange(len(known)), axis)) for axis in known.T)
+        return x, y
+
+    @cached_property
+    def _pull_moments(self) -> Array:
+        """Moments of what pulls the body in every state of its loads, shape (states, 2) [N mm]."""
+        frame, loads = self.facets.frame, self.body.loads
         origin = frame.in_space([self.patches.middle])[0]
-        moments = self.body.pull_moments(loads[first], origin, frame.axes[:2])
-        if share:
-            other = self.body.pull_moments(loads[first + 1], origin, frame.axes[:2])
-            moments = (1.0 - share) * moments + share * other
-        return float(moments[0]), float(moments[1])
+        found = {
+            one: self.body.pull_moments(one, origin, frame.axes[:2]) if one.pulls else np.zeros(2)
+            for one in dict.fromkeys(loads)
+        }
+        return np.array([found[one] for one in loads])
 
     @cached_property
     def pointwise(self) -> Sampling:
