@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike
 from geometry import Control, PatchGrid, Regions
 from support.arrays import Array
 
+_SAME = 1e-6
+"""Relative change below which the forces, or approaches, of two load steps count as the same."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PatchState:
@@ -197,6 +200,22 @@ class LoadStep:
             meshes=tuple((approach - zero, *others) for approach, *others in self.meshes),  # type: ignore[misc]
             patches=replace(self.patches, closure_mm=self.patches.closure_mm - zero),
         )
+
+    def is_unloading(self, before: LoadStep | None) -> bool:
+        """Tell whether the force fell to this load step, or under the same force the approach.
+
+        Args:
+            before: The load step before it; None for the first.
+        """
+        if before is None:
+            return False
+        for here, there in (
+            (self.force_N, before.force_N),
+            (self.approach_mm, before.approach_mm),
+        ):
+            if abs(here - there) > _SAME * max(abs(here), abs(there)):
+                return here < there
+        return False
 
     @property
     def under_its_plane(self) -> Control:
