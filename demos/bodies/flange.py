@@ -12,14 +12,14 @@ Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raise
 
 Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
 rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names:
-volume `flange`, surfaces `raised face`, `bore` and `rim` (the walls inside and outside of it),
+volume `flange`, surfaces `raised face`, `bore`, `rim` (the outer wall of the raised face),
 `washers` and `pipe end`.
 """
 
 from math import cos, pi, sin
 
 import gmsh
-from meshing import in_box, in_plane, name, set_size, write_body
+from meshing import in_plane, name, set_size, write_body
 
 DISC, RAISED, NECK = 18.0, 2.0, 40.0
 TOP = DISC + RAISED
@@ -30,6 +30,13 @@ BOLTS, HOLE, WASHER = 62.5, 9.0, 15.0
 def cylinder(z: float, height: float, radius: float, x: float = 0.0, y: float = 0.0) -> tuple:
     """Return an upright cylinder."""
     return 3, gmsh.model.occ.addCylinder(x, y, z, 0, 0, height, radius)
+
+
+def around_axis(radius: float) -> list[int]:
+    """Return the surfaces that lie on an upright cylinder about the axis."""
+    wide = radius + 1e-3
+    box = gmsh.model.getEntitiesInBoundingBox(-wide, -wide, -1e3, wide, wide, 1e3, 2)
+    return [tag for _, tag in box if gmsh.model.getType(2, tag) == "Cylinder"]
 
 
 def build(size: float) -> None:
@@ -54,11 +61,9 @@ def build(size: float) -> None:
     name(2, in_plane(TOP, FACE + 1), "raised face")
     name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
     name(2, in_plane(-NECK, PIPE + 1), "pipe end")
-    bore = in_box((-BORE, -BORE, -NECK), (BORE, BORE, TOP))
-    flat = {*bore, *in_plane(TOP, FACE), *in_plane(DISC, FACE)}
-    beside = in_box((-FACE, -FACE, DISC), (FACE, FACE, TOP))
-    name(2, bore, "bore")
-    name(2, [tag for tag in beside if tag not in flat], "rim")
+    name(2, around_axis(BORE), "bore")
+    inner = around_axis(PIPE)
+    name(2, [tag for tag in around_axis(FACE) if tag not in inner], "rim")
 
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
     set_size(f"{size} * (1 + 0.15 * {away})")  # coarser with the distance from the face's rim

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import PatchGrid, Regions
+from geometry import Control, PatchGrid, Regions
 from support.arrays import Array
 
 _SAME = 1e-6
@@ -102,6 +102,8 @@ class LoadStep:
         leak_error_mm3_per_s: What it differs by with gaps of samples on half as many cells a side
             [mm³/s].
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
+        stage: Number of the stage, from 1; None where the load history has none.
+        body_state: Position among the states of the bodies' loads, see `geometry.Control`.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -147,6 +149,8 @@ class LoadStep:
     leak_mm3_per_s: float | None = None
     leak_error_mm3_per_s: float | None = None
     zero_mm: float = 0.0
+    stage: int | None = None
+    body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -237,6 +241,11 @@ class LoadStep:
             if abs(here - there) > _SAME * max(abs(here), abs(there)):
                 return here < there
         return False
+
+    @property
+    def under_its_plane(self) -> Control:
+        """What brings the plane of the load step, counted from first touch, back to where it is."""
+        return Control(approach=self.approach_mm, tilt=self.tilt, body_state=self.body_state)
 
     @property
     def first_touch_approach_mm(self) -> float | None:

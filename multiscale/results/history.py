@@ -233,6 +233,10 @@ class History:
     )  # fmt: skip
     leak_error_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
 
+    stage = Column(
+        "Number of the stage, where the load history has stages", heading="stage", table="more"
+    )
+
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)

@@ -19,7 +19,7 @@ from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
 from support.errors import InputError
 
 _TEXT = "reason"
-_COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations"}
+_COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations", "stage"}
 
 
 def read_history(folder: str | Path) -> History:
@@ -105,9 +105,9 @@ def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
 
 
 def _number(name: str, text: str) -> float | int | None:
-    if name in _COUNTS:
-        return int(text)
-    return float(text) if text else None
+    if not text:
+        return None
+    return int(text) if name in _COUNTS else float(text)
 
 
 def _patch_states(rows: list[dict[str, str]], count: int) -> list[PatchState]:

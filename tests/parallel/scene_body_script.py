@@ -34,6 +34,18 @@ def sections(folder):
     leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
     edges = {"inlet": "left", "outlet": "right"}
     yield "leak", {**sample, **load, "body": body, "leak": leak | edges, "output": QUIET}
+    stages = [
+        {
+            "force": "12 N",
+            "steps": 2,
+            "body": {"pretension": [{"surface": "right", "pull": "6 N"}]},
+        },
+        {"force": "10 N", "steps": 1, "body": {"tractions": [{"surface": "back", "pressure": 3}]}},
+        {"hold": "approach", "steps": 2, "body": {"temperature": "20 K"}},
+    ]
+    warm = {**body, "thermal_expansion": "20 ppm/K"}
+    parts = {"load": {"stage": stages, "tilt": "free"}}
+    yield "stages", {**sample, **parts, "body": warm, "output": QUIET}
     yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": QUIET}
 
 
