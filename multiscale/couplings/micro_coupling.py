@@ -148,7 +148,7 @@ class MicroCoupling(PressedSurface):
             return None
         nx, ny = self.cells
         probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
-        if self.load_history.quantity == "force":
+        if self.load_history.quantity_in(step.stage) == "force":
             control = Control(force=step.force_N, tilt=step.tilt)
 
         def solve() -> Array:
