@@ -98,7 +98,9 @@ def test_only_the_force_curve(monkeypatch, tmp_path):
 def test_a_contact_is_worked_out_for_the_last_load_step_alone(monkeypatch):
     made, steps = [], []
     of = ContactRecord.of
-    monkeypatch.setattr(ContactRecord, "of", lambda *given: made.append(given) or of(*given))
+    monkeypatch.setattr(
+        ContactRecord, "of", lambda *given, **other: made.append(given) or of(*given, **other)
+    )
     stiffness = HalfSpaceModel.stiffness
     monkeypatch.setattr(
         HalfSpaceModel, "stiffness",
