@@ -216,7 +216,7 @@ class HalfSpaceGrid:
             spectrum = periodic_spectrum(grid, spacing)
             waves = spectrum
         else:
-            period = _good(grid)
+            period = fast_counts(grid)
             padded = 2 * period[0], 2 * period[1]
             spectrum = padded_spectrum(padded, spacing)
             waves = periodic_spectrum(period, spacing)
@@ -228,7 +228,7 @@ class HalfSpaceGrid:
         self.inverse = Convolution(inverse.astype(np.float32), grid, period, work)
 
 
-def _good(counts: Iterable[int]) -> tuple[int, int]:
+def fast_counts(counts: Iterable[int]) -> tuple[int, int]:
     """Return the next numbers of cells with a fast transform."""
     x, y = (int(fft.next_fast_len(count, real=True)) for count in counts)
     return x, y
