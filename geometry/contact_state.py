@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
+from geometry.shear_state import ShearState
 from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation".split()
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation shear".split()
 )
 
 
@@ -129,6 +130,7 @@ class ContactState:
         elastic_energy: Energy ½ ∫ p u dA of the elastic deformation [N mm].
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
+        shear: Tractions and slip along the surface; None without friction.
     """
 
     plane: RigidPlane
@@ -162,6 +164,7 @@ class ContactState:
     elastic_energy: float = np.nan
     plastic_work: float = np.nan
     indentation: Array | None = None
+    shear: ShearState | None = None
 
     @property
     def approach(self) -> float:

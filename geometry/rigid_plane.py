@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.patches import PatchGrid
+from geometry.shear_state import ShearControl
 from support.arrays import Array, Flags
 from support.errors import InputError, NotConverged
 
@@ -38,6 +39,7 @@ class Control:
         force: Normal force, ≥ 0 [N]; None when the approach is prescribed.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
             the plane turn until the pressures have no moment about the middle.
+        shear: Shift of the plane along the surface, or shear force on it; None without friction.
 
     Raises:
         InputError: When not exactly one of approach and force is given, or a number is not finite
@@ -47,6 +49,7 @@ class Control:
     approach: float | None = None
     force: float | None = None
     tilt: tuple[float, float] | None = (0.0, 0.0)
+    shear: ShearControl | None = None
 
     def __post_init__(self) -> None:
         if (self.approach is None) == (self.force is None):
@@ -64,9 +67,10 @@ class Control:
 
     def __str__(self) -> str:
         """Say what presses, as in "force 2 N"."""
+        along = "" if self.shear is None else f", {self.shear}"
         if self.force is not None:
-            return f"force {self.force:.6g} N"
-        return f"approach {self.approach:.6g} mm"
+            return f"force {self.force:.6g} N{along}"
+        return f"approach {self.approach:.6g} mm{along}"
 
     @property
     def loads(self) -> Array:

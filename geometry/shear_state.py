@@ -39,6 +39,13 @@ class ShearControl:
         if np.shape(pair) != (2,) or not np.isfinite(np.asarray(pair, float)).all():
             raise InputError("needs two finite numbers", value=pair, allowed="along x and y")
 
+    def __str__(self) -> str:
+        """Say what shears, as in "shear force (2, 0) N"."""
+        if self.force is not None:
+            return f"shear force ({self.force[0]:.6g}, {self.force[1]:.6g}) N"
+        assert self.shift is not None
+        return f"shift ({self.shift[0]:.6g}, {self.shift[1]:.6g}) mm"
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ShearState:

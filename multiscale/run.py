@@ -86,6 +86,10 @@ class Run:
             from multiscale.observers.conductance import ConductanceObserver  # others do without
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
+        if self.scene.friction is not None:
+            from multiscale.observers.friction import FrictionObserver  # others do without
+
+            self._observers.append(FrictionObserver(self.coupling))
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def phase(self, name: str) -> AbstractContextManager[None]:

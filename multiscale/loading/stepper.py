@@ -12,6 +12,7 @@ from typing import Any
 
 from geometry import Control, NotConverged, PatchGrid
 from geometry.contact_state import ContactState
+from micro.friction.goodman import NeglectedCoupling
 from micro.model import Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -58,6 +59,17 @@ class StepSolver(ABC):
         The slopes of the plane stay or, where it turns, its moments stay zero.
         """
         return Stiffness(None, 0)
+
+    def tangential_stiffness(self) -> Stiffness:
+        """Return the derivative of the shear force along the shift at the latest load step.
+
+        The shift changes on in the direction of its last change; cells that slip go on slipping.
+        """
+        return Stiffness(None, 0)
+
+    def neglected_coupling(self) -> NeglectedCoupling | None:
+        """Return what friction leaves out at the latest load step; None where that is unknown."""
+        return None
 
     def state(self) -> Any:
         """Return what the next load step starts from; it does not depend on the number of ranks.
@@ -269,7 +281,7 @@ class LoadStepper:
         """Press to a value, through smaller steps where the whole one fails."""
         last, ahead = self.position.value, [target]
         while True:
-            control = self._load_history.control(ahead[-1])
+            control = self._load_history.control(ahead[-1], self.position.targets)
             try:
                 step = self._solver.press(control)
             except NotConverged as error:
@@ -277,7 +289,8 @@ class LoadStepper:
                 beyond = isinstance(error, BeyondLaws)
                 if beyond or abs(ahead[-1] - last) <= self.position.smallest:
                     shown = self._load_history.shown(control)
-                    halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
+                    whole = beyond or not self.position.smallest  # at an unchanging load
+                    halved = "" if whole else f"it was halved {_MOST_HALVINGS} times; "
                     raise NotConverged(
                         f"load step {self.position.steps + 1} ({shown})",
                         reason=error.reason,

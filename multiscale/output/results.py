@@ -30,7 +30,7 @@ from support.collective import on_root, shared
 from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
+_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face")
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
@@ -241,6 +241,8 @@ class RunFigures:
         if run.contacts:
             contact = run.contacts[-1]
             figures["contact"] = "contact.contact_figure", (contact,)
+            if contact.slipping is not None:
+                figures["shear"] = "shear.shear_figure", (history, contact)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells:
                 ratio = coupling.materials.first.poisson_ratio
