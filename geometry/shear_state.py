@@ -1,4 +1,4 @@
-"""What is prescribed of a plane that shifts along a surface, and the shear of a contact under it."""
+"""What is prescribed of a plane that shifts along a surface, and the shear of the contact."""
 
 from __future__ import annotations
 

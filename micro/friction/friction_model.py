@@ -17,16 +17,15 @@ import numpy as np
 from geometry.materials import MaterialPair
 from geometry.shear_state import ShearControl, ShearState
 from micro.boundary_elements.half_space_grid import Cells
-from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.rigid_motions import Box
 from micro.complementarity.solver import box_around
-from micro.friction.goodman import NeglectedCoupling, neglected_coupling
+from micro.friction.goodman import CrossCompliance, NeglectedCoupling, variation
 from micro.friction.stick_slip import FreeTractions, solve_tractions
 from micro.friction.tangential_grid import TangentialGrid, tangential_grid
 from micro.friction.traction_problem import TractionProblem
 from support.arrays import Array, Flags
 from support.cores import blas_threads
-from support.errors import InputError, NotConverged
+from support.errors import InputError
 
 _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present
@@ -130,10 +129,58 @@ class FrictionModel:
         return np.nan, grid.products - used
 
     def neglected(self, state: ShearState) -> NeglectedCoupling:
-        """Return what Goodman's assumption leaves out at a state; two products."""
-        return neglected_coupling(
-            state, self.coefficient, self.materials, self.spacing, periodic=self.periodic
+        """Return what Goodman's assumption leaves out at a state.
+
+        Its effect on the shear force is that on a first loading under the pressures of the state:
+        the plane presses without shear force, then shifts at once as far as in the state.
+
+        Raises:
+            NotConverged: When the tractions of that are not found.
+        """
+        beta, closed = self.materials.dundurs_beta, state.closed
+        if beta == 0.0 or not closed.any():
+            return NeglectedCoupling(beta)
+        grid = closed.shape[0], closed.shape[1]
+        cross = CrossCompliance(grid, self.spacing, self.materials, periodic=self.periodic)
+        sideways = cross.sideways(state.bound / self.coefficient)[:, closed]
+        forces = (
+            self._first_loading(state, np.zeros_like(sideways)),
+            (self._first_loading(state, sideways)),
         )
+        return NeglectedCoupling(
+            beta,
+            float(np.hypot(*variation(sideways)).max()),
+            float(variation(cross.across(state.traction)[closed]).max()),
+            float(np.hypot(*forces[0])),
+            float(np.hypot(*(forces[1] - forces[0]))),
+        )
+
+    def _first_loading(self, state: ShearState, sideways: Array) -> Array:
+        """Return the shear force of a first loading to a shift where the surface has moved.
+
+        Args:
+            state: The shear that has the shift, and the bound of the tractions.
+            sideways: How far the cells in contact are displaced beforehand, shape (2, n) [mm].
+
+        Returns:
+            Shape (2,) [N].
+        """
+        box = self.box(state.closed)
+        cells, bound = _cells_in(state.closed, box), state.bound[state.closed] / self._modulus
+        pressed = TractionProblem(
+            grid=self.grid(box),
+            cells=cells,
+            bound=bound,
+            shift=-sideways,
+            force=np.zeros(2),
+            tolerance=self.tolerance,
+        )
+        with blas_threads(1):
+            before = solve_tractions(pressed, np.zeros_like(sideways))
+            moved = np.array(state.shift) + before.motion
+            sheared = replace(pressed, shift=moved[:, None] - sideways - before.slip, force=None)
+            after = solve_tractions(sheared, before.traction)
+        return np.asarray(after.traction.sum(axis=1)) * self._unit
 
     def energy(self, state: ShearState) -> float:
         """Return the elastic energy ½ ∫ q·u dA of the tractions [N mm]."""
@@ -182,6 +229,7 @@ class _Step:
     def solved(self, control: ShearControl) -> ShearState:
         """Return the shear at the end of the step."""
         model, before, scale = self._model, self._before, self._model._modulus
+        closed = self._closed
         slip_before = self._of_cells(self._slip_before())
         start = self._of_cells(before.traction) / scale
         force = None if control.force is None else np.array(control.force) / model._unit
@@ -201,9 +249,7 @@ class _Step:
         traction = self._on_grid(solution.traction * scale)
         slip = self._on_grid(slip_before + solution.slip)
         slipping = np.zeros(self._bound.shape, bool)
-        slipping[self._box][self._cells.row + self._cells.rows[0], self._cells.column] = (
-            solution.slipping
-        )
+        slipping[closed] = solution.slipping
         lost = self._dissipated(traction, self._on_grid(solution.slip), shift)
         moved = shift - np.array(before.shift)
         size = float(np.hypot(*moved))

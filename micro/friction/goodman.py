@@ -6,7 +6,7 @@ sideways. With Dundurs' β the difference is
     u = −(β/(π E*)) ∫ p d/ρ² dA,    u_z = (β/(π E*)) ∫ q·d/ρ² dA,
 
 d from the load to the point. Neglecting both separates the normal contact from shear (Goodman
-1962). Each is evaluated once, at a solution without them, to know their size.
+1962). They are evaluated at a solution without them, to know their size.
 
 Theory: docs/theory.md, section 15.
 """
@@ -19,13 +19,12 @@ import numpy as np
 from scipy import fft
 
 from geometry.materials import MaterialPair
-from geometry.shear_state import ShearState
 from support.arrays import Array
 from support.cores import cores
 
 
 class NeglectedCoupling(NamedTuple):
-    """Sizes of the displacements that Goodman's assumption leaves out.
+    """What Goodman's assumption leaves out at a load step.
 
     Attributes:
         beta: Dundurs' β.
@@ -33,52 +32,62 @@ class NeglectedCoupling(NamedTuple):
             mean over the contact [mm].
         across: Largest difference of displacements across the surface by the tractions, from their
             mean over the contact [mm].
+        force: Shear force at the shift of the load step, had it been reached at once [N].
+        force_change: Change of that force where the pressures pull the surface sideways first [N].
     """
 
     beta: float
-    sideways: float
-    across: float
+    sideways: float = 0.0
+    across: float = 0.0
+    force: float = 0.0
+    force_change: float = 0.0
 
 
-def neglected_coupling(
-    state: ShearState,
-    coefficient: float,
-    materials: MaterialPair,
-    spacing: tuple[float, float],
-    *,
-    periodic: bool,
-) -> NeglectedCoupling:
-    """Evaluate the displacements that Goodman's assumption leaves out.
+class CrossCompliance:
+    """Displacements along the surface by pressures and across it by tractions, on all cells.
 
     Args:
-        state: The shear of a contact.
-        coefficient: Coefficient of friction.
-        materials: The two bodies.
+        grid: Numbers of cells (nx, ny).
         spacing: Sides of a cell [mm].
+        materials: The two bodies.
         periodic: Whether loads continue periodically.
     """
-    beta, closed = materials.dundurs_beta, state.closed
-    if beta == 0.0 or not closed.any():
-        return NeglectedCoupling(beta, 0.0, 0.0)
-    waves = _waves if periodic else _padded_waves
-    kernels = waves(closed.shape, spacing) * beta / materials.contact_modulus  # type: ignore[arg-type]
-    shape = closed.shape if periodic else tuple(2 * count for count in closed.shape)
 
-    def convolved(kernel: Array, field: Array) -> Array:
-        loaded = fft.rfft2(field, s=shape, workers=cores())
-        whole = fft.irfft2(kernel * loaded, s=shape, workers=cores())
-        return np.asarray(whole[: closed.shape[0], : closed.shape[1]])
+    def __init__(
+        self,
+        grid: tuple[int, int],
+        spacing: tuple[float, float],
+        materials: MaterialPair,
+        *,
+        periodic: bool,
+    ) -> None:
+        self._shown = tuple(slice(count) for count in grid)
+        self._shape = grid if periodic else tuple(2 * count for count in grid)
+        waves = _waves if periodic else _padded_waves
+        self._waves = waves(grid, spacing) * (materials.dundurs_beta / materials.contact_modulus)
 
-    pressure = state.bound / coefficient
-    along = [_variation(convolved(-one, pressure)[closed]) for one in kernels]
-    lifted = sum(convolved(one, q) for one, q in zip(kernels, state.traction, strict=True))
-    return NeglectedCoupling(
-        beta, float(np.hypot(*along).max()), float(_variation(lifted[closed]).max())
-    )
+    def sideways(self, pressure: Array) -> Array:
+        """Return the displacements along the surface by pressures [MPa], shape (2, nx, ny) [mm]."""
+        return np.stack([self._convolved(-one, pressure) for one in self._waves])
+
+    def across(self, tractions: Array) -> Array:
+        """Return the displacements into the body by tractions, shape (nx, ny) [mm].
+
+        Args:
+            tractions: The tractions, shape (2, nx, ny) [MPa].
+        """
+        return self._convolved(self._waves[0], tractions[0]) + self._convolved(
+            self._waves[1], tractions[1]
+        )
+
+    def _convolved(self, kernel: Array, field: Array) -> Array:
+        loaded = fft.rfft2(field, s=self._shape, workers=cores())
+        return np.asarray(fft.irfft2(kernel * loaded, s=self._shape, workers=cores())[self._shown])
 
 
-def _variation(values: Array) -> Array:
-    return np.abs(values - values.mean())
+def variation(values: Array) -> Array:
+    """Return the sizes of differences from the mean along the last axis."""
+    return np.asarray(np.abs(values - values.mean(axis=-1, keepdims=True)))
 
 
 def _waves(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:

@@ -4,6 +4,7 @@ It is the search of `micro.complementarity.active_set` for tractions in two dire
 the cells at the bound that slip outwards as slipping. Their tractions may only turn; those of all
 others are free. The linear problem of these cells is solved roughly by conjugate gradients, the
 same as those of the normal contact, and tractions beyond their bounds are brought back to them.
+Where that gains little, some projected steps along the gradient of the energy come between.
 Turning a traction g by an angle shortens it along the slip s, which adds the stiffness |s|/g to the
 direction across (Newton's method for the bound).
 
@@ -20,9 +21,14 @@ from micro.friction.traction_problem import TractionProblem, Tractions
 from support.arrays import Array
 from support.errors import NotConverged
 
-_TRUSTING_STEPS = 20
-"""Steps that may raise the energy when they lower the residual; later ones must lower the energy."""
 _MOST_STEPS, _MOST_ITERATIONS, _MOST_HALVINGS = 200, 100, 12
+_DECREASE = 0.7
+"""Residual after a step, relative to that before, above which the gradient takes over. Steps that
+come closer halve it."""
+_GRADIENT_STEPS = 8
+"""Steps along the gradient in a row."""
+_MOST_MOTIONS, _ROUNDING = 20, 1e-14
+"""Newton steps for the shift under a prescribed force, and their last change over the slip."""
 _FORCING = (0.2, 0.01)
 """Displacements at which the conjugate gradients of a step end, relative to the present residual:
 where the slipping cells have changed, and where they are the same as before."""
@@ -97,6 +103,7 @@ class StickSlip:
     def __init__(self, problem: TractionProblem, start: Array) -> None:
         self.problem = problem
         self._set = np.zeros(len(problem.bound), bool)
+        self._cautious = False  # since a step has raised the energy
         tractions = problem.admissible(start)
         if tractions is None:
             tractions = problem.admissible(np.zeros_like(start))
@@ -114,14 +121,12 @@ class StickSlip:
         problem, self.traction = self.problem, traction
         moved = problem.grid.displacement_of(problem.cells, traction)
         self._energy = float(np.vdot(traction, 0.5 * moved - problem.shift))
-        wanted, size = problem.shift - moved, np.hypot(*traction)
-        at_bound, self.motion = problem.at_bounds(traction), np.zeros(2)
+        wanted, at_bound = problem.shift - moved, problem.at_bounds(traction)
+        self._normal = traction / np.maximum(np.hypot(*traction), 1e-300)
+        self.motion = np.zeros(2)
         if problem.force is not None:
-            weights = np.where(at_bound, 0.0, problem.bound - size)
-            weights = weights if weights.any() else problem.bound
-            self.motion = -np.average(wanted, axis=1, weights=weights)
+            self.motion = _closest_motion(wanted, self._normal * at_bound, problem.bound)
         slip = self.slip = wanted + self.motion[:, None]
-        self._normal = traction / np.maximum(size, 1e-300)
         outward = (self._normal * slip).sum(axis=0)
         self.slipping = at_bound & (outward > 0.0)
         self._normal *= self.slipping
@@ -132,28 +137,87 @@ class StickSlip:
         largest = float(np.abs(self._left).max(initial=0.0))
         self.residual = largest / self._scale if self._scale > 0.0 else 0.0
 
-    def step(self, *, cautious: bool) -> bool:
-        """Solve with the cells that seem to slip; return whether it gained.
+    def step(self) -> None:
+        """Solve with the cells that seem to slip, or move along the gradient where that fails."""
+        old, residual, energy = self.traction, self.residual, self._energy
+        change = self._newton_change()
+        moved = self.problem.admissible(old + change)
+        if moved is not None:
+            self._accept(moved)
+            falls = self.residual <= _DECREASE * residual
+            if self.residual <= self.problem.tolerance or (falls and not self._cautious):
+                return
+            if falls and self._energy < energy:
+                return
+        if moved is None or self._energy >= energy:
+            self._cautious = True
+            self._accept(old)
+        self._follow_gradient()
 
-        Args:
-            cautious: Whether no step may raise the energy.
-        """
+    def _newton_change(self) -> Array:
+        """Return the change of the tractions by the linear problem of the present cells."""
         problem = self.problem
         same = bool(np.array_equal(self.slipping, self._set))
         self._set = self.slipping
         free = FreeTractions(problem, self._normal, self._outward / problem.bound)
         stop = max(_FORCING[same] * self.residual, 0.25 * problem.tolerance) * self._scale
-        change = free.solution(self._left, stop=stop, limit=_MOST_ITERATIONS)
-        old, residual, energy = self.traction, self.residual, self._energy
-        for halving in range(_MOST_HALVINGS):
-            moved = problem.admissible(old + 0.5**halving * change)
-            if moved is None:
-                continue
-            self._accept(moved)
-            gain = self._energy < energy or (self.residual < residual and not cautious)
-            if gain or self.residual <= problem.tolerance:
-                return True
-        return False
+        return free.solution(self._left, stop=stop, limit=_MOST_ITERATIONS)
+
+    def _follow_gradient(self) -> None:
+        """Lower the energy by some projected steps along the slip, weighted by the bounds.
+
+        Where slip is large against what tractions displace, they follow its direction, and solving
+        for cells as if they stuck leads astray.
+        """
+        problem, bound = self.problem, self.problem.bound
+        ahead = bound * self.slip
+        moved = problem.grid.displacement_of(problem.cells, ahead)
+        length = float((bound * self.slip**2).sum()) / float(np.vdot(ahead, moved))
+        for _ in range(_GRADIENT_STEPS):
+            old, slip, energy = self.traction, self.slip, self._energy
+            for _ in range(_MOST_HALVINGS):
+                trial = problem.admissible(old + length * bound * slip)
+                if trial is not None:
+                    self._accept(trial)
+                    if self._energy <= energy:
+                        break
+                length *= 0.25
+            else:
+                self._accept(old)
+                return
+            change = self.traction - old
+            curvature = -float(np.vdot(change, self.slip - slip))
+            if not curvature > 0.0:
+                return
+            length = float((change**2 / bound).sum()) / curvature
+
+
+def _closest_motion(wanted: Array, normal: Array, weights: Array) -> Array:
+    """Return the shift of all cells that violates the conditions of slip least.
+
+    The weighted sum of the squares of what is left of the slip is convex in the shift. It counts
+    whole in cells that stick, and not along the traction where that points outwards in others.
+
+    Args:
+        wanted: Slip without the shift, shape (2, n) [mm].
+        normal: Directions of the tractions at the bound, 0 of those within it, shape (2, n).
+        weights: Weights of the cells, shape (n,).
+
+    Returns:
+        Shape (2,) [mm].
+    """
+    motion = -np.average(wanted, axis=1, weights=weights)
+    for _ in range(_MOST_MOTIONS):
+        slip = wanted + motion[:, None]
+        outward = (normal * slip).sum(axis=0)
+        free = normal * (outward > 0.0)
+        left = slip - free * outward
+        curvature = weights.sum() * np.eye(2) - (weights * free) @ free.T
+        change = -np.linalg.lstsq(curvature, left @ weights, rcond=1e-12)[0]
+        motion = motion + change
+        if np.abs(change).max() <= _ROUNDING * np.abs(slip).max():
+            break
+    return np.asarray(motion)
 
 
 def solve_tractions(problem: TractionProblem, start: Array) -> Tractions:
@@ -184,7 +248,7 @@ def solve_tractions(problem: TractionProblem, start: Array) -> Tractions:
         empty = np.zeros_like(start)
         return Tractions(empty, np.zeros(2), empty, np.zeros(0, bool), 0.0, 0)
     search = StickSlip(problem, start)
-    for steps in range(_MOST_STEPS):
+    for _ in range(_MOST_STEPS):
         if search.residual <= problem.tolerance:
             return Tractions(
                 search.traction,
@@ -194,8 +258,7 @@ def solve_tractions(problem: TractionProblem, start: Array) -> Tractions:
                 search.residual,
                 problem.grid.products - used,
             )
-        if not search.step(cautious=steps >= _TRUSTING_STEPS):
-            break
+        search.step()
     raise NotConverged(
         f"the tractions (residual {search.residual:.1e}, asked {problem.tolerance:.1e})",
         reason="the cells that slip were not found",

@@ -51,21 +51,20 @@ class ContactSolver(StepSolver):
         self._start: Start | None = None
         self._turns = False
         self._shear: ShearState | None = None
+        self._last: Control | None = None  # without its shear
         self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `StepSolver.press`."""
 
         def solve() -> LoadStep:
-            state = self._model.press(
-                control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
-            )
+            state = self._pressed(control)
             shear, products = self._shear, 0
             if self._friction is not None and control.shear is not None:
                 shear = self._friction.advance(shear, state.pressures, control.shear)
                 state, products = replace(state, shear=shear), shear.products
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
-            self._shear = shear
+            self._shear, self._last = shear, replace(control, shear=None)
             return LoadStep.of_patches(
                 self._patches,
                 plane=(state.approach, *state.tilt),
@@ -82,6 +81,15 @@ class ContactSolver(StepSolver):
             )
 
         return on_root_alone(self._comm, solve)
+
+    def _pressed(self, control: Control) -> ContactState:
+        """Solve the normal contact, unless shear alone changes."""
+        if control.shear is not None and self.latest is not None:
+            if self._last == replace(control, shear=None):
+                return replace(self.latest, iterations=0)
+        return self._model.press(
+            control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
+        )
 
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""
@@ -132,6 +140,7 @@ class ContactSolver(StepSolver):
     @past.setter
     def past(self, value: Any) -> None:
         self._start, self.latest, self._shear = value or (None, None, None)
+        self._last = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.

@@ -120,9 +120,7 @@ class MicroCoupling(PressedSurface):
 
     def contact_solver(self, model: MicroModel) -> ContactSolver:
         """Return what solves the contact problem of a model of the surface."""
-        return ContactSolver(
-            model, self.patches, self.mean_heights, self.comm, self.friction_model
-        )
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm, self.friction_model)
 
     @property
     def friction_model(self) -> FrictionModel | None:

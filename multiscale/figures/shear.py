@@ -1,4 +1,4 @@
-"""The shear of a contact: which cells stick and slip, their tractions, the loop of force and shift."""
+"""The shear of a contact: cells that stick and slip, tractions, the loop of force and shift."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from multiscale.figures.maps import coarsened, colour_bar, map_axes
 from multiscale.figures.style import BLUE, NO_CONTACT, PRESSURES, VERMILLION, panels, styled
-from multiscale.readable import percent, quantity, usual_unit
+from multiscale.readable import percent, usual_unit
 
 _STICK, _SLIP = 1.0, 2.0
 """Values of cells that stick and slip in their map; open ones are masked."""
@@ -26,10 +25,13 @@ def shear_figure(history: Any, record: Any) -> Figure:
         record: A `multiscale.results.contact_record.ContactRecord` with tractions.
     """
     title = f"load step {record.step}: shear of the contact"
-    figure, (cells, tractions, loop) = panels(1, 3, 2.7, bars=[1], title=title)
+    figure, (cells, tractions, loop, lost) = panels(2, 2, 5.4, bars=[1], title=title)
     _draw_cells(cells, record)
     _draw_tractions(tractions, record)
     _draw_loop(loop, history)
+    unit, size = usual_unit(np.nan_to_num(history.dissipated_mJ).tolist(), "mJ")
+    lost.plot(history.step, history.dissipated_mJ / size, color=BLUE)
+    lost.set(xlabel="load step", ylabel=f"lost to friction [{unit}]", title="energy lost so far")
     return figure
 
 
@@ -39,9 +41,7 @@ def _draw_cells(axes: Any, record: Any) -> None:
     look = {"cmap": ListedColormap([BLUE, VERMILLION]), "norm": Normalize(_STICK, _SLIP)}
     _draw_map(axes, record, np.ma.masked_equal(values, 0.0), look)
     slip = np.count_nonzero(slipping) / max(1, np.count_nonzero(closed))
-    axes.set_title(f"{percent(slip, 3)} of the contact slips")
-    keys = [Patch(color=BLUE, label="stick"), Patch(color=VERMILLION, label="slip")]
-    axes.legend(handles=keys, loc="upper right", frameon=True, framealpha=0.8)
+    axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in red")
 
 
 def _draw_tractions(axes: Any, record: Any) -> None:
@@ -69,7 +69,9 @@ def _draw_loop(axes: Any, history: Any) -> None:
     """Draw the force over the shift, both along the direction of the largest shift."""
     steps = [step for step in history.steps if step.shear_x_mm is not None]
     shift = np.array([(0.0, 0.0), *((step.shear_x_mm, step.shear_y_mm) for step in steps)])
-    force = np.array([(0.0, 0.0), *((step.shear_force_x_N, step.shear_force_y_N) for step in steps)])
+    force = np.array(
+        [(0.0, 0.0), *((step.shear_force_x_N, step.shear_force_y_N) for step in steps)]
+    )
     farthest = shift[np.argmax(np.hypot(*shift.T))]
     size = float(np.hypot(*farthest))
     along = farthest / size if size else np.array([1.0, 0.0])
@@ -77,5 +79,4 @@ def _draw_loop(axes: Any, history: Any) -> None:
     names = [usual_unit(values.tolist(), unit) for values, unit in ((x, "mm"), (y, "N"))]
     axes.plot(x / names[0][1], y / names[1][1], color=BLUE, marker="o", ms=2.5)
     axes.set(xlabel=f"shift [{names[0][0]}]", ylabel=f"shear force [{names[1][0]}]")
-    lost = steps[-1].dissipated_mJ if steps else 0.0
-    axes.set_title(f"{quantity(lost or 0.0, 'mJ', 3)} lost to friction")
+    axes.set_title("shear force along the largest shift")

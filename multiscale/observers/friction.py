@@ -14,10 +14,12 @@ from micro.friction.goodman import NeglectedCoupling
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
-from multiscale.readable import number, quantity
+from multiscale.readable import Caution, number, percent, quantity
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""
+_MUCH = 0.1
+"""Neglected share of the shear force from which on a run warns of it."""
 
 
 class FrictionObserver(StepObserver):
@@ -56,16 +58,20 @@ class FrictionObserver(StepObserver):
     def _coupling_notes(self) -> Iterator[str]:
         if self._neglected is None:
             return
-        beta, sideways, across = self._neglected
-        if beta == 0.0:
+        found = self._neglected
+        if found.beta == 0.0:
             yield "friction: two like bodies, whose pressures and tractions do not see each other"
             return
-        yield (
-            f"friction after Goodman: of two unlike bodies (Dundurs' β = {number(beta, 3)}) it "
-            "leaves out that pressures shift the surface sideways, here by up to "
-            f"{quantity(sideways, 'mm', 2)} against the mean of the contact, and that tractions "
-            f"lift it, by up to {quantity(across, 'mm', 2)}"
+        change = found.force_change / found.force if found.force else 0.0
+        text = (
+            "friction after Goodman: of two unlike bodies (Dundurs' β = "
+            f"{number(found.beta, 3)}) it leaves out that pressures pull the surface sideways, by "
+            f"up to {quantity(found.sideways, 'mm', 2)} against the mean of the contact, and that "
+            f"tractions lift it, by up to {quantity(found.across, 'mm', 2)}. Pulled sideways "
+            f"first, a first loading to the last shift has a shear force of "
+            f"{quantity(found.force, 'N', 3)} that differs by {percent(change, 2)}"
         )
+        yield Caution(text) if change > _MUCH else text
 
     def _body_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what the shift leaves out of the body below the contact."""

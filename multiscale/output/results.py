@@ -30,7 +30,9 @@ from support.collective import on_root, shared
 from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face")
+_FIGURES = (
+    "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
+)  # fmt: skip
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",

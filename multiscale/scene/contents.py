@@ -271,16 +271,21 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
         yield "friction", problem, "micro.model = 'half-space'"
     if not loading.shear_points:
         yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
-    if scene.friction is not None and loading.shear_force and loading.force:
-        limits = loading.force if loading.shear_path == "along" else [loading.force[-1]] * len(
-            loading.shear_force
-        )
-        for pair, normal in zip(loading.shear_force, limits, strict=True):
-            most = scene.friction.coefficient * normal
-            if hypot(*pair) >= most:
-                yield (
-                    "load.shear_force",
-                    f"slides: the shear force of {hypot(*pair):.6g} N is not less than the "
-                    f"{most:.6g} N that friction transmits",
-                    f"< {most:.6g} N, or load.shear",
-                )
+    yield from _sliding(scene)
+
+
+def _sliding(scene: SceneSections) -> Iterator[Problem]:
+    """Yield shear forces that friction does not transmit under the prescribed forces."""
+    loading, friction = scene.loading, scene.friction
+    if friction is None or loading.shear_force is None or loading.force is None:
+        return
+    along = loading.shear_path == "along"
+    forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
+    for pair, force in zip(loading.shear_force, forces, strict=True):
+        most = friction.coefficient * force
+        if hypot(*pair) >= most:
+            yield (
+                "load.shear_force",
+                f"slides: friction transmits less than {most:.6g} N under {force:.6g} N",
+                f"pairs shorter than {most:.6g} N; or load.shear",
+            )
