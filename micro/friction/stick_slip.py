@@ -22,9 +22,12 @@ from support.arrays import Array
 from support.errors import NotConverged
 
 _MOST_STEPS, _MOST_ITERATIONS, _MOST_HALVINGS = 200, 100, 12
-_DECREASE = 0.7
+_ADDED = 0.5
+"""Weight of the compliance that slip adds, against that of a cell, in the preconditioner. With 0.25
+to 0.5 it takes two thirds of the products that it takes with 1 (512² cells, ν = 0.3)."""
+_DECREASE = 0.9
 """Residual after a step, relative to that before, above which the gradient takes over. Steps that
-come closer halve it."""
+come closer halve it; with 0.7 half of them do without need on periodic surfaces."""
 _GRADIENT_STEPS = 8
 """Steps along the gradient in a row."""
 _MOST_MOTIONS, _ROUNDING = 20, 1e-14
@@ -48,7 +51,8 @@ class FreeTractions:
 
     def __init__(self, problem: TractionProblem, normal: Array, stiffness: Array) -> None:
         self._problem, self._normal, self._added = problem, normal, stiffness
-        self._weight = 1.0 / np.sqrt(1.0 + stiffness / problem.grid.self_compliance)
+        ratio = stiffness / problem.grid.self_compliance
+        self._weight = 1.0 / np.sqrt(1.0 + _ADDED * ratio)
 
     def free_part(self, vectors: Array) -> Array:
         """Return the part of vectors along which tractions are free, shape (2, n)."""

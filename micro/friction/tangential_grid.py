@@ -127,9 +127,8 @@ class TangentialConvolution:
         Returns:
             ``fields``, holding the result on the same rows.
         """
-        (mx, my), count = self.padded, len(rows)
-        waves, half = self._spectra.shape[2], self.padded[0] // 2 + 1
-        work = self._work[: 2 * count * waves].reshape(2, count, waves)
+        (mx, my), count, half = self.padded, len(rows), self.padded[0] // 2 + 1
+        work, waves = self._rows(count), self._spectra.shape[2]
         dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
         loaded = slice(rows[0], rows[-1] + 1) if dense else rows
 
@@ -140,16 +139,15 @@ class TangentialConvolution:
             columns = np.zeros((2, mx, here.stop - here.start), work.dtype)
             columns[:, loaded] = work[:, :, here]
             columns = fft.fft(columns, axis=1, overwrite_x=True)
-            part = self._spectra[:, :, here]
-            _multiply(columns[:, :half], *part)
-            xx, yy, xy = part[:, mx - half : 0 : -1]
-            _multiply(columns[:, half:], xx, yy, -xy)
+            part, beyond = self._spectra[:, :, here], slice(mx - half, 0, -1)
+            _multiply(columns[:, :half], *part, np.add)
+            _multiply(columns[:, half:], *part[:, beyond], np.subtract)
             work[:, :, here] = fft.ifft(columns, axis=1, overwrite_x=True)[:, loaded]
 
         def back_along_rows(here: slice) -> None:
             fields[:, here] = fft.irfft(work[:, here], n=my, axis=2)[:, :, : self.grid[1]]
 
-        size = 2 * work.itemsize
+        size = 4 * work.itemsize
         in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
         in_threads(along_columns, blocks(waves, max(BLOCK // mx, 128) // size))
         in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
@@ -158,18 +156,37 @@ class TangentialConvolution:
     def on_cells(self, cells: Cells, values: Array) -> Array:
         """Convolve values on some cells, shape (2, n); return those of the same cells."""
         scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
-        fields = np.zeros((2, len(cells.rows), self.grid[1]), self._spectra.dtype)
-        fields[:, cells.row, cells.column] = values / scale
+        # the fields take the place of their own transforms, whose rows are at least as long
+        memory = self._rows(len(cells.rows)).view(self._spectra.dtype)
+        place = cells.row * memory.shape[2] + cells.column
+        fields, flat = memory[:, :, : self.grid[1]], memory.reshape(2, -1)
+        fields[:] = 0.0
+        flat[0, place], flat[1, place] = values / scale
         self(fields, cells.rows)
-        return fields[:, cells.row, cells.column].astype(np.float64) * scale
+        return np.stack([flat[0, place], flat[1, place]]).astype(np.float64) * scale
+
+    def _rows(self, count: int) -> Field:
+        """Return the memory of transformed rows, shape (2, count, my // 2 + 1)."""
+        waves = self._spectra.shape[2]
+        return self._work[: 2 * count * waves].reshape(2, count, waves)
 
 
-def _multiply(columns: Field, xx: Field, yy: Field, xy: Field) -> None:
-    """Multiply two fields' waves by a symmetric matrix, in place."""
-    along_x = xx * columns[0] + xy * columns[1]
-    columns[1] *= yy
-    columns[1] += xy * columns[0]
-    columns[0] = along_x
+def _multiply(columns: Field, xx: Field, yy: Field, xy: Field, combine: np.ufunc) -> None:
+    """Multiply two fields' waves by a symmetric matrix, in place.
+
+    Args:
+        columns: The waves, shape (2, m, c).
+        xx: Elements of the matrix on its diagonal, shape (m, c).
+        yy: The others on its diagonal, shape (m, c).
+        xy: Those beside it, shape (m, c).
+        combine: `numpy.add`, or `numpy.subtract` where those have the other sign.
+    """
+    x, y = columns
+    of_x, of_y = x * xy, y * xy
+    x *= xx
+    combine(x, of_y, out=x)
+    y *= yy
+    combine(y, of_x, out=y)
 
 
 class TangentialGrid:
