@@ -57,7 +57,9 @@ class TractionProblem:
     @property
     def slides(self) -> bool:
         """Whether friction does not transmit the prescribed force without sliding."""
-        return self.force is not None and float(np.hypot(*self.force)) >= self.bound.sum()
+        if self.force is None or not self.force.any():
+            return False
+        return float(np.hypot(*self.force)) >= self.bound.sum()
 
     def within_bounds(self, tractions: Array) -> Array:
         """Return the tractions nearest to given ones within the bounds, shape (2, n)."""
