@@ -52,6 +52,7 @@ class ContactSolver(StepSolver):
         self._turns = False
         self._shear: ShearState | None = None
         self._last: Control | None = None  # without its shear
+        self._stiffness: tuple[Array | None, Stiffness] | None = None  # under which pressures
         self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
@@ -171,9 +172,16 @@ class ContactSolver(StepSolver):
 
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step."""
-        return on_root_alone(
-            self._comm, lambda: self._model.stiffness(self._solved(), turns=self._turns)
-        )
+
+        def stiffness() -> Stiffness:
+            state = self._solved()
+            if self._stiffness is None or self._stiffness[0] is not state.pressure:
+                found = self._model.stiffness(state, turns=self._turns)
+                self._stiffness = state.pressure, found
+                return found
+            return self._stiffness[1]._replace(iterations=0)  # shear alone has changed
+
+        return on_root_alone(self._comm, stiffness)
 
     def interface_stiffness(self, step: LoadStep, areas: Array) -> float:
         """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].

@@ -50,6 +50,10 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=half-space", "micro.hardness='300 MPa'",
         "load.approach=['8 um', '4 um']", "conductance.conductivity=['50 W/m/K']",
     ],
+    "concurrent, sheared there and back": [
+        "coupling.kind=concurrent", "micro.model=half-space", "friction.coefficient=0.3",
+        "load.shear=[['1 um', '0 um'], ['-1 um', '0.5 um']]", "load.shear_steps=2",
+    ],
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],
@@ -78,6 +82,10 @@ NUMBERS = (
     "approach_error_mm",
     "peak_pressure_MPa",
     "stiffness_N_per_mm",
+    "shear_force_x_N",
+    "shear_force_y_N",
+    "tangential_stiffness_N_per_mm",
+    "dissipated_mJ",
 )
 
 
@@ -113,6 +121,7 @@ LONG = {
     "cells for an accuracy",
     "cube, patchwise",  # as the wide block
     "concurrent, asperities",
+    "concurrent, sheared there and back",
     "condensed, up and down",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",

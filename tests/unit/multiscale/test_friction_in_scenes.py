@@ -67,9 +67,9 @@ def test_the_plane_presses_then_shifts_there_and_back(kind, periodic):
     slip, area = history.slip_area_fraction, history.contact_area_fraction
     assert ((slip >= 0.0) & (slip <= 1.2 * area)).all()  # the area is corrected, counts are not
     # the first way from nothing: the more cells slip, the softer
-    assert (np.diff(history.tangential_stiffness_N_per_mm[1:5]) < 0.0).all()
-    # cells that stick before any slips are 1.08 times softer than the normal contact
-    assert history.tangential_stiffness_N_per_mm[1] < history.stiffness_N_per_mm[1] * 1.02
+    stiffness = history.tangential_stiffness_N_per_mm[1:5]
+    assert (np.diff(stiffness) <= 0.0).all()
+    assert stiffness[-1] < 0.8 * stiffness[0]
 
 
 def test_the_scene_is_the_model():
@@ -227,7 +227,7 @@ def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
 
 
 def test_laws_of_samples_have_no_friction():
-    with pytest.raises(InputError, match="law.kind = 'representative', which has no tangential"):
+    with pytest.raises(InputError, match=r"law\.kind = .representative., which has no tang"):
         scene(
             load=SHEARED,
             law={"kind": "representative"},
