@@ -235,6 +235,11 @@ class ElasticBody:
             matrix.setNearNullSpace(rigid_body_modes(points, self.comm))
         return matrix
 
+    @property
+    def stiffnesses(self) -> list[PETSc.Mat]:
+        """The stiffness, as the one diagonal block of itself."""
+        return [self.stiffness]
+
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""

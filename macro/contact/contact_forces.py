@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -25,6 +26,9 @@ Array = NDArray[np.float64]
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
 
+
+_MOVED = 0.5
+"""Change of the slopes, relative to the largest, that a preconditioner does not overlook."""
 
 _MATRIX = "patchlaw matrix"
 
@@ -194,14 +198,33 @@ class ContactForces:
         self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y."""
+    def moved_from(self, slope: Array) -> bool:
+        """Return whether the slopes differ from earlier ones by half of the largest or more."""
+        both = np.abs(self.slope - slope).max(initial=0.0), self.slope.max(initial=0.0)
+        change, largest = (self.comm.allreduce(each, op=MPI.MAX) for each in both)
+        return bool(change > _MOVED * largest)
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
+        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.
+
+        Args:
+            x: A vector.
+            y: What it is added to.
+            known: A part of p'/w that is left out, as y holds its product already, shape (n,).
+        """
+        self._add_product(x, y, self.slope - known, self._border)
+
+    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product B diag(s) Bᵀ x with other slopes s, shape (n,), to y."""
+        self._add_product(x, y, slope, self._border[:, :0])
+
+    def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
         operator, samples = self._sampling.operator, self._sampling.values
         operator.multTranspose(x, samples)
         stretch = samples.array_r
-        pressure = self.slope * stretch
-        if self._border.shape[1]:
-            pressure -= self._border @ self.levers.summed(self._border.T @ stretch)
+        pressure = slope * stretch
+        if border.shape[1]:
+            pressure -= border @ self.levers.summed(border.T @ stretch)
         samples.array[:] = pressure
         operator.multAdd(samples, y, y)
 
@@ -309,10 +332,6 @@ class ContactTangent:
     """
 
     def __init__(self, contacts: Sequence[AddsProduct]) -> None:
-        self.follow(contacts)
-
-    def follow(self, contacts: Sequence[AddsProduct]) -> None:
-        """Take the derivatives of other contacts from now on."""
         self._contacts = [weakref.proxy(contact) for contact in contacts]
 
     def shell(self, matrix: PETSc.Mat) -> PETSc.Mat:

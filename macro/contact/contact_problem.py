@@ -52,9 +52,9 @@ class ContactProblem:
             PETSc's for quadratic ones, or with a factorisation of small problems. What stands
             behind ``-patchlaw_`` on the command line wins. A factorisation alone (``"ksp_type":
             "preonly"``) preconditions GMRES, as contact is no part of what is factorised.
-        in_matrix: Whether the tangents of pointwise interfaces are assembled too, so that the
-            preconditioner knows them: needed where only contact holds the body. The preconditioner
-            is made anew in every Newton step then.
+        in_matrix: Whether preconditioners know the tangents of pointwise interfaces, which takes
+            their entries into the matrix; they are made anew when these have changed much. False
+            keeps one preconditioner for a linear body, which contact alone must not hold.
 
     Attributes:
         displacement: u.
@@ -78,7 +78,7 @@ class ContactProblem:
         tangent: Any = None,
         *,
         petsc_options: Mapping[str, object] | None = None,
-        in_matrix: bool = False,
+        in_matrix: bool = True,
     ) -> None:
         self.displacement = displacement
         self.interfaces = [interfaces] if isinstance(interfaces, Interface) else list(interfaces)

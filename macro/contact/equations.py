@@ -74,6 +74,46 @@ class Equilibrium:
         self.forces.update(displacement)
 
 
+class KeptSprings:
+    """Springs of pointwise laws in a matrix that preconditioners are made of.
+
+    They follow the tangent once that has moved far from them. What the two differ by is applied, so
+    that the matrix and this are the whole derivative at any time.
+
+    Args:
+        interface: The interface of the laws.
+    """
+
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+        self._slope = np.zeros_like(interface.forces.slope)
+
+    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
+        """Let the springs in a matrix follow the tangent.
+
+        Args:
+            matrix: An assembled matrix of elasticity.
+            fresh: Whether it holds no springs, as it was assembled anew.
+
+        Note:
+            Collective.
+        """
+        if fresh:
+            self._slope = np.zeros_like(self._slope)
+        forces = self._interface.forces
+        if self._interface.mode == "pointwise" and forces.moved_from(self._slope):
+            self._interface.add_springs(forces.slope - self._slope, matrix)
+            self._slope = forces.slope.copy()
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative, less that of the springs, with x to y."""
+        self._interface.add_product(x, y, self._slope)
+
+    def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Take the product of the springs with x from y."""
+        self._interface.add_springs_product(-self._slope, x, y)
+
+
 class UserEquations:
     """F(u; v) less the work of contact, assembled.
 
@@ -83,12 +123,12 @@ class UserEquations:
         bcs: Dirichlet conditions, also set to the interfaces.
         tangent: Derivative of F as UFL; None: `ufl.derivative`.
         interfaces: The interfaces.
-        in_matrix: Whether tangents of pointwise interfaces are assembled too.
+        in_matrix: Whether the matrix keeps springs of pointwise interfaces.
 
     Attributes:
         displacement: u.
         matrix: The derivative of F, with unit rows for constrained unknowns, rigid body modes
-            attached, and the assembled tangents.
+            attached, and with springs of the interfaces.
         tangent: The whole derivative, a PETSc matrix without entries.
 
     Raises:
@@ -121,12 +161,11 @@ class UserEquations:
         space = displacement.function_space
         nodes = space.tabulate_dof_coordinates()[: space.dofmap.index_map.size_local]
         self.matrix.setNearNullSpace(rigid_body_modes(nodes, self.comm))
-        self._interfaces, self._assembling = interfaces, in_matrix
+        self._interfaces, self._keeping = interfaces, in_matrix
         for interface in interfaces:
             interface.constrain(self._bcs)
-        self._assembled = list[Interface]()
-        self._applied = ContactTangent(interfaces)
-        self.tangent = self._applied.shell(self.matrix)
+        self._springs = [KeptSprings(interface) for interface in interfaces]
+        self.tangent = ContactTangent(self._springs).shell(self.matrix)
         self._contact = self.matrix.createVecRight()
         self._inner, self._largest = self._contact.duplicate(), 0.0
 
@@ -141,10 +180,8 @@ class UserEquations:
         return compat.petsc_vector(self.displacement)
 
     def begin(self) -> None:
-        """Decide which tangents are assembled: those that can be, under their indenters now."""
+        """Forget the inner forces of earlier solves."""
         self._largest = 0.0
-        self._assembled = [each for each in self._interfaces if self._assembling and each.assembles]
-        self._applied.follow([each for each in self._interfaces if each not in self._assembled])
 
     def take(self, x: PETSc.Vec) -> None:
         """Put a vector of PETSc into the displacement."""
@@ -171,25 +208,25 @@ class UserEquations:
     def scale(self) -> float:
         """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
         self.matrix.mult(self.vector, self._inner)
+        for springs in self._springs:
+            springs.subtract(self.vector, self._inner)
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(self._contact.norm(), self._largest)
 
     def update_tangent(self, _x: PETSc.Vec) -> None:
         """Move the tangent to the displacement.
 
-        The derivative of F is assembled anew where a function or constant in it has changed, or
-        where tangents of contact were added to it.
+        The derivative of F is assembled anew where a function or constant in it has changed.
         """
         values = self._values()
-        same = all(map(np.array_equal, values, self._known))
-        if self._assembling or not self.comm.allreduce(same, min):
+        same = self.comm.allreduce(all(map(np.array_equal, values, self._known)), min)
+        if not same:
             compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
             self._known = values
-        for interface in self._interfaces:
-            if interface in self._assembled:
-                interface.add_tangent(self.displacement, self.matrix)
-            else:
-                interface.move_tangent(self.displacement)
+        for interface, springs in zip(self._interfaces, self._springs, strict=True):
+            interface.move_tangent(self.displacement)
+            if self._keeping:
+                springs.keep_in(self.matrix, fresh=not same)
 
     def reaction(self) -> Array:
         """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""

@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix, vstack
+from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from macro import compat
 from macro.contact.loaded_face import ContactFace, LoadedFace, normal_rows
 from macro.contact.sampling import Sampling
 from macro.elastic_body import ElasticBody
-from macro.linear_solvers.node_matrices import distributed
+from macro.linear_solvers.joint import joint_solver
+from macro.linear_solvers.node_matrices import Stiffened, distributed, joined
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -42,7 +43,7 @@ class BodyPair:
     """A body and the counter-body that is pressed on it.
 
     On every rank the unknowns are those of the body, then those of the counter-body. The stiffness
-    is block diagonal, and so is the preconditioner.
+    is block diagonal, and so is the preconditioner until laws between them are known.
 
     Args:
         body: The body.
@@ -86,6 +87,16 @@ class BodyPair:
         matrix.setUp()
         return matrix
 
+    @property
+    def stiffnesses(self) -> list[PETSc.Mat]:
+        """The stiffness of each, the diagonal blocks."""
+        return [self.body.stiffness, self.counter.stiffness]
+
+    @property
+    def lattice(self) -> None:
+        """No lattice goes through both."""
+        return None
+
     @cached_property
     def solver(self) -> PETSc.KSP:
         """Linear solver of both; its preconditioner also serves the contact solves."""
@@ -97,6 +108,16 @@ class BodyPair:
             solver.setFromOptions()
         solver.setUp()
         return solver
+
+    def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
+        """Return a linear solver for the stiffness, and for what joins the bodies.
+
+        Args:
+            stiffened: The stiffness with springs, which the preconditioner then knows; keep it as
+                long as the solver. None: no springs.
+        """
+        both = self.body, self.counter
+        return self.solver if stiffened is None else joint_solver(both, self.stiffness, stiffened)
 
     @cached_property
     def preload(self) -> Array | None:
@@ -186,23 +207,29 @@ class FacePair(ContactFace):
                 allowed="patches that lie on both faces, or laws at points",
             )
         one, other = self.first.patchwise, self.second.patchwise
-        return self._both(one, _local_rows(one.operator), _local_rows(other.operator), other.depth)
+        operator = joined([[one.operator], [other.operator]])
+        return replace(one, operator=operator, depth=one.depth + other.depth)
 
     @cached_property
     def pointwise(self) -> Sampling:
         """Laws at the quadrature points of the first face that lie on the second."""
         one = self.first.pointwise
-        rows, depth, kept = self._counter_rows
-        own = _local_rows(self.first.points_by_dofs)[kept]
-        both = []
-        for points_by_dofs, face in ((own, self.first), (rows[kept], self.second)):
-            unknowns = 3 * face.space.dofmap.index_map.size_local
-            matrix, transposed = distributed(points_by_dofs, unknowns, self.comm), PETSc.Mat()
-            matrix.transpose(transposed)
-            both.append(_local_rows(transposed))
+        _, depth, kept = self._counter_rows
         names = ("weight", "x", "y", "depth", "patch")
-        samples = {name: getattr(one, name)[kept] for name in names}
-        return self._both(replace(one, **samples), both[0], both[1], depth[kept])
+        own = replace(one, **{name: getattr(one, name)[kept] for name in names})
+        operator = PETSc.Mat().createTranspose(self.points_by_dofs)
+        return replace(own, operator=operator, depth=own.depth + depth[kept])
+
+    @cached_property
+    def points_by_dofs(self) -> PETSc.Mat:
+        """−w φ n of the displacements of both at every common point, (points, dofs) [mm²]."""
+        rows, _, kept = self._counter_rows
+        own = _local_rows(self.first.points_by_dofs)[kept]
+        parts = [
+            distributed(points_by_dofs, face.body.owned_dofs, self.comm)
+            for points_by_dofs, face in ((own, self.first), (rows[kept], self.second))
+        ]
+        return joined([parts])
 
     @property
     def on_both(self) -> NDArray[np.bool_]:
@@ -219,12 +246,6 @@ class FacePair(ContactFace):
         load = self.body.stiffness.createVecRight()
         load.array[:] = np.concatenate(parts)
         return load
-
-    def _both(self, one: Sampling, own: csr_matrix, other: csr_matrix, depth: Array) -> Sampling:
-        """Return samples of both faces, from the rows of both bodies in their operators."""
-        rows = vstack([own, other]).tocsr()
-        operator = distributed(rows, len(one.weight), self.comm)
-        return replace(one, operator=operator, depth=one.depth + depth)
 
     @cached_property
     def _counter_rows(self) -> tuple[csr_matrix, Array, NDArray[np.bool_]]:

@@ -233,9 +233,7 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        added = springs_at(self._points_by_free, self.forces.slope)
-        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        added.destroy()
+        self.add_springs(self.forces.slope, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
@@ -252,15 +250,37 @@ class Interface:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
         self.forces.update(self._vector(x))
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product of the derivative with a vector x to y, as a shell does."""
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
+        """Add the product of the derivative with a vector x to y, as a shell does.
+
+        Args:
+            x: A vector.
+            y: What it is added to.
+            known: Slopes p'/w of this rank's samples whose part y has already, shape (n,).
+        """
+        self._add_product(partial(self.forces.add_product, known=known), x, y)
+
+    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of springs of other slopes at this rank's samples with x to y."""
+        self._add_product(partial(self.forces.add_springs_product, slope), x, y)
+
+    def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
+        """Add springs of given slopes, shape (n,), at the points of pointwise laws to a matrix."""
+        added = springs_at(self._points_by_free, slope)
+        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
+
+    def _add_product(
+        self, add: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec
+    ) -> None:
+        """Add a product between unconstrained unknowns."""
         if self._free is None:
-            self.forces.add_product(x, y)
+            add(x, y)
             return
         product = self._load
         self._masked.pointwiseMult(x, self._free)
         product.set(0.0)
-        self.forces.add_product(self._masked, product)
+        add(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 

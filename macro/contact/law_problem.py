@@ -15,13 +15,12 @@ from petsc4py import PETSc
 
 from geometry.rigid_plane import Control
 from macro import compat
-from macro.bodies import MeshedBody
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.equations import Equilibrium
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.first_steps import FirstSteps
 from macro.contact.initial_guess import DisplacementBasis
-from macro.contact.loaded_face import ContactFace, LoadedFace, Mode
+from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.solvers import solve_linear
@@ -194,11 +193,6 @@ class LawContactProblem:
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
 
-_MOVED = 0.5
-"""Change of the stiffness, relative to the largest, after which the preconditioner is set up anew.
-"""
-
-
 class ContactPreconditioner:
     """The preconditioner of a body's tangents, with the stiffness of laws at points.
 
@@ -210,8 +204,8 @@ class ContactPreconditioner:
 
     Args:
         equilibrium: The equations.
-        face: The contact face that laws stand on at points; None for other laws. Only those on the
-            face of one meshed body enter the matrix.
+        face: The contact face that laws stand on at points; None for other laws. On a lattice,
+            whose multigrid is geometric, laws do not enter the matrix.
         solver: Linear solver of the body alone.
 
     Note:
@@ -220,32 +214,25 @@ class ContactPreconditioner:
 
     def __init__(self, equilibrium: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
         self._equilibrium, self._face, self._alone = equilibrium, face, solver
-        body = equilibrium.body
-        self._body: MeshedBody | None = None
-        if isinstance(face, LoadedFace) and isinstance(body, MeshedBody):
-            self._body = body
+        self._knows_laws = face is not None and equilibrium.body.lattice is None
         self._with_laws: PETSc.KSP | None = None
         self._stiffened: Stiffened | None = None
-        self._slope: Array | None = None
+        self._slope = np.zeros_like(equilibrium.forces.slope)
 
     def update(self) -> None:
         """Follow the tangent."""
-        body, slope = self._body, self._equilibrium.forces.slope
-        if body is None:
+        if not self._knows_laws:
             return
-        comm = self._face.comm
-        known = np.zeros_like(slope) if self._slope is None else self._slope
-        both = (np.abs(slope - known).max(initial=0.0), slope.max(initial=0.0))
-        change, largest = (comm.allreduce(each, op=MPI.MAX) for each in both)
-        if change <= _MOVED * largest:
+        body, forces = self._equilibrium.body, self._equilibrium.forces
+        if not forces.moved_from(self._slope):
             return
-        self._slope = slope.copy()
+        slope = self._slope = forces.slope.copy()
         if self._with_laws is not None:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
-        if largest:
+        if forces.comm.allreduce(slope.any(), op=MPI.LOR):
             springs = springs_at(self._face.points_by_dofs, slope)
-            self._stiffened = Stiffened(body.stiffness, springs)
+            self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
             self._with_laws = body.solver_of(self._stiffened)
         compat.collect_garbage(body.stiffness.comm)
 

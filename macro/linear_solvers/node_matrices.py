@@ -102,6 +102,23 @@ def distributed(
     return PETSc.Mat().createAIJ(size, bsize=block_size, csr=(*pattern, rows.data), comm=comm)
 
 
+def joined(blocks: Sequence[Sequence[PETSc.Mat | None]]) -> PETSc.Mat:
+    """Return a matrix of blocks, each rank's rows and columns of all of them one after another.
+
+    Args:
+        blocks: Rows of distributed matrices; None for a block of zeros.
+
+    Note:
+        Collective.
+    """
+    parts = [[part and part.convert("aij", PETSc.Mat()) for part in row] for row in blocks]
+    nest = PETSc.Mat().createNest(parts)
+    matrix = nest.convert("aij", PETSc.Mat())
+    for part in (nest, *(part for row in parts for part in row if part)):
+        part.destroy()  # PETSc keeps objects that Python drops
+    return matrix
+
+
 def for_displacements(
     weights: csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
@@ -164,11 +181,12 @@ def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:
 
 
 class Stiffened:
-    """The sum K + S of a body's stiffness and that of springs at few of its nodes.
+    """The sum K + S of the stiffness of a body, or of several, and that of springs at few nodes.
 
     Args:
-        stiffness: K, symmetric positive definite.
-        springs: S, with entries only where K has some; of type ``aij``.
+        stiffness: K, symmetric positive definite; products alone are asked of it.
+        parts: The bodies' own stiffnesses, the diagonal blocks of K.
+        springs: S, of type ``aij``; between the nodes of one body only where K has entries.
 
     Attributes:
         springs: S.
@@ -178,8 +196,10 @@ class Stiffened:
         Every method is collective.
     """
 
-    def __init__(self, stiffness: PETSc.Mat, springs: PETSc.Mat) -> None:
-        self._stiffness, self.springs = stiffness, springs
+    def __init__(
+        self, stiffness: PETSc.Mat, parts: Sequence[PETSc.Mat], springs: PETSc.Mat
+    ) -> None:
+        self._stiffness, self._parts, self.springs = stiffness, parts, springs
         self.product = shell(stiffness, self)
 
     def mult(self, _matrix: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
@@ -189,21 +209,42 @@ class Stiffened:
 
     def assembled(self) -> PETSc.Mat:
         """Return the sum with entries, which takes as much memory as K."""
-        matrix = self._stiffness.copy()
-        matrix.axpy(1.0, self.springs, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        matrix.setNearNullSpace(self._stiffness.getNearNullSpace())
-        return matrix
+        return with_springs(self._parts, self.springs)
 
     def diagonal_blocks(self) -> PETSc.Mat:
-        """Return the 3 × 3 blocks of the nodes, a matrix without others; K has type ``baij``."""
-        blocks = np.linalg.inv(np.reshape(self._stiffness.invertBlockDiagonal(), (-1, 3, 3)))
+        """Return the 3 × 3 blocks of the nodes, a matrix without others."""
+        inverses = [np.reshape(part.invertBlockDiagonal(), (-1, 3, 3)) for part in self._parts]
+        blocks = np.linalg.inv(np.concatenate(inverses))
         starts, columns, entries = self.springs.getDiagonalBlock().getValuesCSR()
         rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         own = rows // 3 == columns // 3
         rows, columns = rows[own], columns[own]
         blocks[rows // 3, rows % 3, columns % 3] += entries[own]
-        first, count = self._stiffness.getOwnershipRange()[0] // 3, len(blocks)
+        first, count = self.springs.getOwnershipRange()[0] // 3, len(blocks)
         pattern = np.arange(count + 1, dtype=PETSc.IntType), first + np.arange(count)
         csr = (pattern[0], pattern[1].astype(PETSc.IntType), blocks.ravel())
         size = (3 * count, None)
-        return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=self._stiffness.comm)
+        return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=self.springs.comm)
+
+
+def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:
+    """Return the sum of stiffnesses of bodies, as diagonal blocks, and of springs.
+
+    Args:
+        parts: The stiffnesses. The rigid body modes of a single one go along.
+        springs: Between the nodes of one body only where its stiffness has entries.
+
+    Note:
+        Collective.
+    """
+    structure = PETSc.Mat.Structure
+    if len(parts) == 1:
+        matrix = parts[0].copy()
+        matrix.axpy(1.0, springs, structure=structure.SUBSET_NONZERO_PATTERN)
+        matrix.setNearNullSpace(parts[0].getNearNullSpace())
+        return matrix
+    diagonal = [[one if i == k else None for k in range(len(parts))] for i, one in enumerate(parts)]
+    matrix = joined(diagonal)
+    matrix.setBlockSizes(3, 3)  # algebraic multigrid asks for the components of a node
+    matrix.axpy(1.0, springs, structure=structure.DIFFERENT_NONZERO_PATTERN)
+    return matrix

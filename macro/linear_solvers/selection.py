@@ -10,7 +10,7 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,
                     the supports and the jump of the moduli; with their slow modes solved for
-                    (`slow_modes`) 14 to 18 on flat tetrahedra, 19 to 21 on flat hexahedra, 26 to 31
+                    (`slow_modes`) 14 to 17 on flat tetrahedra, 16 to 18 on flat hexahedra, 26 to 31
                     on a quadratic brake pad held at the rim of its piston
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
@@ -47,7 +47,7 @@ from scipy import sparse
 
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
-from macro.linear_solvers.node_matrices import Stiffened, for_displacements
+from macro.linear_solvers.node_matrices import Stiffened, for_displacements, with_springs
 from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
 from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 
@@ -232,10 +232,8 @@ def vertex_grid(
     """
     transfer, matrix = vertex_transfer(space, linear.space, free), linear.stiffness
     if springs is not None:
-        matrix, modes = matrix.copy(), matrix.getNearNullSpace()
         there = springs.ptap(transfer)
-        matrix.axpy(1.0, there, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        matrix.setNearNullSpace(modes)
+        matrix = with_springs([matrix], there)
         there.destroy()
     return [CoarserGrid(transfer, matrix)]
 

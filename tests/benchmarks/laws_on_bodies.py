@@ -1,10 +1,15 @@
 """Newton steps and linear iterations of bodies under laws: parts, laws, controls.
 
-Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6]`, also
-under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as those
-of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
+Run by hand: `.venv/bin/python tests/benchmarks/laws_on_bodies.py [PART …] [--scale 0.6] [--slab]`,
+also under mpirun; without parts all of `body_solvers.py`. Laws grow exponentially with closure, as
+those of rough surfaces do; of roughness 16 µm (soft), 1 µm (stiff), or both on halves of the face
 (mixed). Every line is one load: in a single step, and along a path of four steps. ``K`` counts the
-iterations to 1e-8 of the body without laws.
+iterations to 1e-8 of the body without laws. With ``--slab`` an elastic slab of other cells is
+pressed on the part in place of a rigid plane.
+
+``--pad FILE`` takes the mesh of the demo `brake_pad.py` instead: four load steps up to 8 kN on
+quadratic elements, as many times as long as one linear solution of the pad to 1e-8, whose matrix
+and multigrid are there in both cases.
 """
 
 import os
@@ -13,6 +18,7 @@ os.environ["OMP_NUM_THREADS"] = "1"
 
 import argparse
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,13 +26,15 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from body_solvers import COMM, PARTS, iterations
-from helpers.machine_parts import part_body, read_part
+from body_solvers import COMM, LINING, PARTS, iterations
+from helpers.body_meshes import HIGH, LOW, box
+from helpers.machine_parts import STEEL, part_body, read_part
 
 from geometry import PatchGrid
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace
+from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
 from macro.mesh.contact_face import contact_facets
+from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face
 from support.errors import NotConverged
 
@@ -84,11 +92,65 @@ def rows(face):
             )
 
 
+def slab_on(face, plane, degree, size):
+    """Return the face of a slab of steel that hangs over a part's face."""
+    low, high = plane.frame.origin, plane.frame.origin + np.array([*plane.lengths, 10.0])
+    cells = [max(2, round(length / (1.3 * size))) for length in high - low]
+    tagged = box(low, high, cells, "tetrahedron" if face.body.hexahedral else "hexahedron", COMM)
+    body = MeshedBody(tagged, STEEL, [Support(tag=HIGH)], order=degree, normal=(0, 0, -1))
+    lower = tagged.facet_tags.find(LOW)
+    facets = contact_facets(tagged.mesh, lower, plane.frame, opposed=True)
+    return FacePair(face, LoadedFace(body, facets, face.patches))
+
+
+def press_pad(file):
+    """Print the time of the demo's load steps as a multiple of that of one linear solution."""
+    tagged = read_mesh(file, COMM)
+    names, volumes = tagged.facet_names, tagged.cell_names
+    materials = {volumes["back plate"]: STEEL, volumes["lining"]: LINING}
+    body = MeshedBody(tagged, materials, [Support(tag=names["piston"])], order=2)
+    plane = planar_face(tagged, names["pad face"])
+    facets = tagged.facet_tags.find(names["pad face"])
+    patches = PatchGrid(grid=(1, 1), lengths=plane.lengths)
+    face = LoadedFace(body, contact_facets(tagged.mesh, facets, plane.frame), patches)
+    set_up, _ = timed(lambda: body.solver)
+    one, alone = timed(lambda: iterations(body, body.solver))
+    body.solver.setTolerances(rtol=1e-10)
+    if COMM.rank == 0:
+        print(f"{body.dofs} unknowns: set-up {set_up:.1f} s, solution {one:.2f} s, {alone} its")
+    for roughness in (16.0, 4.0, 1.0):
+        problem = LawContactProblem(face, [ExponentialLaw(1e-3 * roughness)], "pointwise")
+        loads = [Control(force=2e3 * k) for k in (1, 2, 3, 4)]
+        steps, states = timed(lambda problem=problem, loads=loads: list(map(problem.solve, loads)))
+        newton = [state.iterations for state in states]
+        linear = sum(state.linear_iterations for state in states)
+        if COMM.rank == 0:
+            print(
+                f"  {roughness:4.0f} µm: {steps:6.1f} s, {steps / one:5.1f} solutions; Newton "
+                f"{newton}, linear {linear}",
+                flush=True,
+            )
+
+
+def timed(work):
+    """Return wall seconds and what work returns."""
+    COMM.Barrier()
+    began = time.perf_counter()
+    found = work()
+    COMM.Barrier()
+    return time.perf_counter() - began, found
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", nargs="*")
     parser.add_argument("--scale", type=float, default=0.6)
+    parser.add_argument("--slab", action="store_true")
+    parser.add_argument("--pad", metavar="FILE")
     choice = parser.parse_args()
+    if choice.pad:
+        press_pad(choice.pad)
+        return
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]
         tagged = read_part(replace(part, size=part.size / choice.scale), COMM)
@@ -97,9 +159,11 @@ def main():
         patches = PatchGrid(grid=(2, 1), lengths=plane.lengths)
         face = LoadedFace(body, contact_facets(tagged.mesh, facets, plane.frame), patches)
         alone = iterations(body, body.solver)
+        if choice.slab:
+            face = slab_on(face, plane, rest[0], part.size / choice.scale)
         body.solver.setTolerances(rtol=1e-10)
         if COMM.rank == 0:
-            print(f"{name}, {body.dofs} unknowns, K {alone}", flush=True)
+            print(f"{name}, {face.body.dofs} unknowns, K {alone}", flush=True)
         for row in rows(face):
             if COMM.rank == 0:
                 print(f"  {row[0]:24s} {row[1]:32s} {row[2]}", flush=True)

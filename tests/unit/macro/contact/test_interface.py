@@ -340,6 +340,68 @@ def test_law_a_hundred_thousand_times_as_stiff_as_the_body(body, in_matrix):
     assert rough.force == pytest.approx(10.0, rel=1e-9)
 
 
+@pytest.mark.parametrize("indenter", [PLANE, Control(force=500.0, tilt=None)])
+def test_laws_at_points_are_known_to_the_preconditioner(indenter):
+    mesh = box(cells=(12, 12, 8))
+    space, tags, spent, found = compat.vector_space(mesh, 1), marked(mesh), {}, {}
+    for in_matrix in (True, False):
+        u = fem.Function(space)
+        rough = Interface(space, tags, TOP, laws=PowerLaw(3e7), indenter=indenter)
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough, in_matrix=in_matrix)
+        steps = problem.solve()
+        spent[in_matrix] = problem.report.linear_iterations / steps
+        found[in_matrix] = rough.force, *rough.moment, np.linalg.norm(u.x.array)
+    assert spent[True] < min(20, 0.6 * spent[False])
+    np.testing.assert_allclose(found[True], found[False], rtol=1e-7, atol=1e-7)
+
+
+def test_springs_in_the_matrix_follow_a_material_that_changes(body):
+    """A new modulus has the matrix assembled anew: springs of before must not stay in, or out."""
+    space = body.space
+    modulus = fem.Constant(body.mesh, PETSc.ScalarType(1.0))
+
+    def forces(in_matrix):
+        modulus.value = 1.0
+        u = fem.Function(space)
+        rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e5), indenter=PLANE)
+        held = [clamped(space, body.tags)]
+        problem = ContactProblem(modulus * elastic(u), u, held, rough, in_matrix=in_matrix)
+        found = []
+        for value, plane in ((1.0, PLANE), (3.0, PLANE), (3.0, TILTED), (0.2, TILTED)):
+            modulus.value, rough.indenter = value, plane
+            assert problem.solve() < 12
+            found.append(rough.force)
+        return found
+
+    np.testing.assert_allclose(forces(in_matrix=True), forces(in_matrix=False), rtol=1e-8)
+
+
+def test_one_interface_in_two_problems(body):
+    """What one problem's matrix keeps of the laws is nothing to the other's."""
+    space, problems = body.space, []
+    rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
+    for factor in (1.0, 20.0):
+        u = fem.Function(space)
+        held = [clamped(space, body.tags)]
+        problems.append(ContactProblem(factor * elastic(u), u, held, rough))
+    steps, forces = [], []
+    for approach in (4e-3, 6e-3, 8e-3):
+        for problem in problems:
+            rough.indenter = RigidPlane(approach=approach)
+            steps.append(problem.solve())
+            forces.append(rough.force)
+    assert max(steps) < 10
+    for factor, found in zip((1.0, 20.0), (forces[0::2], forces[1::2]), strict=True):
+        u = fem.Function(space)
+        alone = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
+        held = [clamped(space, body.tags)]
+        problem = ContactProblem(factor * elastic(u), u, held, alone, in_matrix=False)
+        for approach, force in zip((4e-3, 6e-3, 8e-3), found, strict=True):
+            alone.indenter = RigidPlane(approach=approach)
+            problem.solve()
+            assert force == pytest.approx(alone.force, rel=1e-8)
+
+
 def test_problems_are_freed(body):
     space, u = body.space, fem.Function(body.space)
     rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)

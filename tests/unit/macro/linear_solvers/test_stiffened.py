@@ -23,7 +23,7 @@ def stiffened(face):
     points = face.points_by_dofs
     springs = points.transposeMatMult(points)
     springs.scale(1e6)
-    return Stiffened(face.body.stiffness, springs)
+    return Stiffened(face.body.stiffness, face.body.stiffnesses, springs)
 
 
 def test_products_are_those_of_the_sum(face, stiffened):

@@ -1,0 +1,75 @@
+"""One multigrid of two bodies and the laws between them: iterations, whatever stiffness."""
+
+import numpy as np
+import pytest
+from helpers.body_meshes import box, hanging, standing
+
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from macro import FacePair, LawContactProblem, Material
+from macro.linear_solvers.joint import joint_solver
+from macro.linear_solvers.node_matrices import Stiffened, springs_at
+
+STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
+SOFT = Material(young_modulus=5e3, poisson_ratio=0.3)
+RUBBER = Material(young_modulus=5e2, poisson_ratio=0.49)
+WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+
+
+class Spring:
+    """A law p = k c."""
+
+    def __init__(self, k):
+        self.k = k
+
+    def pressure(self, closure):
+        return self.k * closure
+
+    def stiffness(self, closure):
+        return np.full_like(closure, self.k)
+
+
+def faces(cells=("tetrahedron", "tetrahedron"), orders=(1, 1), materials=(STEEL, SOFT)):
+    below, above = (
+        box(lower, upper, count, cell)
+        for lower, upper, count, cell in (
+            ((0, 0, -1), (1, 1, 0), (9, 8, 7), cells[0]),
+            ((0, 0, 0), (1, 1, 1), (7, 9, 8), cells[1]),
+        )
+    )
+    first = standing(below, materials[0], WHOLE, orders[0])
+    return FacePair(first, hanging(above, materials[1], WHOLE, orders[1]))
+
+
+@pytest.mark.parametrize(
+    "stiffness", [1e2, 1e5, 1e7], ids=["soft", "stiff", "stiffer than elements"]
+)
+@pytest.mark.parametrize(
+    ("cells", "orders"),
+    [
+        (("tetrahedron", "hexahedron"), (1, 1)),
+        (("tetrahedron", "tetrahedron"), (2, 2)),
+        (("hexahedron", "tetrahedron"), (1, 2)),
+    ],
+)
+def test_iterations_do_not_depend_on_the_stiffness_of_the_laws(cells, orders, stiffness):
+    problem = LawContactProblem(faces(cells, orders), [Spring(stiffness)], "pointwise")
+    state = problem.solve(Control(approach=1e-3))
+    assert state.linear_iterations <= 21 * state.iterations
+
+
+def test_nearly_incompressible_bodies_are_factorised_together():
+    pair = faces(materials=(STEEL, RUBBER))
+    points = pair.points_by_dofs
+    springs = springs_at(points, np.full(points.getLocalSize()[0], 1e8))
+    stiffened = Stiffened(pair.body.stiffness, pair.body.stiffnesses, springs)
+    bodies = pair.body.body, pair.body.counter
+    solver = joint_solver(bodies, pair.body.stiffness, stiffened)
+    assert solver.method == "cholesky"
+    load, found = points.createVecRight(), points.createVecRight()
+    load.array[:] = np.random.default_rng(7).standard_normal(load.local_size)
+    solver.pc.apply(load, found)
+    residual = load.duplicate()
+    stiffened.product.mult(found, residual)
+    residual.axpy(-1.0, load)
+    assert residual.norm() < 1e-9 * load.norm()
