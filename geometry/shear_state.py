@@ -36,7 +36,10 @@ class ShearControl:
                 allowed="exactly one of them",
             )
         pair = self.shift if self.force is None else self.force
-        if np.shape(pair) != (2,) or not np.isfinite(np.asarray(pair, float)).all():
+        if (
+            np.shape(np.asarray(pair, float)) != (2,)
+            or not np.isfinite(np.asarray(pair, float)).all()
+        ):
             raise InputError("needs two finite numbers", value=pair, allowed="along x and y")
 
     def __str__(self) -> str:

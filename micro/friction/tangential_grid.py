@@ -140,8 +140,8 @@ class TangentialConvolution:
             columns[:, loaded] = work[:, :, here]
             columns = fft.fft(columns, axis=1, overwrite_x=True)
             part, beyond = self._spectra[:, :, here], slice(mx - half, 0, -1)
-            _multiply(columns[:, :half], *part, np.add)
-            _multiply(columns[:, half:], *part[:, beyond], np.subtract)
+            _multiply(columns[:, :half], part, np.add)
+            _multiply(columns[:, half:], part[:, beyond], np.subtract)
             work[:, :, here] = fft.ifft(columns, axis=1, overwrite_x=True)[:, loaded]
 
         def back_along_rows(here: slice) -> None:
@@ -171,17 +171,15 @@ class TangentialConvolution:
         return self._work[: 2 * count * waves].reshape(2, count, waves)
 
 
-def _multiply(columns: Field, xx: Field, yy: Field, xy: Field, combine: np.ufunc) -> None:
+def _multiply(columns: Field, matrix: Field, combine: np.ufunc) -> None:
     """Multiply two fields' waves by a symmetric matrix, in place.
 
     Args:
         columns: The waves, shape (2, m, c).
-        xx: Elements of the matrix on its diagonal, shape (m, c).
-        yy: The others on its diagonal, shape (m, c).
-        xy: Those beside it, shape (m, c).
-        combine: `numpy.add`, or `numpy.subtract` where those have the other sign.
+        matrix: Elements xx, yy and xy of the matrix, shape (3, m, c).
+        combine: `numpy.add`, or `numpy.subtract` where xy has the other sign.
     """
-    x, y = columns
+    (x, y), (xx, yy, xy) = columns, matrix
     of_x, of_y = x * xy, y * xy
     x *= xx
     combine(x, of_y, out=x)

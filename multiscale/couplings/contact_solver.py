@@ -112,9 +112,10 @@ class ContactSolver(StepSolver):
         """Return the derivative of the shear force along the shift at the latest load step."""
 
         def stiffness() -> Stiffness:
-            if self._friction is None or self._solved().shear is None:
+            shear = self._solved().shear
+            if self._friction is None or shear is None:
                 return Stiffness(None, 0)
-            value, used = self._friction.stiffness(self._solved().shear)
+            value, used = self._friction.stiffness(shear)
             return Stiffness(value if np.isfinite(value) else None, used)
 
         return on_root_alone(self._comm, stiffness)

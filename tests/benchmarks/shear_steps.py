@@ -1,9 +1,9 @@
 """Work of load steps in shear against normal ones, counted in transforms and processor time.
 
 ``OMP_NUM_THREADS=1 .venv/bin/python tests/benchmarks/shear_steps.py [cells]`` presses a rough
-surface of 512² cells in steps of its force, then shears it in five steps to about sliding. A product of the
-half-space is one transform forth and one back; one with tractions is two of each. The products of
-the approximate inverse come on top of both, one in every iteration.
+surface of 512² cells in steps of its force, then shears it in five steps to about sliding. A
+product of the half-space is one transform forth and one back; one with tractions is two of each.
+The products of the approximate inverse come on top of both, one in every iteration.
 """
 
 import sys
