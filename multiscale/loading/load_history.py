@@ -44,7 +44,7 @@ class LoadHistory:
         shear_force: Shear force on the plane along x and y, or a list of turning points [N].
         shear_path: Whether the plane goes through the points of the shear ``after`` the load has
             come to its end, which then stays, or ``along`` with the load: each of them is then
-            reached together with a turning point of the load.
+            reached together with one of the load's turning points.
         shear_steps: Load steps to every point of a shear that follows the load; ``steps`` when not
             given.
         shear_cycles: How often the plane goes through the points of a shear that follows the load,

@@ -197,7 +197,7 @@ SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
         ({"load": SHEARED | {"shear": [0.0, 0.0]}}, "load.shear", "repeats a point, or starts"),
         (
             {"load": SHEARED | {"shear_force": [0.1, 0.0]}},
-            "load.shear",
+            "load.shear_force",
             "is a second shear load",
         ),
         ({"load": {"force": 1.0, "shear_steps": 3}}, "load.shear_steps", "needs 'shear'"),
