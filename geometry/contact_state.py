@@ -20,9 +20,9 @@ from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
-    "shear".split()
-)
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes "
+    "shear"
+).split()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -82,11 +82,27 @@ class Start:
             shape (n,) [mm].
         plastic_depth: Plastic depth that loads so far have left in the cells, by which the heights
             are lower, shape (nx, ny) [mm]; None for the surface as it was made.
+        by_slopes: What finite slopes add to the displacements of the cells there, (nx, ny) [mm];
+            None where that is not known.
     """
 
     plane: RigidPlane
     values: Array
     plastic_depth: Array | None = None
+    by_slopes: Array | None = None
+
+    def towards(self, other: Start, share: float) -> Start:
+        """Return what a load between this and another one, or beyond, may start from.
+
+        Args:
+            other: What the other load left behind, on the surface as it was made as well.
+            share: Of the way to the other one; below 0 or above 1 it is extrapolated.
+        """
+        values = np.maximum(self.values + share * (other.values - self.values), 0.0)
+        by_slopes = None
+        if self.by_slopes is not None and other.by_slopes is not None:
+            by_slopes = self.by_slopes + share * (other.by_slopes - self.by_slopes)
+        return Start(plane=self.plane, values=values, by_slopes=by_slopes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -132,6 +148,7 @@ class ContactState:
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
         shear: Tractions and slip along the surface; None without friction.
+        by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None: nothing.
     """
 
     plane: RigidPlane
@@ -166,6 +183,7 @@ class ContactState:
     plastic_work: float = np.nan
     indentation: Array | None = None
     shear: ShearState | None = None
+    by_slopes: Array | None = None
 
     @property
     def approach(self) -> float:
@@ -222,7 +240,8 @@ class ContactState:
     def guess(self) -> Start:
         """What any other load may start from, on the surface as it was made."""
         own = self.indentation
-        return Start(plane=self.plane, values=self.pressures if own is None else own)
+        values = self.pressures if own is None else own
+        return Start(plane=self.plane, values=values, by_slopes=self.by_slopes)
 
     @property
     def start(self) -> Start:

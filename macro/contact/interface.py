@@ -22,7 +22,7 @@ from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTange
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.interface_parts import InterfaceLaws, chosen_face, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode
-from macro.contact.sampling import crown_depth
+from macro.contact.sampling import by_patch, crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
 from support.arrays import Array
@@ -310,7 +310,7 @@ class Interface:
         if not all(hasattr(law, "at") for law in self.laws):
             return None
         functions = [partial(_area_fraction, law) for law in self.laws]
-        share = together(self.comm, lambda: self.sampling.by_patch(functions, closure))
+        share = together(self.comm, lambda: by_patch(functions, self.sampling.patch, closure))
         return float(self.sampling.patch_sums(share).sum())
 
     def check_range(self) -> None:

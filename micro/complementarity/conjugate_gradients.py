@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.inverse import ContactInverse
 from support.arrays import Array
 
 
@@ -24,8 +25,8 @@ class LinearCompliance(Protocol):
         """Return the displacements by loads on the cells, shape (n,) [mm]."""
         ...
 
-    def apply_inverse(self, cells: Cells, displacement: Array, /) -> Array:
-        """Return roughly the loads that make displacements of the cells, shape (n,)."""
+    def inverse_on(self, cells: Cells, /) -> ContactInverse:
+        """Return an approximate inverse of the compliance of the cells."""
         ...
 
 
@@ -40,9 +41,11 @@ class ContactCells:
 
     def __init__(self, compliance: LinearCompliance, cells: Cells, modes: Array) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
-        # pressures by each free motion, and the inverse of their loads, by the approximate inverse
-        resistance = [compliance.apply_inverse(cells, mode) for mode in modes]
-        self.resistance = np.array(resistance).reshape(modes.shape)
+        self._inverse = compliance.inverse_on(cells)
+        # pressures by each free motion, roughly, and the inverse of their loads
+        self.resistance = modes
+        if not self._inverse.accurate:
+            self.resistance = np.array([self._inverse(mode) for mode in modes]).reshape(modes.shape)
         self.inverse = np.linalg.pinv(modes @ self.resistance.T, rcond=1e-10)
 
     def balanced(self, gap: Array) -> Array:
@@ -54,7 +57,7 @@ class ContactCells:
 
     def preconditioned(self, gap: Array) -> Array:
         """Return roughly the pressures that make these gaps, without loads on free motions."""
-        pressure = self.compliance.apply_inverse(self.cells, gap)
+        pressure = self._inverse(gap)
         if not len(self.modes):
             return pressure
         return pressure - (self.inverse @ (self.modes @ pressure)) @ self.resistance

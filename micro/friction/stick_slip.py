@@ -40,7 +40,7 @@ where the slipping cells have changed, and where they are the same as before."""
 class FreeTractions:
     """Tractions of some cells that stick, and of others that turn, as one linear problem.
 
-    It has the two products of `GridCompliance` that `ContactCells` takes.
+    It is a `LinearCompliance` that `ContactCells` takes.
 
     Args:
         problem: The traction problem.
@@ -64,7 +64,11 @@ class FreeTractions:
         moved = self._problem.grid.roughly(cells, part) + self._added * part
         return self.free_part(moved).ravel()
 
-    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
+    def inverse_on(self, cells: Cells) -> FreeInverse:
+        """Return an approximate inverse of the compliance of the cells."""
+        return FreeInverse(self, cells)
+
+    def roughly_resisted(self, cells: Cells, displacement: Array) -> Array:
         """Return roughly the free change that displaces the cells, both flat."""
         part = self.free_part(self._weight * displacement.reshape(2, -1))
         moved = self._problem.grid.inverse(cells, part)
@@ -87,6 +91,24 @@ class FreeTractions:
         contact = ContactCells(self, self._problem.cells, modes)
         left = -self.free_part(displacement).ravel()
         return contact.close(left, stop=stop, limit=limit).reshape(2, -1)
+
+
+class FreeInverse:
+    """Approximate inverse of the compliance of free tractions; a `ContactInverse`.
+
+    Args:
+        free: The free tractions.
+        cells: Their cells.
+    """
+
+    accurate = False
+
+    def __init__(self, free: FreeTractions, cells: Cells) -> None:
+        self._free, self._cells = free, cells
+
+    def __call__(self, displacement: Array) -> Array:
+        """Return roughly the free change that displaces the cells, both flat."""
+        return self._free.roughly_resisted(self._cells, displacement)
 
 
 class StickSlip:
