@@ -20,8 +20,8 @@ from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes "
-    "shear"
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
+    "by_slopes shear"
 ).split()
 
 
