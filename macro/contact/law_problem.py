@@ -6,6 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -73,12 +74,9 @@ class LawContactProblem:
             )
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
-        gap = together(face.comm, lambda: sampling.below(crown))
-        if body.preload is not None:
-            preload = body.stiffness.createVecRight()
-            preload.array[:] = body.preload
-            gap = gap + sampling.displacements(preload)
-        self.forces = ContactForces(face, sampling, laws, gap)
+        self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
+        self._preload: Array | None = None
+        self.forces = ContactForces(face, sampling, laws, self._undeformed_gap)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, body.solver
@@ -107,6 +105,9 @@ class LawContactProblem:
                 solutions stay what they were, so that a smaller step can be tried.
         """
         equilibrium = self.equilibrium
+        self._load_bodies(control.body_state)
+        if control.tilt is None and control.force:
+            control = replace(control, moment=self._face.pull_moments(control.body_state))
         self.forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
@@ -117,7 +118,7 @@ class LawContactProblem:
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
-            displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
+            displacement=solution.array_r + (0.0 if self._preload is None else self._preload),
             reaction=body.reaction(solution),
             iterations=len(residuals) + report.iterations,
             linear_iterations=started + spent + report.linear_iterations,
@@ -139,6 +140,15 @@ class LawContactProblem:
         if pressure.any():
             samples = pressure[self._sampling.patch]
             self.basis.add(self._displacement(samples)[0], samples)
+
+    def _load_bodies(self, state: float) -> None:
+        """Let the bodies take the displacements of their other loads, and the gap with them."""
+        body = self.equilibrium.body
+        self._preload = body.preload(state)
+        if self._preload is not None:
+            moved = body.stiffness.createVecRight()
+            moved.array[:] = self._preload
+            self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

@@ -31,11 +31,15 @@ from multiscale.laws.refinement import MOST_ROWS
 from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
-from multiscale.readable import Observer, number, quantity
+from multiscale.readable import Caution, Observer, number, percent, quantity
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LoadedFace
+
+
+_SEEN = 0.01
+"""Displacement that laws leave out, relative to the approach, from which a run warns of it."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -65,7 +69,7 @@ class RepresentativeCoupling(LawCoupling):
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        history, plane = load_history_on(scene, surfaces), None
+        history, plane = load_history_on(scene, surfaces, body.area), None
         check_load(scene, history, surfaces, body.area, body)
         modulus, hardness = materials.contact_modulus, scene.micro.hardness
         model = HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, hardness=hardness)
@@ -189,12 +193,11 @@ class RepresentativeCoupling(LawCoupling):
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
         tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
+        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
-        first = self.bodies.first
-        preloaded = first is not None and first.body.preload is not None
-        return pressure, None if preloaded else 1.15 * approach
+        return pressure, None if self.scene.loads_bodies else 1.15 * approach
 
     def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
         """Return the largest local pressure that laws are made for [MPa].
@@ -260,6 +263,16 @@ class RepresentativeCoupling(LawCoupling):
             yield from self.table.notes(self.table_tolerance)
         yield from super().notes(steps)
         yield from self._extensions
+        if steps and self.both_elastic:
+            step = max(steps, key=lambda one: one.force_N)
+            moved, approach = self._left_out(step.mean_pressure_MPa), abs(step.approach_mm)
+            share = f", {percent(moved / approach)} of its approach" if approach else ""
+            text = (
+                "the counter-body, a half-space, is elastic on the scale of the sample alone: "
+                f"under the whole face it would add about {quantity(moved, 'mm', 2)} at load step "
+                f"{step.step}{share}"
+            )
+            yield Caution(f"{text}; give it a mesh") if moved > _SEEN * approach else text
 
     @property
     def areas(self) -> Array:
@@ -298,13 +311,22 @@ class RepresentativeCoupling(LawCoupling):
                     f"the heights of {region.name} do not continue periodically: their sample is "
                     "four mirror images, twice as long and wide"
                 )
-        history, second = self.load_history, self.materials.second
-        if self.both_elastic and second is not None and history.quantity == "force":
-            pressure = history.largest / self.body.area
-            # mean displacement of a square of a half-space by a uniform pressure
-            moved = 0.95 * pressure * side * second.surface_compliance
+        if self.both_elastic and self.load_history.quantity == "force":
+            moved = self._left_out(self.load_history.largest / self.body.area)
             yield (
                 "the compliance of the counter-body, a half-space, counts on the scale of the "
                 f"sample alone; under the whole face it would add about {1e3 * moved:.3g} µm: give "
                 "it a mesh where that matters"
             )
+
+    def _left_out(self, pressure: float) -> float:
+        """Return the mean displacement of a half-space under a face, which laws leave out [mm].
+
+        It is that of a square of the face's area under a uniform pressure (Love 1929).
+
+        Args:
+            pressure: Mean pressure on the face [MPa].
+        """
+        second = self.materials.second
+        compliance = 0.0 if second is None else second.surface_compliance
+        return 0.946 * pressure * math.sqrt(self.body.area) * compliance

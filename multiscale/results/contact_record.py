@@ -34,6 +34,7 @@ class ContactRecord:
         step: Number of the load step.
         approach_mm: Approach of the plane [mm].
         force_N: Force of all spots [N].
+        unloading: Whether the load fell to this load step.
         lengths_mm: Sides of the surface [mm].
         spots: A row for each spot, see `SPOT_COLUMNS`: the place of its largest pressure, its real
             contact area, its force and that pressure, shape (m, 5).
@@ -63,15 +64,24 @@ class ContactRecord:
     traction_MPa: Array | None = None
     slip_mm: Array | None = None
     slipping: NDArray[np.bool_] | None = None
+    unloading: bool = False
 
     @classmethod
-    def of(cls, state: ContactState, step: LoadStep, lengths: tuple[float, float]) -> ContactRecord:
+    def of(
+        cls,
+        state: ContactState,
+        step: LoadStep,
+        lengths: tuple[float, float],
+        *,
+        unloading: bool = False,
+    ) -> ContactRecord:
         """Return the record of a load step.
 
         Args:
             state: The contact, with its spots.
             step: The load step.
             lengths: Sides of the surface [mm].
+            unloading: Whether the load fell to it.
         """
         assert state.spots is not None
         shear = state.shear
@@ -99,6 +109,7 @@ class ContactRecord:
             traction_MPa=None if shear is None else shear.traction,
             slip_mm=None if shear is None else shear.slip,
             slipping=None if shear is None else shear.slipping,
+            unloading=unloading,
         )
 
     @property
@@ -127,7 +138,7 @@ class ContactRecord:
             yield (self.step, number, *spot)
 
     def plot(self) -> Any:
-        """Draw pressures, gaps and the sizes of the spots.
+        """Draw pressures, gaps, plastic depths and the sizes of the spots.
 
         Returns:
             A matplotlib figure; a notebook shows it.
