@@ -68,6 +68,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         '`block.sides = "roller"`': {"block.sides": "roller"},
         "`block.margin`": {"block.margin": 0.5},
         "`body.tractions`": {"body.tractions": [{"surface": "side", "stress": [0.0, 0.0, 1.0]}]},
+        "`body.temperature`": {"body.temperature": 10.0, "body.thermal_expansion": 1e-5},
     },
     "Laws": {
         '`coupling.interface = "pointwise"`': {"coupling.interface": "pointwise"},
@@ -78,6 +79,12 @@ CHOICES: dict[str, dict[str, Changes]] = {
     },
     "Load": {
         "`load.force`": {"load.approach": None, "load.force": 1.0},
+        "`load.pressure`": {"load.approach": None, "load.pressure": 1.0},
+        "`[[load.stage]]`": {
+            "load.approach": None,
+            "load.stage": [{"approach": 4e-3}, {"force": 1.0}],
+        },
+        "`[friction]`, `load.shear`": {"friction.coefficient": 0.3, "load.shear": [1e-3, 0.0]},
         "`load.tilt = [tx, ty]`": {"load.tilt": [1e-3, 0.0]},
         '`load.tilt = "free"`': {"load.tilt": "free"},
         "`load.approach = [up, down]`": {"load.approach": [8e-3, 2e-3]},
@@ -91,6 +98,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         '`output.contact = "all"` (spots, maps)': {"output.contact": "all"},
         "`output.fields`": {"output.fields": True},
         "`[conductance]`": {"conductance": {"conductivity": [50.0]}},
+        "`[leak]` (through gaps of cells)": {"leak": {"viscosity": 1e-3, "pressures": [0.2, 0.1]}},
     },
 }
 """Rows: the choices by topic, each with the keys that make it; None takes a key away."""
