@@ -254,6 +254,17 @@ def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: 
     by_force, turns = load_history.quantity == "force", load_history.slopes is None
     plane = step.force_N, step.approach_mm, step.tilt
     found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
+    return with_errors(step, found, by_force=by_force)
+
+
+def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> LoadStep:
+    """Return a load step with measured errors.
+
+    Args:
+        step: The load step.
+        found: Its errors.
+        by_force: Whether the force is prescribed, and not the approach.
+    """
     force, approach = (
         each if math.isfinite(each) else None for each in (found.force, found.approach)
     )

@@ -6,14 +6,14 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.rigid_plane import Control
+from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactLaw
 from macro.contact.equations import Equilibrium
@@ -22,6 +22,7 @@ from macro.contact.first_steps import FirstSteps
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
+from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
@@ -30,8 +31,42 @@ from support.errors import InputError
 Array = NDArray[np.float64]
 
 
+_LINEAR = 1e-9
+"""Relative residual of the response to the approach."""
+
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
+
+
+class ApproachResponse(NamedTuple):
+    """First order change of a contact with the approach of the plane.
+
+    Operators of body and laws are symmetric, so that it also tells what errors of laws change: the
+    force at the approach by ∫ λ Δp dA, where laws err by pressures Δp.
+
+    Attributes:
+        stiffness: dF/dδ [N/mm].
+        closing: λ, the change of this rank's closures with the approach, shape (n,); 0 where laws
+            have no stiffness.
+        closure: The closures, shape (n,) [mm].
+        sampling: The samples.
+    """
+
+    stiffness: float
+    closing: Array
+    closure: Array
+    sampling: Sampling
+
+    def force_changes(self, pressures: Array) -> Array:
+        """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
+
+        Args:
+            pressures: Their sizes at this rank's samples, shape (n,) [MPa].
+
+        Note:
+            Collective.
+        """
+        return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
 
 
 class LawContactProblem:
@@ -73,9 +108,10 @@ class LawContactProblem:
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
         gap = together(face.comm, lambda: sampling.below(crown))
-        if body.preload is not None:
+        self._preload = body.preload
+        if self._preload is not None:
             preload = body.stiffness.createVecRight()
-            preload.array[:] = body.preload
+            preload.array[:] = self._preload
             gap = gap + sampling.displacements(preload)
         self.forces = ContactForces(face, sampling, laws, gap)
         self.equilibrium = Equilibrium(body, self.forces)
@@ -116,7 +152,7 @@ class LawContactProblem:
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
-            displacement=solution.array_r + (0.0 if body.preload is None else body.preload),
+            displacement=solution.array_r + (0.0 if self._preload is None else self._preload),
             reaction=body.reaction(solution),
             iterations=len(residuals) + report.iterations,
             linear_iterations=started + spent + report.linear_iterations,
@@ -138,6 +174,55 @@ class LawContactProblem:
         if pressure.any():
             samples = pressure[self._sampling.patch]
             self.basis.add(self._displacement(samples)[0], samples)
+
+    def start_at(self, displacement: Array, plane: RigidPlane) -> None:
+        """Take a displacement for the latest solution, such as that on other elements.
+
+        Args:
+            displacement: This rank's owned displacements, preload included, shape (n,) [mm].
+            plane: The plane there.
+
+        Note:
+            Collective.
+        """
+        start, preload = self.equilibrium.body.stiffness.createVecRight(), self._preload
+        start.array[:] = displacement - (0.0 if preload is None else preload)
+        self._plane = np.array([plane.approach, *plane.tilt])
+        self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
+        self.basis.add(start, self.forces.pressure(self.forces.closure(start)))
+
+    def approach_response(self, *, turns: bool) -> ApproachResponse:
+        """Return what the latest equilibrium changes with the approach, to first order.
+
+        Args:
+            turns: Whether the plane turns with it, so that there is no moment; or keeps its slopes.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
+        approach, *slopes = map(float, self._plane)
+        tilt = None if turns else (slopes[0], slopes[1])
+        forces.prescribe(Control(approach=approach, tilt=tilt), self._plane)
+        stiffness = forces.stiffness(self._closure)
+        forces.linearise(stiffness)
+        self._preconditioner.update()
+        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        risen = forces.pressure_change(sampling.weight)
+        sampling.values.array[:] = risen
+        sampling.operator.mult(sampling.values, load)
+        solver = self.newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
+        solve_linear(solver, load, moved)
+        sampling.operator.multTranspose(moved, sampling.values)
+        change = risen - forces.pressure_change(sampling.values.array_r.copy())
+        compat.collect_garbage(load.comm)
+        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
+        return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

@@ -20,10 +20,12 @@ from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_surface
+from multiscale.law_errors import LawErrorProbe, causes_of, scatter_notes
 from multiscale.law_solvers.embedded import ExtendedLaws
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -31,6 +33,7 @@ from multiscale.laws.refinement import MOST_ROWS
 from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
+from multiscale.measured_errors import ErrorProbe, with_errors
 from multiscale.readable import Observer, number, quantity
 from support.arrays import Array
 
@@ -128,8 +131,47 @@ class RepresentativeCoupling(LawCoupling):
         )
 
     def unmeasured(self) -> str:
-        """Return why a run does not measure the errors of its load steps."""
-        return "laws of samples have no measure of it, but for errors between rows and scatter"
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        return "output.check = 'none'" if self.scene.output.check == "none" else ""
+
+    def error_statement(self) -> str:
+        """Say how the run will know its error."""
+        if self.unmeasured():
+            return super().error_statement()
+        return self.measured_at(causes_of(self.samples))
+
+    # --- errors
+
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step with its errors measured, by further steps on the same bodies."""
+        solver, history = self.solver, self.load_history
+        assert isinstance(solver, ExtendedLaws)
+        problem, state = solver.solved
+        probe = LawErrorProbe(
+            problem=problem,
+            face=solver.face,
+            state=state,
+            problem_of=lambda face: self._problem(face, solver.table),
+            laws=solver.table.laws,
+            samples=self.samples,
+            probe_of=self._probe_of,
+            comm=self.comm,
+        )
+        found = probe.measure(turns=history.slopes is None)
+        return with_errors(step, found, by_force=history.quantity == "force")
+
+    def _probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
+        """Return what measures the errors of one sample."""
+        return ErrorProbe(
+            model=replace(self._model_of(region, sample), slopes=()),
+            on_body=on_body(None, region.materials, None),
+            order=SLOPES if self.finite_slopes else 0,
+        )
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what measured errors leave out."""
+        if any(step.errors for step in steps):
+            yield from scatter_notes(self.samples)
 
     # --- laws and load steps
 
