@@ -1,9 +1,13 @@
 """Errors of load steps under laws of samples, by cause, measured in the run.
 
-Each cause is varied while all others stay, under the plane of the load step: elements and quadrature
-of the body by solving the step again, from the known solution; the laws by what they err at the
-pressures of the step. What an error of the laws changes is known from one linear solution to first
-order: the response of the contact to the approach, which tells the error of the approach, too.
+Each cause is varied while all others stay, under the plane of the load step: elements and
+quadrature of the body by solving the step again, from the known solution; the laws by what they err
+at the pressures of the step. To first order one linear solution tells what that changes: the
+response of the contact to the approach, which tells the error of the approach, too.
+
+Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
+(docs/accuracy.md).
 
 The cells and the finite slopes of samples are judged as those of any contact problem, by
 `multiscale.measured_errors`, at the mean closure of every region. The scatter among samples gives
@@ -15,8 +19,8 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -24,10 +28,15 @@ from scipy.special import stdtrit
 
 from geometry import Control, Surface
 from multiscale.bodies.bodies import free_bodies
+from multiscale.inputs.bodies import BodyFacts
+from multiscale.inputs.memory import body_request
 from multiscale.inputs.surfaces import RegionSamples
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import LEAST_LOAD
+from multiscale.loading.load_step import LoadStep
+from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.readable import Caution
 from support.arrays import Array
 from support.collective import shared
 
@@ -37,10 +46,13 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
 """The causes, in their order."""
 MOST_CHECKED_UNKNOWNS = 400_000
-"""Unknowns of the same mesh with quadratic elements at most; linear elements beyond have no measure
-of their error."""
-OF_LINEAR, OF_QUADRATIC = 1.3, 0.3
-"""Errors of linear and of quadratic elements over the change of the force from one to the other."""
+"""Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
+is measured for a block alone, by half of its cells along every side."""
+OF_LINEAR, OF_QUADRATIC, OF_HALF = 1.3, 0.3, 1.0
+"""Errors of linear and of quadratic elements over the change of the force from one to the other,
+and of linear ones over the change from half as many cells along every side."""
+CHECKS_OF_SAMPLE = 4
+"""Contact problems that measure the errors of one sample: 3 to 6."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _LEAST_SEPARATION = 1e-3
@@ -134,37 +146,63 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        from macro.contact.other_elements import bodies_of, face_on, quadratic_dofs
+        from macro.contact.other_elements import bodies_of, face_on
 
-        force, made = self.state.force, list[Any]()
-
-        def raised(body: Any) -> Any:
-            if body.degree == 2:
-                return body
-            made.append(body.as_quadratic())
-            return made[-1]
-
-        own = bodies_of(self.face)
+        own, force = bodies_of(self.face), self.state.force
         points = self._force_on(face_on(self.face, lambda body: body, finer=True), turns)
         mesh = 0.0
         if any(body.degree == 2 for body in own):
             lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
             mesh += OF_QUADRATIC * abs(self._force_on(lowered, turns) - force)
         if any(body.degree == 1 for body in own):
-            if sum(map(quadratic_dofs, own)) > MOST_CHECKED_UNKNOWNS:
-                return math.inf, abs(points - force)
-            higher = face_on(self.face, raised, finer=True)
-            mesh += OF_LINEAR * abs(self._force_on(higher, turns) - points)
-            del higher
-            free_bodies(made)
+            mesh += self._of_linear(own, points, turns)
         return mesh, abs(points - force)
 
-    def _force_on(self, face: Any, turns: bool) -> float:
-        """Return the force under the same plane on another face of the bodies [N]."""
+    def _of_linear(self, own: Sequence[Any], points: float, turns: bool) -> float:
+        """Return the error of linear elements [N]; infinite where it is not measured.
+
+        Args:
+            own: The bodies.
+            points: Force on them with a finer quadrature [N].
+            turns: As for `measure`.
+        """
+        from macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
+
+        made = list[Any]()
+
+        def raised(body: Any) -> Any:
+            if body.degree == 1:
+                made.append(body.as_quadratic())
+            return made[-1] if body.degree == 1 else body
+
+        if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
+            other: Any = face_on(self.face, raised, finer=True)
+            error = OF_LINEAR * abs(self._force_on(other, turns) - points)
+        else:
+            other = face_on_half(self.face)
+            if other is None:
+                return math.inf
+            made.append(other.body)
+            error = OF_HALF * abs(self._force_on(other, turns, same=False) - self.state.force)
+        del other
+        free_bodies(made)
+        return error
+
+    def _force_on(self, face: Any, turns: bool, *, same: bool = True) -> float:
+        """Return the force under the same plane on another face [N].
+
+        Args:
+            face: The face.
+            turns: As for `measure`.
+            same: Whether its meshes are the same.
+        """
         from macro.contact.other_elements import start_from_elements
 
         problem, plane = self.problem_of(face), self.state.plane
-        start_from_elements(problem, face, self.state, self.face)
+        if same:
+            start_from_elements(problem, face, self.state, self.face)
+        else:
+            problem.start_from(self.state.patch_pressure)
         tilt = None if turns else plane.tilt
         return problem.solve(Control(approach=plane.approach, tilt=tilt)).force
 
@@ -213,6 +251,38 @@ def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     return [cause for cause in CAUSES if several or cause != "samples"]
 
 
+def _raised(bodies: Iterable[BodyFacts | None]) -> list[tuple[BodyFacts, int]]:
+    """Return bodies that are solved with quadratic elements, and their unknowns then."""
+    linear = [(body, 8 * body.unknowns) for body in bodies if body and body.degree == 1]
+    affordable = sum(unknowns for _, unknowns in linear) <= MOST_CHECKED_UNKNOWNS
+    return linear if affordable else []
+
+
+def check_cycles(bodies: Sequence[BodyFacts]) -> float:
+    """Return unknowns times multigrid cycles that measuring the errors of a load step takes.
+
+    Args:
+        bodies: What is known of the bodies.
+    """
+    # 40 to 90 on the mesh itself, with finer quadrature and for the response; others from nothing
+    own = 60.0 * sum(body.unknowns for body in bodies)
+    return own + 80.0 * sum(unknowns for _, unknowns in _raised(bodies))
+
+
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
+    """Yield the memory that measuring the errors of a load step takes beside that of the run.
+
+    Args:
+        bodies: What is known of the bodies, by their section of the scene.
+    """
+    raised = dict(_raised(bodies.values()))
+    for key, body in bodies.items():
+        if body in raised:
+            asked = body_request(key, f"{body.element[0]}2", raised[body], 0, in_parts=True)
+            purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
+            yield replace(asked, key="output.check", purpose=purpose)
+
+
 def interpolation_errors(law: PatchLaw, closure: Array) -> Array:
     """Return what a law may err between its rows at closures [MPa].
 
@@ -242,15 +312,22 @@ def mean_error(samples: Sequence[Surface]) -> float:
     return float(stdtrit(count - 1.0, _SHARE)) / math.sqrt(count) if count > 1.0 else 0.0
 
 
-def scatter_notes(samples: Sequence[RegionSamples]) -> Iterator[str]:
-    """Yield of which regions a single sample tells no scatter.
+def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:
+    """Yield what the measured errors of a load step leave out.
 
     Args:
         samples: Those of every region.
+        step: The load step.
     """
     alone = [region.name for region in samples if len(region.surfaces) == 1]
     if alone:
         yield (
             f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
             "others would change is not known (law.seeds gives a spectrum several)"
+        )
+    if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
+        yield Caution(
+            "the error by mesh was not measured: quadratic elements, which would tell that of "
+            f"linear ones, have more than {MOST_CHECKED_UNKNOWNS} unknowns on this mesh; take a "
+            "coarser mesh with quadratic elements, whose error linear ones tell"
         )

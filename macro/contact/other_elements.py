@@ -1,4 +1,4 @@
-"""A contact face on other elements of the same meshes, or with another quadrature.
+"""A contact face on other elements of the same meshes, with another quadrature, on fewer cells.
 
 Theory: section 11 of ``docs/theory.md``.
 """
@@ -12,11 +12,14 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from macro.bodies import Block
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.face_pair import FacePair
 from macro.contact.law_problem import LawContactProblem
-from macro.contact.loaded_face import ContactFace, LoadedFace
+from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
 from macro.elastic_body import ElasticBody
+from macro.mesh.block import block_mesh
+from macro.mesh.contact_face import top_facets
 from support.arrays import Array
 
 ChooseBody = Callable[[ElasticBody], ElasticBody]
@@ -68,6 +71,28 @@ def face_on(face: ContactFace, choose: ChooseBody, finer: bool = False) -> Conta
 def _one_on(face: LoadedFace, choose: ChooseBody, finer: bool) -> LoadedFace:
     degree = face.quadrature_degree
     return replace(face, body=choose(face.body), degree=2 * degree + 2 if finer else degree)
+
+
+def face_on_half(face: ContactFace) -> LoadedFace | None:
+    """Return the face of a block with half as many cells along every side; None where it has few.
+
+    Args:
+        face: The contact face; None comes back for bodies on meshes of their own.
+
+    Note:
+        Collective.
+    """
+    if not isinstance(face, LoadedFace) or not isinstance(face.body, Block):
+        return None
+    block, patches = face.body, face.patches
+    shape = block.mesh.shape
+    if min(shape.cells) < 4 or not isinstance(patches, Outline):
+        return None
+    x, y, z = (count // 2 for count in shape.cells)
+    mesh = block_mesh(replace(shape, cells=(x, y, z)), block.comm)
+    half = Block(mesh, block.material, block.sides)
+    coarse = LoadedFace.of_regions(half, (top_facets(mesh),), patches.lengths)
+    return replace(coarse, degree=face.quadrature_degree)
 
 
 def start_from_elements(

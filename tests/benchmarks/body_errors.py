@@ -1,10 +1,10 @@
 """Measured errors of bodies under laws against uniformly refined meshes, on bodies drawn at random.
 
-Run by hand: `.venv/bin/python tests/benchmarks/body_errors.py [--bodies 20] [--first 0]`, also under
-mpirun. Every body is pressed as a run presses it; its errors by elements and quadrature are those
-that a run would state. The force at the same approach on the same mesh refined twice, every cell
-into 64, is taken for the true one; ``rest`` is what the second refinement still changed, relative
-to the true error. All errors are relative to the force.
+Run by hand: `.venv/bin/python tests/benchmarks/body_errors.py [--bodies 20] [--first 0]`, also
+under mpirun. Every body is pressed as a run presses it; its errors by elements and quadrature are
+those that a run would state. The force at the same approach on the same mesh refined twice, every
+cell into 64, is taken for the true one; ``rest`` is what the second refinement still changed,
+relative to the true error. All errors are relative to the force.
 """
 
 import os

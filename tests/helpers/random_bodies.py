@@ -1,4 +1,4 @@
-"""Bodies under laws, drawn at random: shapes, cells, elements, laws, controls; for witnesses of errors.
+"""Bodies under laws, drawn at random: shapes, cells, elements, laws and controls.
 
 Outlines in the plane of x and z are extruded along y: a plate on two feet, a wide base with a foot
 whose end is the contact face, a pad of two materials, a wedge. A quarter of a ring stands on
@@ -110,7 +110,8 @@ def drawn(seed, *, coarser=1.0):
         if rng.random() < 0.6
         else Power(pressure / closure ** (power := float(rng.uniform(1.0, 3.0))), power)
     )
-    tilts = (0.0, 0.0), tuple(rng.uniform(-2.0, 2.0, 2) * closure / length), None
+    # held ones lift a part of some faces off the plane
+    tilts = (0.0, 0.0), tuple(rng.uniform(-2.0, 2.0, 2) * pressure / modulus), None
     hexahedra, order = bool(rng.random() < 0.5), int(rng.integers(1, 3))
     cells = float(rng.uniform(*_CELLS[f"{'Q' if hexahedra else 'P'}{order}"]))
     return RandomBody(
@@ -265,7 +266,8 @@ def _volumes(occ, body, section):
         disc = occ.intersect(
             [(2, occ.addDisk(0, 0, 0, a, a))], [(2, occ.addRectangle(0, 0, 0, a, a))]
         )[0]
-        faces, way = occ.cut(disc, [(2, occ.addDisk(0, 0, 0, inner, inner))])[0], (0, 0, 0.6 * a * body.ratios[1])
+        faces = occ.cut(disc, [(2, occ.addDisk(0, 0, 0, inner, inner))])[0]
+        way = (0.0, 0.0, 0.6 * a * body.ratios[1])
     else:
         way = (0.0, a * body.ratios[3], 0.0)
         faces = [_quadrilateral(occ, corners[i : i + 2, j : j + 2]) for i, j in np.argwhere(parts)]

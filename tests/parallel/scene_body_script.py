@@ -31,7 +31,12 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
-    yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": QUIET}
+    measured = QUIET | {"check": "last"}
+    above["element"] = "quadratic"
+    yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": measured}
+    sample["law"] = sample["law"] | {"seeds": [1, 2, 3]}
+    load["load"] = {"approach": "6 um", "steps": 1, "tilt": [1e-3, 0]}
+    yield "errors", {**sample, **load, "body": body, "output": measured}
 
 
 def main(folder):
@@ -40,7 +45,10 @@ def main(folder):
     for name, content in sections(folder):
         run = Run(Scene.from_dict(content), comm)
         list(run.load_steps())
-        found[name] = run.steps[-1].force_N, run.steps[-1].approach_mm
+        step = run.steps[-1]
+        # errors are differences of forces
+        errors = [step.force_N + error for _, error in step.errors]
+        found[name] = step.force_N, step.approach_mm, *errors
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))
