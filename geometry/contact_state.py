@@ -19,8 +19,8 @@ from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation".split()
-)
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes"
+).split()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -80,11 +80,27 @@ class Start:
             shape (n,) [mm].
         plastic_depth: Plastic depth that loads so far have left in the cells, by which the heights
             are lower, shape (nx, ny) [mm]; None for the surface as it was made.
+        by_slopes: What finite slopes add to the displacements of the cells there, (nx, ny) [mm];
+            None where that is not known.
     """
 
     plane: RigidPlane
     values: Array
     plastic_depth: Array | None = None
+    by_slopes: Array | None = None
+
+    def towards(self, other: Start, share: float) -> Start:
+        """Return what a load between this and another one, or beyond, may start from.
+
+        Args:
+            other: What the other load left behind, on the surface as it was made as well.
+            share: Of the way to the other one; below 0 or above 1 it is extrapolated.
+        """
+        values = np.maximum(self.values + share * (other.values - self.values), 0.0)
+        by_slopes = None
+        if self.by_slopes is not None and other.by_slopes is not None:
+            by_slopes = self.by_slopes + share * (other.by_slopes - self.by_slopes)
+        return Start(plane=self.plane, values=values, by_slopes=by_slopes)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -129,6 +145,7 @@ class ContactState:
         elastic_energy: Energy ½ ∫ p u dA of the elastic deformation [N mm].
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
+        by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None: nothing.
     """
 
     plane: RigidPlane
@@ -162,6 +179,7 @@ class ContactState:
     elastic_energy: float = np.nan
     plastic_work: float = np.nan
     indentation: Array | None = None
+    by_slopes: Array | None = None
 
     @property
     def approach(self) -> float:
@@ -218,7 +236,8 @@ class ContactState:
     def guess(self) -> Start:
         """What any other load may start from, on the surface as it was made."""
         own = self.indentation
-        return Start(plane=self.plane, values=self.pressures if own is None else own)
+        values = self.pressures if own is None else own
+        return Start(plane=self.plane, values=values, by_slopes=self.by_slopes)
 
     @property
     def start(self) -> Start:

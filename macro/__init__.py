@@ -7,71 +7,13 @@ TaggedMesh → write_mesh → a file that ranks read in parts.
 
 `face_compliance` is the displacement of the contact face in smooth modes; rough_block_mesh → Block
 → UnilateralContactProblem meshes the roughness itself, as a reference.
+
+A module is imported with the first use of one of its names: the compliance of a block's face that
+is in the cache takes no finite elements.
 """
 
-from geometry.materials import Material
-from macro.bodies import Block, MeshedBody
-from macro.compat import vector_space
-from macro.compliance.face_compliance import FaceCompliance, face_compliance
-from macro.contact.contact_forces import ContactLaw
-from macro.contact.contact_problem import ContactProblem
-from macro.contact.face_contact_state import FaceContactState
-from macro.contact.face_pair import FacePair
-from macro.contact.interface import Interface
-from macro.contact.law_operator import LawOperator, LawsAtPoints
-from macro.contact.law_problem import LawContactProblem
-from macro.contact.loaded_face import LoadedFace, displacements_under, patch_compliance_matrix
-from macro.contact.rough_face import RoughFace
-from macro.contact.unilateral_problem import (
-    UnilateralContactProblem,
-    nodal_contact,
-)
-from macro.elastic_body import ElasticBody
-from macro.fields import write_fields, write_rough_fields
-from macro.mesh.block import BOTTOM, SIDES, TOP, MeshQuality, block_mesh, rough_block_mesh
-from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.from_file import read_mesh
-from macro.mesh.supports import Support, Traction, check_supports
-from macro.mesh.tagged import TaggedMesh, planar_face
-from macro.mesh.xdmf import write_mesh
+import sys
 
-__all__ = [
-    "BOTTOM",
-    "SIDES",
-    "TOP",
-    "Block",
-    "ContactFacets",
-    "ContactLaw",
-    "ContactProblem",
-    "ElasticBody",
-    "FaceCompliance",
-    "FaceContactState",
-    "FacePair",
-    "Interface",
-    "LawContactProblem",
-    "LawOperator",
-    "LawsAtPoints",
-    "LoadedFace",
-    "Material",
-    "MeshQuality",
-    "MeshedBody",
-    "RoughFace",
-    "Support",
-    "TaggedMesh",
-    "Traction",
-    "UnilateralContactProblem",
-    "block_mesh",
-    "check_supports",
-    "contact_facets",
-    "displacements_under",
-    "face_compliance",
-    "nodal_contact",
-    "patch_compliance_matrix",
-    "planar_face",
-    "read_mesh",
-    "rough_block_mesh",
-    "vector_space",
-    "write_fields",
-    "write_mesh",
-    "write_rough_fields",
-]
+from support.packages import LazyPackage
+
+sys.modules[__name__].__class__ = LazyPackage

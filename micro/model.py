@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import heapq
+from collections.abc import Mapping
 from typing import NamedTuple, Protocol, Self
 
 import numpy as np
@@ -80,6 +81,13 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
+    def is_quick(self, control: Control) -> bool:
+        """Return whether a solution takes milliseconds, from one nearby, up to a load.
+
+        Args:
+            control: The load.
+        """
+
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return the interfacial stiffness, the derivative dF/dδ of the force by the approach.
 
@@ -109,16 +117,18 @@ def press_along(
     *,
     patches: PatchGrid | None = None,
     mean_heights: ArrayLike | None = None,
-    tilt: tuple[float, float] = (0.0, 0.0),
+    tilt: tuple[float, float] | None = (0.0, 0.0),
+    known: Mapping[float, Start] | None = None,
 ) -> list[ContactState]:
-    """Press to approaches, each from the solutions at the two below it, extrapolated.
+    """Press to approaches, one after the other, each from the solutions next to it.
 
     Args:
         model: The micro model.
         approaches: Rigid approaches δ in any order, shape (m,) [mm].
         patches: As for `MicroModel.press`.
         mean_heights: As for `MicroModel.press`.
-        tilt: Slopes of the plane.
+        tilt: Slopes of the plane; None lets it turn.
+        known: What other approaches may be started from, see `ContactState.guess`.
 
     Returns:
         A state for each approach, in their order.
@@ -131,28 +141,28 @@ def press_along(
     wanted = np.atleast_1d(real_array(approaches))
     if wanted.ndim != 1:
         raise InputError("the approaches are no list", value=wanted.shape, allowed="numbers in mm")
-    states: dict[int, ContactState] = {}
-    before = last = None
-    for index in map(int, np.argsort(wanted, kind="stable")):
-        state = model.press(
-            Control(approach=float(wanted[index]), tilt=tilt),
+    starts, states = dict(known or {}), {}
+    for approach in sorted(set(wanted.tolist())):
+        states[approach] = model.press(
+            Control(approach=approach, tilt=tilt),
             patches=patches,
             mean_heights=mean_heights,
-            start=_extrapolated(float(wanted[index]), last, before),
+            start=_nearby(approach, starts),
         )
-        states[index], before, last = state, last, state
-    return [states[index] for index in range(len(wanted))]
+        starts[approach] = states[approach].guess
+    return [states[approach] for approach in wanted.tolist()]
 
 
-def _extrapolated(
-    approach: float, last: ContactState | None, before: ContactState | None
-) -> Start | None:
-    """Return what to start from at an approach, by the last two solutions."""
-    if last is None or before is None or not last.approach > before.approach:
-        return None if last is None else last.guess
-    ahead = (approach - last.approach) / (last.approach - before.approach)
-    own = last.guess.values
-    return replace(last.guess, values=np.maximum(own + ahead * (own - before.guess.values), 0.0))
+def _nearby(approach: float, starts: Mapping[float, Start]) -> Start | None:
+    """Return what to start from at an approach, by the solutions on both sides or the next two."""
+    above = heapq.nsmallest(2, (each for each in starts if each > approach))
+    below = heapq.nlargest(2, (each for each in starts if each < approach))
+    if not above and not below:
+        return None
+    first, second, *_ = [*above[:1], *below[:1], *above[1:], *below[1:], *above, *below]
+    if second == first:
+        return starts[first]
+    return starts[first].towards(starts[second], (approach - first) / (second - first))
 
 
 def checked_patches(

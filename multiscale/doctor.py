@@ -262,7 +262,7 @@ def warm(elements: Sequence[str], comm: Any = None) -> tuple[Path, int]:
             allowed=", ".join(ELEMENTS),
         )  # fmt: skip
     if comm is not None:  # PETSc starts on all ranks together; one rank alone must not
-        import macro  # noqa: F401
+        import macro.bodies  # noqa: F401
 
     def compile_all() -> tuple[Path, int]:
         from macro import form_cache as jit

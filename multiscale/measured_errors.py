@@ -28,12 +28,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from geometry import Control
+from geometry.contact_state import Start
 from micro import BodyModes, ContactState, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, OnBody
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent, quantity
+from support.arrays import Array
 from support.collective import on_root_alone
 from support.errors import InputError
 
@@ -97,6 +101,7 @@ class ErrorProbe:
         approach: float,
         tilt: tuple[float, float],
         *,
+        start: Start | None = None,
         turns: bool = False,
         stiffness: bool = False,
     ) -> MeasuredErrors:
@@ -106,6 +111,7 @@ class ErrorProbe:
             force: What the run found [N].
             approach: Approach of the plane [mm].
             tilt: Its slopes.
+            start: Where the model is known to be under this plane, or nearby.
             turns: Whether the plane was free to tilt. Laws are then compared with a solution whose
                 plane is free. The other causes are measured under the plane as it is.
             stiffness: Whether the stiffness is requested.
@@ -116,10 +122,10 @@ class ErrorProbe:
         parts = {}
         if self.by_laws:
             free = Control(approach=approach, tilt=None if turns else tilt)
-            found = self.on_body(self.model, self.order).press(free)
+            found = self.on_body(self.model, self.order).press(free, start=start)
             parts["laws"] = abs(force - found.force)
-            force, tilt = found.force, found.plane.tilt
-        problems = _Problems(self, Control(approach=approach, tilt=tilt))
+            force, tilt, start = found.force, found.plane.tilt, found.guess
+        problems = _Problems(self, Control(approach=approach, tilt=tilt), start)
         parts |= problems.body_error()
         parts["slopes"] = problems.slopes_error()
         parts["grid"] = problems.grid_error(force, others=sum(parts.values()))
@@ -129,10 +135,11 @@ class ErrorProbe:
 
 
 class _Problems:
-    """Contact problems under one plane on several grids, each solved once."""
+    """Contact problems under one plane on several grids, each solved once, from those before."""
 
-    def __init__(self, probe: ErrorProbe, control: Control) -> None:
+    def __init__(self, probe: ErrorProbe, control: Control, start: Start | None) -> None:
         self._probe, self._control = probe, control
+        self._known = [] if start is None else [start]
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
         self._states: dict[tuple[tuple[int, int], int], ContactState] = {}
@@ -210,7 +217,8 @@ class _Problems:
         needed = min(nx, ny) < _FEWEST_CELLS or 8.0 * error > 0.5 * others
         if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
             return 8.0 * error
-        finer = abs(self._force((2 * nx, 2 * ny), 0) - self._force((nx, ny), 0))
+        known = self._force((nx, ny), 0)  # which the finer grid starts from
+        finer = abs(self._force((2 * nx, 2 * ny), 0) - known)
         return max(1.5 * finer, error)
 
     def stiffness(self) -> float:
@@ -225,18 +233,44 @@ class _Problems:
     def _state(self, grid: tuple[int, int], order: int) -> ContactState:
         """Return the solution on a grid with finite slopes up to an order."""
         if (grid, order) not in self._states:
-            known = [state for (cells, _), state in self._states.items() if cells == grid]
-            start = known[-1].guess if known else None
-            found = self._model(grid, order).press(self._control, start=start)
+            found = self._model(grid, order).press(self._control, start=self._start(grid))
             self._states[grid, order] = found
+            self._known.append(found.guess)
         return self._states[grid, order]
+
+    def _start(self, grid: tuple[int, int]) -> Start | None:
+        """Return a solution on a grid, or the one on most like cells; None where there is none."""
+        starts = [(known, _on_grid(known.values, grid)) for known in reversed(self._known)]
+        fit = [(abs(np.log(known.values.size / math.prod(grid))), known, values)
+               for known, values in starts if values is not None]  # fmt: skip
+        if not fit:
+            return None
+        _, known, values = min(fit, key=lambda each: each[0])
+        return replace(known, values=values)
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
         model = self._probe.model.resampled(grid)
         return replace(self._probe.on_body(model, order), tolerance=1e-6)  # forces right to 1e-5
 
 
-def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: Any) -> LoadStep:
+def _on_grid(pressures: Array, grid: tuple[int, int]) -> Array | None:
+    """Return pressures on cells that are halves, doubles or the like of others; None for others."""
+    (nx, ny), (x, y) = pressures.shape, grid
+    if nx % x == ny % y == 0:
+        return np.asarray(pressures.reshape(x, nx // x, y, ny // y).mean(axis=(1, 3)))
+    if x % nx == y % ny == 0:
+        return np.repeat(np.repeat(pressures, x // nx, axis=0), y // ny, axis=1)
+    return None
+
+
+def checked(
+    step: LoadStep,
+    probe: ErrorProbe,
+    load_history: LoadHistory,
+    comm: Any,
+    *,
+    start: Start | None = None,
+) -> LoadStep:
     """Return a load step with its errors measured; rank 0 solves for all.
 
     Args:
@@ -244,6 +278,7 @@ def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: 
         probe: Measures the errors.
         load_history: The loads.
         comm: MPI communicator; None for this process alone.
+        start: The solution of the load step on rank 0, where the run has it.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
@@ -253,7 +288,11 @@ def checked(step: LoadStep, probe: ErrorProbe, load_history: LoadHistory, comm: 
     """
     by_force, turns = load_history.quantity == "force", load_history.slopes is None
     plane = step.force_N, step.approach_mm, step.tilt
-    found = on_root_alone(comm, lambda: probe.measure(*plane, turns=turns, stiffness=by_force))
+
+    def measured() -> MeasuredErrors:
+        return probe.measure(*plane, start=start, turns=turns, stiffness=by_force)
+
+    found = on_root_alone(comm, measured)
     return with_errors(step, found, by_force=by_force)
 
 

@@ -161,6 +161,8 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
         The results, in the order of the tasks.
     """
     listed = list(tasks)
+    if len(listed) <= 1:
+        return [work(task) for task in listed]
     results: dict[int, Result] = {}
     todo = iter(range(len(listed)))
 

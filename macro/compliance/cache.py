@@ -17,10 +17,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from mpi4py.util import pkl5
 from numpy.typing import NDArray
 
 from support.checked_store import fingerprint, read_record, write_record
+from support.collective import place_in
 from support.errors import InputError, NotWritten
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -68,7 +68,7 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         kind: Name of the kind of arrays.
         key: Everything that they depend on: numbers, words, tuples and dataclasses of them.
         compute: Makes the arrays; collective. Those of rank 0 are used.
-        comm: MPI communicator.
+        comm: MPI communicator; None for this process alone.
 
     Raises:
         TypeError: When a key holds anything else, on every rank.
@@ -77,9 +77,9 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         Collective.
     """
     words = fingerprint((sources_digest(), kind, key))  # a wrong key raises on every rank
-    path = _file(kind, words) if comm.rank == 0 else None
-    large = pkl5.Intracomm(comm)  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
-    arrays: Arrays | None = large.bcast(_read(path, words) if path else None, root=0)
+    rank, _ = place_in(comm)
+    path = _file(kind, words) if rank == 0 else None
+    arrays = _of_root(comm, _read(path, words) if path else None)
     if arrays is not None:
         return arrays
     made = compute()
@@ -87,7 +87,17 @@ def cached(kind: str, key: tuple[object, ...], compute: Callable[[], Arrays], co
         with suppress(OSError, NotWritten):
             _write(path, words, made)
             _clear(path.parent)
-    return large.bcast(made, root=0)
+    return _of_root(comm, made)  # type: ignore[return-value]
+
+
+def _of_root(comm: Any, arrays: Arrays | None) -> Arrays | None:
+    """Return the arrays of rank 0."""
+    if comm is None:
+        return arrays
+    from mpi4py.util import pkl5  # for arrays of more than 2³¹ bytes, as 128 × 128 patches have
+
+    found: Arrays | None = pkl5.Intracomm(comm).bcast(arrays, root=0)
+    return found
 
 
 @cache

@@ -14,21 +14,21 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property, reduce
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from petsc4py import PETSc
 from scipy.sparse import bmat, csr_matrix, kron
 
 from geometry.materials import Material
-from macro.bodies import Sides
 from macro.compliance.cache import cached
 from macro.compliance.elements import Line, block_lines
-from macro.linear_solvers.solvers import solved_at_once
 from support.arrays import Array
 from support.collective import shared
 from support.errors import InputError
+
+if TYPE_CHECKING:
+    from macro.bodies import Sides
 
 Parity = tuple[int, int]
 """Parity of a pressure along x and along y: 0 even, 1 odd."""
@@ -189,6 +189,10 @@ class ParityBlock:
 
 def _solution(stiffness: csr_matrix, right: Array) -> Array:
     """Solve for many right-hand sides."""
+    from petsc4py import PETSc  # a compliance that is in the cache takes none
+
+    from macro.linear_solvers.solvers import solved_at_once
+
     pattern = (part.astype(PETSc.IntType) for part in (stiffness.indptr, stiffness.indices))
     csr = (*pattern, stiffness.data)
     matrix = PETSc.Mat().createAIJ(stiffness.shape, csr=csr, comm=PETSc.COMM_SELF)
@@ -257,7 +261,7 @@ def face_compliance(
         material: Elastic constants.
         sides: Support of the block's sides.
         count: Modes K along a side of the top.
-        comm: MPI communicator.
+        comm: MPI communicator; None for this process alone.
         use_cache: Whether to read the result from the cache on disk, or to write it there.
 
     Returns:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from mpi4py import MPI
@@ -18,10 +18,11 @@ from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibr
 from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.loaded_face import ContactFace
-from macro.contact.sampling import Sampling
+from macro.contact.sampling import Sampling, by_patch
 from support.collective import together
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
@@ -51,6 +52,46 @@ class ContactLaw(Protocol):
         ...
 
 
+@runtime_checkable
+class ContactLaws(Protocol):
+    """The laws of all patches, evaluated together: as quick for many patches as for one."""
+
+    def __len__(self) -> int:
+        """Return the number of patches."""
+        ...
+
+    def pressures(self, patch: Indices, closure: Array, /) -> Array:
+        """Return the pressures at closures of patches, shape (n,) [MPa]; see `ContactLaw`."""
+        ...
+
+    def stiffnesses(self, patch: Indices, closure: Array, /) -> Array:
+        """Return the exact derivatives of the pressures, shape (n,) [MPa/mm]."""
+        ...
+
+
+class SingleLaws:
+    """The laws of patches, evaluated one by one, and checked: they may be a user's functions.
+
+    Args:
+        laws: One law per patch.
+    """
+
+    def __init__(self, laws: Sequence[ContactLaw]) -> None:
+        self._pressures = [law.pressure for law in laws]
+        self._stiffnesses = [law.stiffness for law in laws]
+
+    def __len__(self) -> int:
+        return len(self._pressures)
+
+    def pressures(self, patch: Indices, closure: Array) -> Array:
+        """Return the pressures at closures of patches, see `ContactLaws.pressures`."""
+        return by_patch(self._pressures, patch, closure)
+
+    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
+        """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
+        return by_patch(self._stiffnesses, patch, closure)
+
+
 class ContactForces:
     """Nodal forces B p(c(u)) of contact laws on a face that a rigid plane is pressed on.
 
@@ -68,15 +109,15 @@ class ContactForces:
     Args:
         face: The contact face with its patches.
         sampling: Where the laws are evaluated.
-        laws: One law per patch, the same on every rank.
+        laws: One law per patch, or all of them together; the same on every rank.
         gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
 
     Attributes:
+        laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
         control: What the load step prescribes of the plane.
         slope: p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵].
-        assembled: The part of it that the user's matrix holds, which `add_product` leaves out.
         comm: MPI communicator of the mesh.
 
     Note:
@@ -84,11 +125,14 @@ class ContactForces:
     """
 
     def __init__(
-        self, face: ContactFace, sampling: Sampling, laws: Sequence[ContactLaw], gap: Array
+        self,
+        face: ContactFace,
+        sampling: Sampling,
+        laws: Sequence[ContactLaw] | ContactLaws,
+        gap: Array,
     ) -> None:
         self._face, self._sampling, self.comm = face, sampling, face.comm
-        self._pressures = [law.pressure for law in laws]
-        self._stiffnesses = [law.stiffness for law in laws]
+        self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
         patches = face.patches
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
@@ -98,7 +142,6 @@ class ContactForces:
         self.control = Control(approach=0.0)
         self._unloaded = False
         self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
-        self.assembled: Array = np.zeros_like(self.slope)
         self._border: Array = np.zeros((len(sampling.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
@@ -206,13 +249,19 @@ class ContactForces:
         change, largest = (self.comm.allreduce(each, op=MPI.MAX) for each in both)
         return bool(change > _MOVED * largest)
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y, less the part that is assembled."""
-        self._add_product(x, y, self.slope - self.assembled, self._border)
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
+        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.
 
-    def subtract_assembled(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Take the product of the part that is assembled with x from y."""
-        self._add_product(x, y, -self.assembled, self._border[:, :0])
+        Args:
+            x: A vector.
+            y: What it is added to.
+            known: A part of p'/w that is left out, as y holds its product already, shape (n,).
+        """
+        self._add_product(x, y, self.slope - known, self._border)
+
+    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product B diag(s) Bᵀ x with other slopes s, shape (n,), to y."""
+        self._add_product(x, y, slope, self._border[:, :0])
 
     def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
         operator, samples = self._sampling.operator, self._sampling.values
@@ -239,13 +288,13 @@ class ContactForces:
 
         What a law raises on one rank is raised on all.
         """
-        return together(self.comm, lambda: self._sampling.by_patch(self._pressures, closure))
+        return together(self.comm, lambda: self.laws.pressures(self._sampling.patch, closure))
 
     def stiffness(self, closure: Array) -> Array:
         """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
         if self._unloaded:
             return np.zeros_like(closure)
-        return together(self.comm, lambda: self._sampling.by_patch(self._stiffnesses, closure))
+        return together(self.comm, lambda: self.laws.stiffnesses(self._sampling.patch, closure))
 
     def loads(self, pressure: Array) -> Array:
         """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].

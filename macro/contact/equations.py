@@ -74,6 +74,46 @@ class Equilibrium:
         self.forces.update(displacement)
 
 
+class KeptSprings:
+    """Springs of pointwise laws in a matrix that preconditioners are made of.
+
+    They follow the tangent once that has moved far from them. What the two differ by is applied, so
+    that the matrix and this are the whole derivative at any time.
+
+    Args:
+        interface: The interface of the laws.
+    """
+
+    def __init__(self, interface: Interface) -> None:
+        self._interface = interface
+        self._slope = np.zeros_like(interface.forces.slope)
+
+    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
+        """Let the springs in a matrix follow the tangent.
+
+        Args:
+            matrix: An assembled matrix of elasticity.
+            fresh: Whether it holds no springs, as it was assembled anew.
+
+        Note:
+            Collective.
+        """
+        if fresh:
+            self._slope = np.zeros_like(self._slope)
+        forces = self._interface.forces
+        if self._interface.mode == "pointwise" and forces.moved_from(self._slope):
+            self._interface.add_springs(forces.slope - self._slope, matrix)
+            self._slope = forces.slope.copy()
+
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of the derivative, less that of the springs, with x to y."""
+        self._interface.add_product(x, y, self._slope)
+
+    def subtract(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Take the product of the springs with x from y."""
+        self._interface.add_springs_product(-self._slope, x, y)
+
+
 class UserEquations:
     """F(u; v) less the work of contact, assembled.
 
@@ -124,8 +164,8 @@ class UserEquations:
         self._interfaces, self._keeping = interfaces, in_matrix
         for interface in interfaces:
             interface.constrain(self._bcs)
-            interface.keep_in(self.matrix, fresh=True)
-        self.tangent = ContactTangent(interfaces).shell(self.matrix)
+        self._springs = [KeptSprings(interface) for interface in interfaces]
+        self.tangent = ContactTangent(self._springs).shell(self.matrix)
         self._contact = self.matrix.createVecRight()
         self._inner, self._largest = self._contact.duplicate(), 0.0
 
@@ -168,8 +208,8 @@ class UserEquations:
     def scale(self) -> float:
         """Norm of the contact forces, or a share of that of the largest inner forces [N]."""
         self.matrix.mult(self.vector, self._inner)
-        for interface in self._interfaces:
-            interface.subtract_kept(self.vector, self._inner)
+        for springs in self._springs:
+            springs.subtract(self.vector, self._inner)
         self._largest = max(self._largest, _INNER * self._inner.norm())
         return max(self._contact.norm(), self._largest)
 
@@ -183,10 +223,10 @@ class UserEquations:
         if not same:
             compat.assemble_matrix_into(self.matrix, self._slope, self._bcs)
             self._known = values
-        for interface in self._interfaces:
+        for interface, springs in zip(self._interfaces, self._springs, strict=True):
             interface.move_tangent(self.displacement)
             if self._keeping:
-                interface.keep_in(self.matrix, fresh=not same)
+                springs.keep_in(self.matrix, fresh=not same)
 
     def reaction(self) -> Array:
         """Return the sum of F less contact over the constrained unknowns, shape (3,) [N]."""

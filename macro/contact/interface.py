@@ -22,7 +22,7 @@ from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTange
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.interface_parts import InterfaceLaws, chosen_face, laws_on_face
 from macro.contact.loaded_face import LoadedFace, Mode
-from macro.contact.sampling import crown_depth
+from macro.contact.sampling import by_patch, crown_depth
 from macro.linear_solvers.node_matrices import free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
 from support.arrays import Array
@@ -233,7 +233,7 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        self._add_springs(self.forces.slope, matrix)
+        self.add_springs(self.forces.slope, matrix)
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
@@ -250,30 +250,25 @@ class Interface:
         """Move the derivative to displacements, a Function or a vector of PETSc [mm]."""
         self.forces.update(self._vector(x))
 
-    def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
-        """Keep the springs of pointwise laws in a matrix that preconditioners are made of.
-
-        They follow the tangent once they differ much from it. What they differ by is left to
-        `add_product`, so that matrix and product together are the derivative at any time.
+    def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
+        """Add the product of the derivative with a vector x to y, as a shell does.
 
         Args:
-            matrix: An assembled matrix of elasticity.
-            fresh: Whether the matrix holds none of them, as it was assembled anew.
+            x: A vector.
+            y: What it is added to.
+            known: Slopes p'/w of this rank's samples whose part y has already, shape (n,).
         """
-        forces = self.forces
-        if fresh:
-            forces.assembled = np.zeros_like(forces.slope)
-        if self.mode == "pointwise" and forces.moved_from(forces.assembled):
-            self._add_springs(forces.slope - forces.assembled, matrix)
-            forces.assembled = forces.slope.copy()
+        self._add_product(partial(self.forces.add_product, known=known), x, y)
 
-    def add_product(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product of the derivative with a vector x to y, as a shell does."""
-        self._add_product(self.forces.add_product, x, y)
+    def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        """Add the product of springs of other slopes at this rank's samples with x to y."""
+        self._add_product(partial(self.forces.add_springs_product, slope), x, y)
 
-    def subtract_kept(self, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Take the product of the springs that a matrix keeps with a vector x from y."""
-        self._add_product(self.forces.subtract_assembled, x, y)
+    def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
+        """Add springs of given slopes, shape (n,), at the points of pointwise laws to a matrix."""
+        added = springs_at(self._points_by_free, slope)
+        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
 
     def _add_product(
         self, add: Callable[[PETSc.Vec, PETSc.Vec], None], x: PETSc.Vec, y: PETSc.Vec
@@ -288,11 +283,6 @@ class Interface:
         add(self._masked, product)
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
-
-    def _add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
-        added = springs_at(self._points_by_free, slope)
-        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        added.destroy()
 
     def evaluate(self, x: Any) -> FaceContactState:
         """Evaluate the contact at displacements; the properties then give its parts.
@@ -320,7 +310,7 @@ class Interface:
         if not all(hasattr(law, "at") for law in self.laws):
             return None
         functions = [partial(_area_fraction, law) for law in self.laws]
-        share = together(self.comm, lambda: self.sampling.by_patch(functions, closure))
+        share = together(self.comm, lambda: by_patch(functions, self.sampling.patch, closure))
         return float(self.sampling.patch_sums(share).sum())
 
     def check_range(self) -> None:

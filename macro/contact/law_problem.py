@@ -15,7 +15,7 @@ from petsc4py import PETSc
 
 from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
-from macro.contact.contact_forces import ContactForces, ContactLaw
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
 from macro.contact.equations import Equilibrium
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.first_steps import FirstSteps
@@ -29,6 +29,7 @@ from support.collective import together
 from support.errors import InputError
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 _LINEAR = 1e-9
@@ -80,7 +81,7 @@ class LawContactProblem:
 
     Args:
         face: Patches on the contact face of an elastic body.
-        laws: One law per patch, in flat order, the same on every rank.
+        laws: One law per patch, in flat order, or all of them together; the same on every rank.
         mode: ``"patchwise"``: the closure averaged over a patch gives one pressure for it;
             ``"pointwise"``: the law holds at every quadrature point.
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
@@ -96,7 +97,7 @@ class LawContactProblem:
     def __init__(
         self,
         face: ContactFace,
-        laws: Sequence[ContactLaw],
+        laws: Sequence[ContactLaw] | ContactLaws,
         mode: Mode = "patchwise",
         *,
         crown: Callable[[Array, Array], Array] | None = None,
@@ -242,30 +243,31 @@ class LawContactProblem:
         displacement = load.duplicate()
         return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
-    def patch_means(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
-        """Average functions of closure over the patches, at the latest equilibrium.
+    def patch_means(self, function: Callable[[Indices, Array], Array]) -> Array:
+        """Average a function of closure over the patches, at the latest equilibrium.
 
         Args:
-            functions: One function of closures (n,) [mm] per patch.
+            function: Takes patch indices and closures of samples, shape (n,) [mm], and returns a
+                value for each.
 
         Returns:
             The means over the samples of each patch, shape (N,).
 
         Raises:
-            Exception: What a function raises on one rank, on every rank.
+            Exception: What the function raises on one rank, on every rank.
 
         Note:
             Collective.
         """
         sampling = self._sampling
-        values = together(self._face.comm, lambda: sampling.by_patch(functions, self._closure))
+        values = together(self._face.comm, lambda: function(sampling.patch, self._closure))
         return sampling.patch_sums(values) / self._face.areas
 
-    def patch_largest(self, functions: Sequence[Callable[[Array], Array]]) -> Array:
-        """Return the largest values of functions of closure on the patches, as `patch_means` does.
+    def patch_largest(self, function: Callable[[Indices, Array], Array]) -> Array:
+        """Return the largest values of a function of closure on the patches, see `patch_means`.
 
         Args:
-            functions: One function of closures (n,) [mm] per patch; not below zero.
+            function: The function; not below zero.
 
         Returns:
             The largest values at the samples of each patch, shape (N,).
@@ -274,7 +276,7 @@ class LawContactProblem:
             Collective.
         """
         sampling, largest = self._sampling, np.zeros(self._sampling.count)
-        np.maximum.at(largest, sampling.patch, sampling.by_patch(functions, self._closure))
+        np.maximum.at(largest, sampling.patch, function(sampling.patch, self._closure))
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
 
 

@@ -76,22 +76,26 @@ class Sampling:
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)
         return self.operator.comm.tompi4py().allreduce(local)
 
-    def by_patch(self, functions: Sequence[Callable[[Array], Array]], closure: Array) -> Array:
-        """Return functions of closure, one per patch, at this rank's samples, shape (n,).
 
-        Args:
-            functions: One function per patch.
-            closure: Closures of the samples, shape (n,) [mm].
+def by_patch(
+    functions: Sequence[Callable[[Array], Array]], patch: NDArray[np.intp], closure: Array
+) -> Array:
+    """Return functions of closure, one per patch, at samples, shape (n,).
 
-        Raises:
-            InputError: When a function's values are no numbers, or not one for every closure.
-        """
-        values = np.empty_like(closure)
-        ends = np.searchsorted(self.patch, np.arange(self.count + 1))
-        for i in np.unique(self.patch):
-            part = slice(ends[i], ends[i + 1])
-            values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
-        return values
+    Args:
+        functions: One function per patch.
+        patch: Flat patch index of the samples, ascending, shape (n,).
+        closure: Closures of the samples, shape (n,) [mm].
+
+    Raises:
+        InputError: When a function's values are no numbers, or not one for every closure.
+    """
+    values = np.empty_like(closure)
+    ends = np.searchsorted(patch, np.arange(len(functions) + 1))
+    for i in np.unique(patch):
+        part = slice(ends[i], ends[i + 1])
+        values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
+    return values
 
 
 def crown_depth(crown: Any, x: Array, y: Array) -> Array:

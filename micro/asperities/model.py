@@ -106,6 +106,10 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
+    def is_quick(self, control: Control) -> bool:
+        """Return that a solution may take long; see `MicroModel.is_quick`."""
+        return False
+
     def press(
         self,
         control: Control,

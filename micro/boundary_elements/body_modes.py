@@ -202,6 +202,18 @@ class ModesOnCells:
         amplitudes = amplitudes.reshape(*self.matrix.shape[:-2], *moments.shape)
         return np.asarray(self.means_x.T @ amplitudes @ self.means_y)
 
+    def between(self, row: Indices, column: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, shape (n, n) [mm].
+
+        Args:
+            row: Their rows.
+            column: Their columns.
+        """
+        modes = self.means_x[:, None, row] * self.means_y[:, column]
+        modes = modes.reshape(len(self.matrix), -1)
+        loads = modes * (self.widths_x[row] * self.widths_y[column])
+        return np.asarray(modes.T @ (self.matrix @ loads))
+
     def among(self, rows: Indices, columns: Indices) -> ModesOnCells:
         """Return the cells where some rows and columns of the grid cross.
 

@@ -18,9 +18,11 @@ from typing import Any, Protocol, Self
 import numpy as np
 
 from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
+from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid, many
+from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.side_cells import side_cells
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
@@ -30,12 +32,16 @@ Grid = tuple[int, ...]
 Pair = tuple[float, float]
 """Lengths along x and y [mm]."""
 
+_ROUNDING = 4e-16
+
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
 # those of few cells, of 2 MB, for other surfaces too
 _half_space = cached_where_small(
     lambda grid, spacing, *, periodic: grid[0] * grid[1] <= 2**14, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
+_MOST_BYTES = 1e8
+"""Size of the matrices of few cells that are cached [B]."""
 
 
 class ComplianceTerm(Protocol):
@@ -43,6 +49,10 @@ class ComplianceTerm(Protocol):
 
     def displacement(self, pressure: Array, /) -> Array:
         """Return the displacements by pressures / E* on all these cells, shape (r, c) [mm]."""
+        ...
+
+    def between(self, row: Indices, column: Indices, /) -> Array:
+        """Return the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
         ...
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
@@ -101,14 +111,26 @@ class GridCompliance:
                 moved += term.displacement(some).ravel()[place]
         return moved
 
-    def apply_inverse(self, cells: Cells, displacement: Array) -> Array:
-        """Return very roughly the pressures / E* on some cells that displace them, shape (n,).
+    def inverse_on(self, cells: Cells) -> ContactInverse:
+        """Return an approximate inverse of the compliance of some cells.
 
         Args:
             cells: The cells.
-            displacement: Their displacements, shape (n,) [mm].
         """
-        return self._half_space.inverse.on_cells(cells, displacement)
+        return contact_inverse(self._half_space, cells)
+
+    def matrix(self, flat: Indices, columns: int) -> ComplianceMatrix:
+        """Return the compliance of some cells alone as a matrix.
+
+        Args:
+            flat: Their flat indices, shape (n,).
+            columns: Number of columns of the grid.
+        """
+        row, column = np.divmod(flat, columns)
+        total = self._half_space.between(row, column)
+        for term in self._terms:
+            total += term.between(row, column)
+        return ComplianceMatrix(total)
 
     def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
@@ -144,7 +166,7 @@ class Compliance:
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "_last"}
+        caches = {"half_space", "_terms_on", "body_on", "_matrices", "_last"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -156,11 +178,31 @@ class Compliance:
             grid: Numbers of cells (nx, ny).
             spacing: Sides of a cell [mm].
             corner: Corner of the first cell on the surface [mm].
-            coarse: Whether these are no cells of the surface but coarser ones, where free sides are
-                left out.
+            coarse: Whether these are no cells of the surface but coarser ones. Free sides are left
+                out where these are few, which solutions start from quickly, or do not fill the
+                surface.
         """
         terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
         return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+
+    def matrix_on(self, cells: Indices, grid: Grid, spacing: Pair) -> ComplianceMatrix:
+        """Return the compliance of few cells of the surface as a matrix; the last few are cached.
+
+        Args:
+            cells: Their flat indices, ascending, shape (n,).
+            grid: Numbers of cells of the surface.
+            spacing: Sides of a cell [mm].
+        """
+        key = cells.tobytes()
+        found = self._matrices.pop(key, None) or self.on_grid(grid, spacing).matrix(cells, grid[1])
+        self._matrices[key] = found
+        while sum(one.nbytes for one in self._matrices.values()) > _MOST_BYTES:
+            del self._matrices[next(iter(self._matrices))]
+        return found
+
+    @cached_property
+    def _matrices(self) -> dict[bytes, ComplianceMatrix]:
+        return {}
 
     @cached_property
     def _terms_on(self) -> Callable[[tuple[int, int], Pair, Pair, bool], list[ComplianceTerm]]:
@@ -171,24 +213,23 @@ class Compliance:
         self, grid: tuple[int, int], spacing: Pair, corner: Pair, coarse: bool
     ) -> list[ComplianceTerm]:
         terms: list[ComplianceTerm] = []
-        if self.sides is not None and not coarse:
+        if self.sides is not None and (not coarse or many(grid)):
             rows, columns = (
                 round(start / step) + np.arange(n)
                 for start, step, n in zip(corner, spacing, grid, strict=True)
             )
-            terms.append(side_cells(self.sides, spacing).among(rows, columns))
+            if not coarse or _fill(self.sides.lengths, spacing, (rows[-1], columns[-1])):
+                terms.append(side_cells(self.sides, spacing).among(rows, columns))
         if self.body is not None:
-            terms.append(self.body_on(grid, spacing, corner))
+            terms.append(self.body_on((grid[0], grid[1]), spacing, corner))
         return terms
 
-    def body_on(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
-        """Return what the finite body, which must be given, adds on cells.
+    @cached_property
+    def body_on(self) -> Callable[..., ModesOnCells]:
+        """Function from cells to what the finite body adds on them, cached; see `on_grid`."""
+        return lru_cache(maxsize=_MOST_GRIDS)(self._make_body)
 
-        Args:
-            grid: Numbers of cells (nx, ny).
-            spacing: Sides of a cell [mm].
-            corner: Corner of the first cell on the surface [mm].
-        """
+    def _make_body(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
         assert self.body is not None
         x, y = (
             start + step * np.arange(n + 1)
@@ -209,7 +250,9 @@ class Compliance:
         Args:
             pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
         """
-        if self._last is None or not np.array_equal(self._last[0], pressure):
+        # times E* and over it pressures may change by rounding
+        same = self._last is not None and np.allclose(self._last[0], pressure, _ROUNDING, 0.0)
+        if self._last is None or not same:
             self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
 
@@ -230,3 +273,10 @@ class Compliance:
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""
         return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))
+
+
+def _fill(lengths: Pair, spacing: Pair, last: tuple[int, int]) -> bool:
+    """Return whether cells fill a rectangle, of which one by its indices is to be part."""
+    counts = np.divide(lengths, spacing)
+    whole = np.round(counts)
+    return bool(np.allclose(counts, whole, rtol=1e-9) and np.all(np.less(last, whole)))

@@ -41,7 +41,7 @@ from functools import cache
 
 import numpy as np
 from scipy.interpolate import RectBivariateSpline, make_interp_spline
-from scipy.special import kn
+from scipy.special import k0, k1
 
 from support.arrays import Array
 
@@ -101,12 +101,15 @@ def _stress_splines(nu: float) -> list[RectBivariateSpline]:
 
 
 def _values(splines: list[RectBivariateSpline], distances: Array) -> Array:
-    """Return functions at all pairs of distances, (functions, n, n); zero beyond their tables."""
+    """Return functions at pairs of ascending distances, (functions, n, n); 0 beyond tables."""
     first, *_, last = splines[0].get_knots()[0]
     logs = np.log(distances)
-    places = np.clip(logs, first, last)
-    values = np.stack([spline(places, places) for spline in splines])
-    return np.where((logs < last)[:, None] & (logs < last), values, 0.0)
+    within = int(np.searchsorted(logs, last))
+    places = np.maximum(logs[:within], first)
+    values = np.zeros((len(splines), len(logs), len(logs)))
+    for value, spline in zip(values, splines, strict=True):
+        value[:within, :within] = spline(places, places) if within else 0.0
+    return values
 
 
 def _logs(smallest: float) -> Array:
@@ -136,9 +139,9 @@ def _side_compliance(logs: Array, nu: float) -> Array:
     _, more = _reflections(logs, nu)
     apart = np.abs(np.subtract.outer(x, x))
     np.fill_diagonal(apart, 1.0)
-    near = kn(0, apart)
+    near = k0(apart)
     np.fill_diagonal(near, -np.log(_STEP * x / (4.0 * np.pi)) - np.euler_gamma)
-    image = kn(0, np.add.outer(x, x))
+    image = k0(np.add.outer(x, x))
     total = 2.0 / np.pi * (image + ((near + image) * weights) @ more)
     return np.asarray(0.5 * (total + total.T))
 
@@ -178,7 +181,7 @@ def side_traction(logs: Array, poisson_ratio: float) -> Array:
     """
     x = np.exp(logs)
     z, rho = x[:, None], np.hypot(x[:, None], x)
-    direct = z * x**2 * kn(2, rho) / rho**2
+    direct = z * x**2 * _k2(rho) / rho**2
     return np.asarray(2.0 / np.pi * (direct - (1.0 - 2.0 * poisson_ratio) * _depth_integral(logs)))
 
 
@@ -191,7 +194,7 @@ def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
     """
     x = np.exp(logs)[:, None]
     rho = np.hypot(x, x.T)
-    k_0, k_1, k_2 = (kn(order, rho) for order in range(3))
+    k_0, k_1, k_2 = (function(rho) for function in (k0, k1, _k2))
     below = (1.0 - 2.0 * poisson_ratio) * _depth_integral(logs)
     xx = -(x**3) * k_2 / rho**2
     yy = x * k_0 - 2.0 * poisson_ratio * x * k_1 / rho - below
@@ -201,5 +204,10 @@ def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
 def _depth_integral(logs: Array) -> Array:
     """Return ∫_z^∞ K₀(√(x² + s²)) ds at depths z and distances x of exp(logs), shape (n, n)."""
     x = np.exp(logs)
-    below = make_interp_spline(logs, kn(0, np.hypot.outer(x, x)) * x[:, None]).antiderivative()
+    below = make_interp_spline(logs, k0(np.hypot.outer(x, x)) * x[:, None]).antiderivative()
     return np.asarray(below(logs[-1]) - below(logs))
+
+
+def _k2(x: Array) -> Array:
+    """Return K₂(x), by K₀ and K₁."""
+    return np.asarray(k0(x) + 2.0 / x * k1(x))

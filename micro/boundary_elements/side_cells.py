@@ -26,6 +26,8 @@ from support.cores import in_threads
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
+_LINES = 2**20
+"""Numbers that the waves between rows of cells hold at most at a time."""
 _SWAPPED = [1, 0, 2]
 """Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
 _SHEAR = np.array([-1j, 1j])
@@ -61,13 +63,7 @@ class _SidePair:
         """
         length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
         step, period = length / rows, 2 * cells
-        # with 1/16 the mean stress over the cell in a corner of constant pressure errs by 8 % of
-        # the largest one, with 1/256 by 0.4 %
-        nodes = distance_nodes(step / (256.0 if stress else 16.0), length)
-        lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
-        low, high = (float(there) for there in sides.pair(axis))
-        both = csr_array(hstack([low * lower, high * lower[::-1]]))
-        means = both.toarray() if rows <= 128 else both  # full matrices are quicker
+        nodes = _nodes(length, rows, stress=stress)
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):
@@ -79,7 +75,14 @@ class _SidePair:
             else:
                 kernel = sides.compliance(axis, nodes, np.abs(waves))
             parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
+        means = _means(sides, axis, rows, nodes)
         return cls(means, _transposed(means), np.sum(parts, axis=0), np.arange(cells))
+
+    def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
+        """Return the sides across y of a square from those across x: waves do the same there."""
+        rows = len(self.place)
+        means = _means(sides, 1, rows, _nodes(sides.lengths[1], rows, stress=stress))
+        return _SidePair(means, _transposed(means), self.kernels, self.place)
 
     def among(self, rows: Indices, cells: Indices) -> _SidePair:
         """Return the same sides with some of these rows, and some of the cells of each."""
@@ -104,6 +107,22 @@ class _SidePair:
         means = self.means @ lines.reshape(self.means.shape[1], -1)
         return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
 
+    def between(self, row: Indices, cell: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
+        used, row = np.unique(row, return_inverse=True)
+        means = np.asarray(_full(self.means)[used])
+        low, high = np.split(means, 2, axis=1)
+        matrix = np.empty((len(row), len(row)))
+        step = max(1, _LINES // (len(used) * len(self.kernels)))
+        for first in range(0, len(used), step):  # some rows at a time, for the memory
+            here = slice(first, first + step)
+            waves = sum(one[here] @ self.kernels @ one.T for one in (low, high))
+            lines = fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)
+            some = np.flatnonzero((row >= first) & (row < first + step))
+            apart = np.abs(cell[some][:, None] - cell)
+            matrix[some] = lines[apart, row[some][:, None] - first, row]
+        return matrix
+
     def displacement(self, pressure: Array) -> Array:
         """Return displacements of the cells by pressures on them, shape (rows, cells)."""
         return self.on_cells(_multiplied(self.kernels, self.loaded(pressure[None])), 1)[0]
@@ -119,6 +138,27 @@ class _SidePair:
         waves = self.loaded(fields)
         waves[:, -(waves.shape[1] // 3) :] *= _SHEAR.conj()
         return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves), 1)[0]
+
+
+def _nodes(length: float, rows: int, *, stress: bool) -> Array:
+    """Return distances from a side at which stresses or displacements are known [mm]."""
+    # with 1/16 the mean stress over the cell in a corner of constant pressure errs by 8 % of the
+    # largest one, with 1/256 by 0.4 %
+    return distance_nodes(length / rows / (256.0 if stress else 16.0), length)
+
+
+def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> Means:
+    """Return means over rows of cells of values at the nodes of both sides, (rows, 2 a)."""
+    length = sides.lengths[axis]
+    lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
+    low, high = (float(there) for there in sides.pair(axis))
+    both = csr_array(hstack([low * lower, high * lower[::-1]]))
+    return both.toarray() if rows <= 128 else both  # full matrices are quicker
+
+
+def _full(means: Means) -> Array:
+    """Return a full or sparse matrix as a full one."""
+    return means.toarray() if isinstance(means, csr_array) else means
 
 
 def _transposed(means: Means) -> Means:
@@ -146,8 +186,10 @@ def _pairs(
 ) -> tuple[_SidePair, _SidePair]:
     """Return the sides across x and those across y, around cells that fill the rectangle."""
     nx, ny = (round(length / step) for length, step in zip(sides.lengths, spacing, strict=True))
-    across_x, across_y = (_SidePair.of(sides, axis, (nx, ny), stress=stress) for axis in (0, 1))
-    return across_x, across_y
+    across_x = _SidePair.of(sides, 0, (nx, ny), stress=stress)
+    if nx == ny and sides.lengths[0] == sides.lengths[1]:
+        return across_x, across_x.turned(sides, stress=stress)
+    return across_x, _SidePair.of(sides, 1, (nx, ny), stress=stress)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -170,6 +212,10 @@ class SideCells:
             pressure.size,
         )
         return np.asarray(one + other.T)
+
+    def between(self, row: Indices, column: Indices) -> Array:
+        """Return the displacements of n cells by unit pressures on them, (n, n) [mm]."""
+        return self.across_x.between(row, column) + self.across_y.between(column, row)
 
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""

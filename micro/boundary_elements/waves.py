@@ -87,7 +87,7 @@ class Waves:
         Returns:
             Shape (cx, cy).
         """
-        (cx, cy), everywhere = self.coarse, cores()
+        (cx, cy), everywhere = self.coarse, self._threads
         rows = fft.dct(field, axis=1, norm="ortho", workers=everywhere)[:, :cy]
         cosines = fft.dct(rows, axis=0, norm="ortho", workers=everywhere)[:cx]
         return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
@@ -97,10 +97,15 @@ class Waves:
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
-        (nx, ny), everywhere = self.grid, cores()
+        (nx, ny), everywhere = self.grid, self._threads
         cosines = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
         columns = fft.idct(cosines, n=nx, axis=0, norm="ortho", workers=everywhere)
         return np.asarray(fft.idct(columns, n=ny, axis=1, norm="ortho", workers=everywhere))
+
+    @property
+    def _threads(self) -> int:
+        """Threads of a transform that gains by them."""
+        return cores() if self.grid[0] * self.grid[1] > 2**16 else 1
 
     def continued(self, field: Array) -> Array:
         """Return a field on the coarse cells as it is continued around them, shape (sx, sy)."""

@@ -27,6 +27,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import Compliance, GridCompliance
 from micro.complementarity.rigid_motions import Box, Motions, coarsened
 from support.arrays import Array, Flags, Indices
@@ -40,12 +41,15 @@ class ContactPressures(NamedTuple):
         motion: Free motions of the body, counted from where the interference was, (k,) [mm].
         residual: Largest violation of the contact conditions over the largest interference.
         iterations: Products of the compliance with pressures.
+        by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None where that
+            is not known.
     """
 
     pressure: Array
     motion: Array = np.zeros(0)
     residual: float = 0.0
     iterations: int = 0
+    by_slopes: Array | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,9 +65,12 @@ class CellProblem:
         tolerance: Largest residual of a solution.
         hardness: Largest pressure H / E*; infinite where contacts are elastic. Pressures of a
             solution that are at the bound equal it exactly.
+        lowered: What finite slopes have taken off the interference [mm].
         corner: Corner of the first cell on the surface [mm].
-        coarse: Whether these are no cells of the surface but coarser ones, where free sides are
+        coarse: Whether these are no cells of the surface but coarser ones, where free sides may be
             left out.
+        matrix: Compliance of the cells where they are few, here and there on the surface; they are
+            a column then.
     """
 
     compliance: Compliance
@@ -72,14 +79,23 @@ class CellProblem:
     motions: Motions
     tolerance: float
     hardness: float = np.inf
+    lowered: Array | float = 0.0
     corner: tuple[float, float] = (0.0, 0.0)
     coarse: bool = False
+    matrix: ComplianceMatrix | None = None
 
     @cached_property
-    def grid(self) -> GridCompliance:
+    def grid(self) -> GridCompliance | ComplianceMatrix:
         """Compliance of these cells, without finite slopes."""
+        if self.matrix is not None:
+            return self.matrix
         shape = self.interference.shape
         return self.compliance.on_grid(shape, self.spacing, self.corner, coarse=self.coarse)
+
+    @property
+    def undeformed(self) -> Array:
+        """Interference without finite slopes, shape (nx, ny) [mm]."""
+        return np.asarray(self.interference + self.lowered)
 
     @property
     def unloaded(self) -> bool:
@@ -99,6 +115,19 @@ class CellProblem:
         x, y = (part.start * step for part, step in zip(box, self.spacing, strict=True))
         interference = np.ascontiguousarray(self.interference[box])
         return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
+
+    def among(self, cells: Indices) -> CellProblem:
+        """Return the problem of a few of these cells, those of a surface, which carry all loads.
+
+        Args:
+            cells: Their flat indices, ascending, shape (n,).
+        """
+        return replace(
+            self,
+            interference=self.interference.ravel()[cells][:, None],
+            motions=self.motions.among(cells),
+            matrix=self.compliance.matrix_on(cells, self.interference.shape, self.spacing),
+        )
 
     def coarsened(self, factors: Sequence[int], tolerance: float) -> CellProblem:
         """Return the problem on coarse cells, with a tolerance of its own.

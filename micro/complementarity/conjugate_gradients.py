@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import GridCompliance
 from micro.boundary_elements.half_space_grid import Cells
 from support.arrays import Array
@@ -25,11 +26,15 @@ class ContactCells:
         modes: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
     """
 
-    def __init__(self, compliance: GridCompliance, cells: Cells, modes: Array) -> None:
+    def __init__(
+        self, compliance: GridCompliance | ComplianceMatrix, cells: Cells, modes: Array
+    ) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
-        # pressures by each free motion, and the inverse of their loads, by the approximate inverse
-        resistance = [compliance.apply_inverse(cells, mode) for mode in modes]
-        self.resistance = np.array(resistance).reshape(modes.shape)
+        self._inverse = compliance.inverse_on(cells)
+        # pressures by each free motion, roughly, and the inverse of their loads
+        self.resistance = modes
+        if not self._inverse.accurate:
+            self.resistance = np.array([self._inverse(mode) for mode in modes]).reshape(modes.shape)
         self.inverse = np.linalg.pinv(modes @ self.resistance.T, rcond=1e-10)
 
     def balanced(self, gap: Array) -> Array:
@@ -41,7 +46,7 @@ class ContactCells:
 
     def preconditioned(self, gap: Array) -> Array:
         """Return roughly the pressures that make these gaps, without loads on free motions."""
-        pressure = self.compliance.apply_inverse(self.cells, gap)
+        pressure = self._inverse(gap)
         if not len(self.modes):
             return pressure
         return pressure - (self.inverse @ (self.modes @ pressure)) @ self.resistance

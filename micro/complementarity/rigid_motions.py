@@ -100,11 +100,13 @@ class Motions:
             pressure: Pressures, by which cells are weighted, shape (nx, ny).
             gap: Gaps, shape (nx, ny) [mm].
         """
+        if not self.turns:  # the approach, whose mode is 1
+            return np.array([np.vdot(pressure, gap) / pressure.sum()])
         cells = np.flatnonzero(pressure)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
         modes, left = self.modes_of(cells), gap.ravel()[cells]
         motion = np.zeros(self.count)
-        for _ in range(2 if self.turns else 1):  # again for what rounding leaves of light cells
+        for _ in range(2):  # again for what rounding leaves of light cells
             change = np.linalg.lstsq((modes * root).T, left * root, rcond=1e-10)[0]
             motion, left = motion + change, left - change @ modes
         return motion
@@ -112,6 +114,10 @@ class Motions:
     def on(self, box: Box) -> Motions:
         """Return the motions on a part of the cells, which carries all loads."""
         return replace(self, along_x=self.along_x[:, box[0]], along_y=self.along_y[:, box[1]])
+
+    def among(self, cells: Indices) -> Motions:
+        """Return the motions on a column of some cells, which carry all loads."""
+        return replace(self, along_x=self.modes_of(cells), along_y=np.ones((self.count, 1)))
 
     def coarsened(self, factors: Sequence[int]) -> Motions:
         """Return the motions on blocks of cells; see `coarsened`."""
@@ -157,6 +163,30 @@ class Motions:
         scaled = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
         scaled.ravel()[cells] = values
         return scaled
+
+    def shifted_to_load(self, wanted: Array, hardness: float, acting: float) -> Array | None:
+        """Return the pressures nearest to given ones, between 0 and H, that meet the only load.
+
+        They are p_i = min(max(p_i⁰ + μ, 0), H), and their sum is linear in μ between the values
+        of it at which a cell meets a bound.
+
+        Args:
+            wanted: Pressures / E* of some cells, of either sign, shape (n,).
+            hardness: Largest pressure / E*, finite.
+            acting: Sum of the pressures of all other cells.
+
+        Returns:
+            The pressures; None where motions turn or these cells cannot meet the load.
+        """
+        load = float(self.loads[0]) - acting
+        if self.turns or not 0.0 <= load <= wanted.size * hardness:
+            return None
+        shifts = np.concatenate((-wanted, hardness - wanted))
+        order = np.argsort(shifts, kind="stable")
+        moving = np.cumsum(np.repeat((1.0, -1.0), wanted.size)[order])  # cells between the bounds
+        sums = np.append(0.0, np.cumsum(moving[:-1] * np.diff(shifts[order])))
+        shift = float(np.interp(load, sums, shifts[order]))
+        return np.clip(wanted + shift, 0.0, hardness)
 
 
 class _Scaled(NamedTuple):

@@ -14,7 +14,9 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -24,12 +26,22 @@ from micro.complementarity.rigid_motions import Box
 from support.arrays import Array, Flags
 from support.errors import NotConverged
 
+Place = Any
+"""A box of cells, or rows and columns of n cells, shape (n, 1) both: an index of fields."""
+
 _FEW_CELLS = 32
 """Cells per side on which a solution from nothing costs nothing."""
 _ROUGH = 2e-2
 """Residual on the coarse grids; their discretisation errs by more."""
 _MARGIN = 1.1
 """Factor on an estimated approach, so that the box of cells that it overlaps holds the contact."""
+_MATRIX_WORK, _MATRIX_CELLS = 2e5, 2500
+"""Cube of the number of cells that are solved by a matrix, over those of the box, and their number,
+at most. On 32² to 256² cells between free sides a solution from one nearby takes 2 to 26 ms by the
+matrix there and 5 to 53 by transforms; at ten times that work they take equally long. Before that
+the matrix is made, which takes as long as a solution from nothing."""
+_DEPTHS = 1.5
+"""Ratio of the depths below the highest cell that such cells lie within."""
 _ESTIMATE = 1e-2
 """Residual of the solution on a coarse grid that the approach is estimated from."""
 
@@ -52,7 +64,7 @@ def solve_on_surface(problem: CellProblem, start: ContactPressures | None) -> Co
         return _solve_under_force(problem, start)
     if interference.max() <= 0.0:
         return ContactPressures(np.zeros(interference.shape))
-    return _solve_growing(problem, _box(problem, 0.0), pressure)
+    return _solve_growing(problem, _place(problem, interference > 0.0), pressure)
 
 
 def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
@@ -69,60 +81,100 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
         solution = _solve_nested(problem.coarsened(factors, _ESTIMATE))
         most = _MARGIN * (float(solution.motion[0]) + top)
     while True:
-        box = _box(problem, min(top - most, np.nextafter(top, -np.inf)))
-        solution = _solve_growing(problem, box, first)
+        least = min(top - most, np.nextafter(top, -np.inf), _bearing(problem))
+        place = _place(problem, interference > least)
+        solution = _solve_growing(problem, place, first)
         approach, used = float(solution.motion[0]) + top, used + solution.iterations
-        if approach <= most or box == _whole(interference):
+        if approach <= most or _is_whole(place, interference):
             return solution._replace(iterations=used)
         first, most = solution.pressure, _MARGIN * approach
 
 
-def _box(problem: CellProblem, least: float) -> Box:
-    """Return the box that a body can touch on a half-space: the cells of more interference."""
-    interference = problem.interference
+def _bearing(problem: CellProblem) -> float:
+    """Return an interference that enough cells exceed to bear the force at their hardness [mm]."""
+    if problem.hardness == np.inf:
+        return np.inf
+    most = problem.interference.size
+    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.hardness) + 1
+    last = most - min(needed, most)
+    highest = float(np.partition(problem.interference, last, axis=None)[last])
+    return float(np.nextafter(highest, -np.inf))
+
+
+def touches_few_cells(problem: CellProblem) -> bool:
+    """Return whether a body that does not move freely is solved for on few cells by a matrix.
+
+    Args:
+        problem: The contact problem.
+    """
+    touchable = problem.interference > 0.0
+    return not touchable.any() or not isinstance(_place(problem, touchable)[0], slice)
+
+
+def _place(problem: CellProblem, touchable: Flags) -> Place:
+    """Return where to solve: the rows and columns of few cells, or a box around many.
+
+    The depths that few cells lie within come in steps: their matrix serves loads nearby, too.
+
+    Args:
+        problem: The contact problem.
+        touchable: Cells that the body can touch on a half-space, at least one.
+    """
     if problem.compliance.periodic:
-        return _whole(interference)
-    return box_around(interference > least)
+        return _whole(touchable)
+    box = box_around(touchable)
+    depth = problem.undeformed.max() - problem.undeformed
+    if deepest := float(depth[touchable].max()):
+        deepest = _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS))
+    within = touchable | (depth <= deepest)
+    count = np.count_nonzero(within)
+    if count > _MATRIX_CELLS or count**3 > _MATRIX_WORK * touchable[box].size:
+        return box
+    row, column = np.nonzero(within)
+    return row[:, None], column[:, None]
 
 
-def _solve_growing(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
-    """Solve on a box, and on a larger one while cells outside are lifted into contact."""
-    solution = _solve_on(problem, box, start)
-    while problem.compliance.body is not None and box != _whole(problem.interference):
+def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:
+    """Solve on some cells, and on more while cells outside are lifted into contact."""
+    solution = _solve_on(problem, place, start)
+    while problem.compliance.body is not None and not _is_whole(place, problem.interference):
         nearer = problem.interference + problem.motions.displacement(solution.motion)
-        larger = _lifted(problem, box, nearer, solution.pressure)
+        larger = _lifted(problem, place, nearer, solution.pressure)
         if not larger.any():
             break
-        larger[box] = True  # what touched once may touch again
-        box = box_around(larger)
-        again = _solve_on(problem, box, solution.pressure)
+        larger[place] = True  # what touched once may touch again
+        place = _place(problem, larger)
+        again = _solve_on(problem, place, solution.pressure)
         solution = again._replace(iterations=solution.iterations + again.iterations)
     return solution
 
 
-def _lifted(problem: CellProblem, box: Box, interference: Array, pressure: Array) -> Flags:
-    """Return which cells outside a box penetrate the rigid body.
+def _lifted(problem: CellProblem, place: Place, interference: Array, pressure: Array) -> Flags:
+    """Return which cells outside a place penetrate the rigid body.
 
     The half-space only lowers cells. All displacements are therefore evaluated only where those by
     the finite body alone do not clear every cell outside.
     """
     outside = np.ones(interference.shape, bool)
-    outside[box] = False
+    outside[place] = False
     body = problem.compliance.body_on(pressure.shape, problem.spacing).displacement(pressure)
     if not np.any(outside & (body < interference)):
         return np.zeros(interference.shape, bool)
     return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
 
 
-def _solve_on(problem: CellProblem, box: Box, start: Array | None) -> ContactPressures:
-    """Solve on the cells of a box, from coarser grids where there is no start."""
-    part = problem.on(box)
-    known = None if start is None else start[box].copy()  # the search overwrites it
-    solution = solve(part, nested_start(part) if known is None or not known.any() else known)
-    if box == _whole(problem.interference):
+def _solve_on(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:
+    """Solve on some cells; where there is no start and they are many, from coarser grids."""
+    shape, few = problem.interference.shape, not isinstance(place[0], slice)
+    part = problem.among(np.ravel_multi_index(place, shape).ravel()) if few else problem.on(place)
+    known = None if start is None else start[place].copy()  # the search overwrites it
+    if known is None or not known.any():
+        known = _even_pressure(part) if few else nested_start(part)
+    solution = solve(part, known)
+    if _is_whole(place, problem.interference):
         return solution
-    pressure = np.zeros(problem.interference.shape)
-    pressure[box] = solution.pressure
+    pressure = np.zeros(shape)
+    pressure[place] = solution.pressure
     return solution._replace(pressure=pressure)
 
 
@@ -148,8 +200,13 @@ def nested_start(problem: CellProblem) -> Array:
             return np.ascontiguousarray(fine)
         except NotConverged:  # a bad start only costs time
             pass
+    return _even_pressure(problem)
+
+
+def _even_pressure(problem: CellProblem) -> Array:
+    """Return uniform pressures / E* that meet the loads."""
     total = float(np.abs(problem.motions.loads).max(initial=0.0))
-    return np.full(shape, total / problem.interference.size)
+    return np.full(problem.interference.shape, total / problem.interference.size)
 
 
 def refined(field: Array, factors: Sequence[int]) -> Array:
@@ -157,9 +214,14 @@ def refined(field: Array, factors: Sequence[int]) -> Array:
     return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
 
 
-def _whole(field: Array) -> Box:
+def _whole(field: Array | Flags) -> Box:
     """Return the box of all cells."""
     return slice(0, field.shape[0]), slice(0, field.shape[1])
+
+
+def _is_whole(place: Place, field: Array) -> bool:
+    """Return whether a place is the box of all cells."""
+    return isinstance(place[0], slice) and place == _whole(field)
 
 
 def box_around(cells: Flags) -> Box:

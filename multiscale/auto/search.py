@@ -253,7 +253,8 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
         state = model.press(load_history.control(value))
         if not state.force > 0.0:
             continue
-        measured = probe.measure(state.force, state.plane.approach, state.plane.tilt)
+        plane = state.plane
+        measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)
         errors = {cause: error / state.force for cause, error in measured.parts.items()}
         worst = max(worst, errors, key=lambda each: sum(each.values()))
     return worst

@@ -16,6 +16,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -149,13 +150,48 @@ class Bodies:
         Note:
             Collective.
         """
-        if dense or self.parts.patches.count <= solutions:
-            compliance = self.patch_compliance() if dense else self._of_first()
+        if dense:
+            compliance = self.patch_compliance()
             return lambda pressures: np.asarray(pressures @ compliance.T)
-        from macro import displacements_under
+        return self._by_loaded_patches(solutions)
 
-        face = self.contact_face()
-        return lambda pressures: displacements_under(face, pressures)
+    def _by_loaded_patches(self, solutions: int) -> Displacements:
+        """Return what gives displacements of the mesh, from those by patches that carry a load.
+
+        Args:
+            solutions: Patches that are loaded one by one, at most.
+        """
+        from mpi4py import MPI
+
+        from macro import displacements_under
+        from macro.compliance.cache import cached
+        from macro.linear_solvers.options import users_options
+
+        key = (*self._as_text(), self.parts.patches, users_options())
+        faces: list[Any] = []  # meshed when a column is missing
+        columns: dict[int, Array] = {}
+
+        def under(pressures: Array) -> Array:
+            if not faces:
+                faces.append(self.contact_face())
+            return displacements_under(faces[0], pressures)
+
+        def by_unit_load(patch: int) -> Array:
+            one = np.eye(1, self.parts.patches.count, patch)
+            comm = self.comm or MPI.COMM_SELF
+            return cached("column", (*key, patch), lambda: {"column": under(one)}, comm)["column"]
+
+        def displacements(pressures: Array) -> Array:
+            loaded = np.flatnonzero(pressures.any(axis=0)).tolist()
+            if len(loaded) > solutions:
+                return under(pressures)
+            columns.update((patch, by_unit_load(patch)) for patch in loaded if patch not in columns)
+            total = np.zeros(pressures.shape)
+            for patch in loaded:
+                total += pressures[:, [patch]] * columns[patch]
+            return total
+
+        return displacements
 
     def patch_compliance(self) -> Array:
         """Return the compliance of both sides under the patches, shape (N, N) [mm/MPa].
@@ -163,7 +199,7 @@ class Bodies:
         Note:
             Collective.
         """
-        parts, first, second = self.parts, self._of_first(), self.parts.materials.second
+        parts, first, second = self.parts, self._of_first, self.parts.materials.second
         # two meshes are loaded together; decomposed, they are two half-spaces and what bodies add
         meshed_together = parts.counter is not None and not parts.scene.decomposed
         if second is None or meshed_together:
@@ -171,12 +207,11 @@ class Bodies:
         half_space = influence_matrix(parts.patches) * second.surface_compliance / np.pi
         return np.asarray(first + half_space)
 
+    @cached_property
     def _of_first(self) -> Array:
         """Return the compliance of the meshes under the patches, of the first body or of both."""
         if self.parts.scene.decomposed:
             return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
-        from mpi4py import MPI
-
         from macro import patch_compliance_matrix
         from macro.compliance.cache import cached
         from macro.linear_solvers.options import users_options
@@ -185,7 +220,7 @@ class Bodies:
             return {"compliance": patch_compliance_matrix(self.contact_face())}
 
         key = (*self._as_text(), self.parts.patches, users_options())
-        return cached("plain", key, compute, self.comm or MPI.COMM_SELF)["compliance"]
+        return cached("plain", key, compute, self.comm)["compliance"]
 
     def mean_compliance(self) -> float:
         """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].

@@ -259,8 +259,6 @@ class BlockTerms(FaceTerms):
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
         """
-        from mpi4py import MPI
-
         from macro import face_compliance
 
         count, shape = modes or self.modes, self.shape
@@ -275,7 +273,6 @@ class BlockTerms(FaceTerms):
                 allowed="blocks whose longest side is at most "
                 f"{ratio:.3g} times the shortest or the height",
             )
-        comm = comm or MPI.COMM_SELF
         return face_compliance(
             self.lengths, shape.height, self.material, self.sides, count, comm, use_cache=True
         )

@@ -41,25 +41,23 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             if choice.resume and kept is None and _is_finished(folder, scene, comm):
                 terminal.say(comm, f"this run is finished; its results are in {folder}")
                 return
-            with terminal.following(comm) as (begun, _):
-                begun("setting up the problem")
-                run = Run(scene, comm, None if kept is None else kept.resolved)
-            if kept is not None:
-                run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
-            terminal.show_plan(comm, run.coupling)
-            if notice:
-                terminal.say(comm, notice)
-            with (
-                CheckpointWriter(folder, run, lock.hold) as checkpoints,
-                RunFigures(run) as figures,
-            ):
-                failure = _make_load_steps(run, checkpoints, figures, interruption)
-                if run.steps:
-                    checkpoints.finish()  # writing results may fail
-                _write(folder, run, figures, failure, options)
-                if failure is not None:
-                    raise failure
-                checkpoints.remove()
+            with RunFigures(scene, comm) as figures:
+                with terminal.following(comm) as (begun, _):
+                    begun("setting up the problem")
+                    run = Run(scene, comm, None if kept is None else kept.resolved)
+                if kept is not None:
+                    run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+                terminal.show_plan(comm, run.coupling)
+                if notice:
+                    terminal.say(comm, notice)
+                with CheckpointWriter(folder, run, lock.hold) as checkpoints:
+                    failure = _make_load_steps(run, checkpoints, figures, interruption)
+                    if run.steps:
+                        checkpoints.finish()  # writing results may fail
+                    _write(folder, run, figures, failure, options)
+                    if failure is not None:
+                        raise failure
+                    checkpoints.remove()
 
 
 def _earlier(
@@ -96,7 +94,7 @@ def _make_load_steps(
             if run.coupling.has_laws:
                 run.make_laws()
             checkpoints.accept()
-            figures.begin()
+            figures.begin(run)
             interruption.check("before the block was made")
             with optional_packages():
                 run.prepare()

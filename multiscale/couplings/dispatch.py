@@ -47,4 +47,4 @@ def load_finite_elements(scene: Scene, comm: Any) -> None:
     """
     meshed = scene.body is not None or (scene.counter_body and scene.counter_body.mesh)
     if comm is not None and (coupling_class(scene).has_body or meshed):
-        import macro  # noqa: F401
+        import macro.bodies  # noqa: F401

@@ -136,7 +136,9 @@ class MicroCoupling(PressedSurface):
 
     def checked(self, step: LoadStep) -> LoadStep:
         """Return a load step of contacts on cells with its errors measured."""
-        return checked(step, self.error_probe(), self.load_history, self.comm)
+        known = None if self.has_laws else self.solver.latest
+        start = None if known is None else known.guess
+        return checked(step, self.error_probe(), self.load_history, self.comm, start=start)
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""

@@ -102,7 +102,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
         from macro import LawContactProblem
 
         face = self.bodies.contact_face()
-        problem = LawContactProblem(face, table.laws, mode=self.scene.coupling.interface)
+        problem = LawContactProblem(face, table.together(), mode=self.scene.coupling.interface)
         return EmbeddedLaws(problem, table, face)
 
     def model_behind_laws(self) -> MicroModel:

@@ -285,7 +285,7 @@ class RepresentativeCoupling(LawCoupling):
         """Return a face with laws at its points."""
         from macro import LawContactProblem
 
-        return LawContactProblem(face, table.laws, mode="pointwise", crown=self._crown())
+        return LawContactProblem(face, table.together(), mode="pointwise", crown=self._crown())
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""

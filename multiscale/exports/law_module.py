@@ -139,7 +139,7 @@ def law_module_text(law: PatchLaw, head: str) -> str:
     curves = law.rising_curves
     rows = law.rows.closure[:count].tolist()
     widths = [*(law.rows.approach[1:count] - law.rows.approach[: count - 1]).tolist(), 0.0][:count]
-    cubics = curves.coefficients[0, 1:, :, :2]
+    cubics = curves.coefficients[1:, :, :2]
     pieces = [
         (width, *cubic[:, 0].tolist(), *cubic[:, 1].tolist())
         for width, cubic in zip(widths, cubics, strict=True)

@@ -1,4 +1,4 @@
-"""The files of figures, drawn here or by a process beside this one while that computes."""
+"""The files of figures, drawn here or by processes beside this one."""
 
 from __future__ import annotations
 
@@ -14,11 +14,15 @@ from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Lock
 from typing import Any, NamedTuple
 
 from multiscale.figures import by_matplotlib
 from support.errors import NotInstalled
 from support.whole_files import write_bytes
+
+_BROKEN_PIPE = [signal.SIGPIPE]
 
 
 class Drawing(NamedTuple):
@@ -101,66 +105,93 @@ def write_figure(folder: Path, drawing: Drawing, tell: Callable[[str], None]) ->
 
 
 class FigureProcess:
-    """A process that draws figures while this one computes.
+    """Processes that draw figures while this one computes, or waits for them.
 
-    It loads what drawing needs when it is made, and ends when this process does, however that ends.
-    Figures that it does not come to, as where memory runs out, are drawn here.
+    The first loads what drawing needs, and the others are its forks. All of them end when this
+    process does, however that ends. Figures that they do not come to, as where memory runs out, are
+    drawn here.
+
+    Args:
+        count: Number of processes.
     """
 
-    def __init__(self) -> None:
-        self._connection, there = Pipe()
-        handle, nowhere = there.fileno(), subprocess.DEVNULL
-        call = f"from multiscale.figures.files import serve; serve({handle})"
+    def __init__(self, count: int = 1) -> None:
+        ends = [Pipe() for _ in range(count)]
+        handles, nowhere = [there.fileno() for _, there in ends], subprocess.DEVNULL
+        call = f"from multiscale.figures.files import serve; serve({handles})"
         packages = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "OMP_NUM_THREADS": "1"}
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", call], env=os.environ | packages, pass_fds=[handle],
+            [sys.executable, "-P", "-c", call], env=os.environ | packages, pass_fds=handles,
             stdin=nowhere, stdout=nowhere, stderr=nowhere, start_new_session=True,
         )  # fmt: skip
-        there.close()
-        # PETSc ends this process when another one has closed its end, unless the signal is blocked
-        block = signal.pthread_sigmask
-        self._line = ThreadPoolExecutor(
-            1, initializer=block, initargs=(signal.SIG_BLOCK, [signal.SIGPIPE])
-        )
-        self._ended = False
+        self._connections, self._free = [here for here, _ in ends], SimpleQueue[Connection]()
+        for here, there in ends:
+            there.close()
+            self._free.put(here)
+        self._beside, self._together = (_line(threads) for threads in (1, count))
+        self._ended, self._here = False, Lock()
 
-    def draw(self, drawing: Drawing) -> Future[Pictures]:
-        """Let the process draw a figure after those before it.
+    def draw(self, drawing: Drawing, *, beside: bool = False) -> Future[Pictures]:
+        """Let a process draw a figure.
 
         Args:
             drawing: The figure.
+            beside: Whether this process computes meanwhile. Such figures are drawn one after
+                another.
         """
-        return self._line.submit(self._drawn, drawing)
+        return (self._beside if beside else self._together).submit(self._drawn, drawing)
 
     def close(self) -> None:
-        """End the process; figures that are not drawn are wanted no longer."""
+        """End the processes; figures that are not drawn are wanted no longer."""
         self._ended = True
-        self._process.kill()
-        self._line.shutdown(cancel_futures=True)
+        with suppress(ProcessLookupError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+        for line in (self._beside, self._together):
+            line.shutdown(cancel_futures=True)
         self._process.wait()
-        self._connection.close()
+        for connection in self._connections:
+            connection.close()
 
     def _drawn(self, drawing: Drawing) -> Pictures:
+        connection = self._free.get()
         try:
-            self._connection.send(drawing)
-            answer = self._connection.recv()
+            connection.send(drawing)
+            answer = connection.recv()
         except (OSError, EOFError):
-            answer = Pictures({}) if self._ended else pictures_of(drawing)
+            with self._here:  # two threads must not draw at once
+                answer = Pictures({}) if self._ended else pictures_of(drawing)
+        finally:
+            self._free.put(connection)
         if isinstance(answer, str):
             raise RuntimeError(answer)
         return answer
 
 
-def serve(handle: int) -> None:
-    """Draw figures for the process at the other end of a connection, until that ends.
+def _line(threads: int) -> ThreadPoolExecutor:
+    """Return threads that wait for the processes."""
+    # PETSc ends this process when another one has closed its end, unless the signal is blocked
+    block = signal.pthread_sigmask
+    return ThreadPoolExecutor(threads, initializer=block, initargs=(signal.SIG_BLOCK, _BROKEN_PIPE))
+
+
+def serve(handles: Sequence[int]) -> None:
+    """Draw figures for the process at the other end of connections, until that ends.
 
     Args:
-        handle: Number of the file that is this end.
+        handles: Numbers of the files that are these ends; each gets a process.
     """
-    connection = Connection(handle)
     with suppress(Exception):  # it is told with the first figure
         for module in ("contact", "curves", "surface"):
             import_module(f"multiscale.figures.{module}")
+    own, *others = handles
+    for other in others:
+        if os.fork() == 0:
+            own = other
+            break
+    for handle in handles:  # a connection ends with the process that serves it
+        if handle != own:
+            os.close(handle)
+    connection = Connection(own)
     with suppress(OSError, EOFError):
         while True:
             drawing = connection.recv()

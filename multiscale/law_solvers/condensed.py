@@ -38,7 +38,7 @@ class CondensedLaws(LawSolver):
 
     def __init__(self, table: LawTable, compliance: Array) -> None:
         super().__init__(table)
-        self._laws, self._compliance = PatchLaws(table.laws), compliance
+        self._laws, self._compliance = table.together(), compliance
         self._last: DenseState | None = None
         self._control = Control(approach=0.0)
 
@@ -107,7 +107,7 @@ class FreePlaneLaws(LawSolver):
         if table.path is None:
             raise ValueError("the laws were made under a plane of given tilt")
         super().__init__(table)
-        self._path, self._laws = table.path, PatchLaws(table.laws)
+        self._path, self._laws = table.path, table.together()
         self._displacements = displacements
         self._approach: float | None = None
 

@@ -41,8 +41,12 @@ class EmbeddedLaws(LawSolver):
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
         super().__init__(table)
-        self._problem, self.face = problem, face
+        self.face = face
         self._last: FaceContactState | None = None
+        self._take(problem, table)
+
+    def _take(self, problem: LawContactProblem, table: LawTable) -> None:
+        self._problem, self.table, self._laws = problem, table, table.together()
 
     @property
     def _known(self) -> FaceContactState:
@@ -145,17 +149,18 @@ class EmbeddedLaws(LawSolver):
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
-        laws = self.table.laws
+        laws = self._laws
 
         def means(name: str) -> Array:
-            functions = [lambda closure, at=law.at: getattr(at(closure), name) for law in laws]
-            return self._problem.patch_means(functions)
+            return self._problem.patch_means(
+                lambda patch, closure: getattr(laws.at(patch, closure), name)
+            )
 
         try:
             area_fraction, separation = means("contact_area_fraction"), means("separation")
             stiffness = means("stiffness")
         except InputError as error:
-            falls = not all(law.is_function for law in laws)
+            falls = not all(law.is_function for law in self.table.laws)
             raise self.beyond_law(control, str(error), falls=falls) from error
         return LoadStep.of_patches(
             self.table.patches,
@@ -179,17 +184,18 @@ class EmbeddedLaws(LawSolver):
         Where laws are those of samples, contacts are counted on the area of the samples, and the
         pressure has a largest value on the face.
         """
-        laws = self.table.laws
+        laws = self._laws
         if isinstance(self.table.patches, PatchGrid):
-            mean_closures = zip(laws, state.patch_closure, strict=True)
-            return {"contacts": [law.at(c, extend=True).contacts for law, c in mean_closures]}
+            every = np.arange(len(laws))
+            return {"contacts": laws.at(every, state.patch_closure, extend=True).contacts}
         areas = self.face.areas
-        density = [
-            lambda closure, law=law: law.at(closure).contacts / law.sample_area for law in laws
-        ]
-        peaks = self._problem.patch_largest([law.pressure for law in laws])
+        counted_on = np.array([law.sample_area for law in self.table.laws])
+        density = self._problem.patch_means(
+            lambda patch, closure: laws.at(patch, closure).contacts / counted_on[patch]
+        )
+        peaks = self._problem.patch_largest(laws.pressures)
         return {
-            "contacts": round(float(self._problem.patch_means(density) @ areas)),
+            "contacts": round(float(density @ areas)),
             "areas": areas,
             "peak_pressure_MPa": float(peaks.max()),
         }
@@ -224,5 +230,5 @@ class ExtendedLaws(EmbeddedLaws):
                 if (longer := self._longer(self.table)) is None:
                     raise
                 last = self.state()
-                self.table, self._problem = longer, self._problem_of(longer)
+                self._take(self._problem_of(longer), longer)
                 self.restore(last)

@@ -5,16 +5,15 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
-from micro import ContactState, MicroModel, Start, influence_matrix, stacked
+from micro import ContactState, MicroModel, Start, influence_matrix, press_along, stacked
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -102,6 +101,7 @@ def consistent_laws(
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
+    whole = replace(whole, quick=model.is_quick(Control(approach=end, tilt=largest.tilt)))
     laws, error = refined(
         whole.rows,
         whole.laws,
@@ -143,6 +143,7 @@ class WholeSurface:
         tilt: Slopes of the plane; None lets it turn.
         comm: MPI communicator, whose ranks share the rows; None for this process alone.
         observe: Called with the number of rows that are solved.
+        quick: Whether a row takes so little that one rank solves them all.
     """
 
     model: MicroModel
@@ -152,8 +153,9 @@ class WholeSurface:
     tilt: tuple[float, float] | None = (0.0, 0.0)
     comm: Any = None
     observe: Callable[[int], None] | None = None
+    quick: bool = False
     _solved: dict[float, ContactState] = field(default_factory=dict, init=False)
-    _seconds: dict[float, float] = field(default_factory=dict, init=False)
+    _starts: dict[float, Start] = field(default_factory=dict, init=False)
 
     def range_up_to(self, largest: Control) -> tuple[float, float, tuple[float, float]]:
         """Return the approaches at first touch and at the largest load [mm], and the tilt there.
@@ -226,36 +228,35 @@ class WholeSurface:
         )
 
     def _solve(self, approaches: Array) -> list[ContactState]:
-        """Solve the contact problem at all approaches, shared by the ranks."""
-        count = _ROWS_TOGETHER
+        """Solve the contact problem at all approaches.
+
+        Quick solutions follow each other on one rank, each from those next to it. Others are shared
+        by the ranks, a few in sequence.
+        """
+        count = len(approaches) if self.quick else _ROWS_TOGETHER
         parts = [approaches[k : k + count] for k in range(0, len(approaches), count)]
 
-        def solve(part: int) -> list[tuple[ContactState, float]]:
-            rows, start = [], None
-            for approach in parts[part]:
-                began = time.process_time()
-                control = Control(approach=float(approach), tilt=self.tilt)
-                state = self._press(control, start)
-                start = state.guess
-                rows.append((state.summary(), time.process_time() - began))
-            return rows
+        def solve(part: int) -> list[ContactState]:
+            states = press_along(
+                self.model,
+                parts[part],
+                patches=self.patches,
+                mean_heights=self.mean_heights,
+                tilt=self.tilt,
+                known=self._starts,
+            )
+            if self.quick:
+                self._starts.update((state.approach, state.guess) for state in states)
+            return [state.summary() for state in states]
 
         def solved(done: int) -> None:
             if self.observe is not None:
                 self.observe(len(self._solved) + min(count * done, len(approaches)))
 
-        costs = [float(self._costs(part).sum()) for part in parts]
+        first = min(float(approaches[0]), 0.0)
+        costs = [float(np.sum(part - first)) for part in parts]  # the nearer, the dearer
         solutions = shared(self.comm, len(parts), solve, costs=costs, observe=solved)
-        rows = [row for part in solutions for row in part]
-        self._seconds.update((float(a), row[1]) for a, row in zip(approaches, rows, strict=True))
-        return [row[0] for row in rows]
-
-    def _costs(self, approaches: Array) -> Array:
-        """Return what rows cost, relative to each other: as long as those next to them took."""
-        if not self._seconds:
-            return approaches - min(float(approaches.min()), 0.0)
-        known = sorted(self._seconds)
-        return np.interp(approaches, known, [self._seconds[approach] for approach in known])
+        return [row for part in solutions for row in part]
 
     def _press(self, control: Control, start: Start | None) -> ContactState:
         """Press once; rows are those of rising loads, in whatever order: without plastic depth."""

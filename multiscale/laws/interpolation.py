@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -57,18 +57,23 @@ class LawPoint(NamedTuple):
 class LawCurves:
     """The interpolants of N laws: piecewise cubic functions of the local approach.
 
-    They are closure, p^(2/3), area fraction, mean separation and number of contacts. The first
-    piece holds before the first row of a law. The last one continues the tangents beyond the last
-    row.
+    They are closure, p^(2/3), area fraction, mean separation and number of contacts. The pieces of
+    all laws stand one after another. The first piece of a law holds before its first row. Its last
+    one continues the tangents beyond the last row.
 
     Attributes:
-        knots: Approaches of the rows, padded by infinity, shape (N, n) [mm].
-        origins: Approaches that the pieces count from, shape (N, n + 1) [mm].
-        coefficients: Coefficients of the powers 3 … 0, shape (N, n + 1, 4, 5).
+        first: Index of the first piece of each law, and the number of all pieces, shape (N + 1,).
+        starts: Approaches that the n pieces begin at, shape (n,) [mm]; −∞ for the first of a law.
+        origins: Approaches that they count from, shape (n,) [mm].
+        widths: Their widths, shape (n,) [mm]; 0 for the first and the last of a law, which are
+            straight and have no end.
+        coefficients: Coefficients of the powers 3 … 0, shape (n, 4, 5).
     """
 
-    knots: Array
+    first: Indices
+    starts: Array
     origins: Array
+    widths: Array
     coefficients: Array
 
     @classmethod
@@ -95,28 +100,32 @@ class LawCurves:
             pieces[1:, 3, 4] = rows.contacts
         pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
         pieces[:, 3, 3] += initial_separation
-        origins = np.append(rows.approach[:1] if len(rows) else 0.0, rows.approach)
-        return cls(rows.approach[None], origins[None], pieces[None])
+        widths = np.zeros(len(pieces))
+        widths[1:-1] = np.diff(rows.approach)
+        return cls(
+            first=np.array([0, len(pieces)]),
+            starts=np.append(-np.inf, rows.approach),
+            origins=np.append(rows.approach[:1] if len(rows) else 0.0, rows.approach),
+            widths=widths,
+            coefficients=pieces,
+        )
 
     @classmethod
     def packed(cls, curves: Sequence[LawCurves]) -> LawCurves:
         """Return the curves of many laws as one."""
-        rows = max(one.knots.shape[1] for one in curves)
-        knots = np.full((len(curves), rows), np.inf)
-        origins = np.zeros((len(curves), rows + 1))
-        pieces = np.zeros((len(curves), rows + 1, *curves[0].coefficients.shape[2:]))
-        for law, one in enumerate(curves):
-            own = one.knots.shape[1]
-            knots[law, :own] = one.knots[0]
-            origins[law, : own + 1] = one.origins[0]
-            pieces[law, : own + 1] = one.coefficients[0]
-        return cls(knots, origins, pieces)
+        counts = [len(one.starts) for one in curves]
+        whole = (
+            np.concatenate([getattr(one, name) for one in curves])
+            for name in ("starts", "origins", "widths", "coefficients")
+        )
+        return cls(np.concatenate([[0], np.cumsum(counts)]), *whole)
 
     def cut(self, rows: int) -> LawCurves:
         """Return the curves of a single law through its first rows, with their tangents beyond."""
-        pieces = self.coefficients[:, : rows + 1].copy()
-        pieces[:, rows, :2] = 0.0
-        return LawCurves(self.knots[:, :rows], self.origins[:, : rows + 1], pieces)
+        end = rows + 1
+        pieces, widths = self.coefficients[:end].copy(), self.widths[:end].copy()
+        pieces[rows, :2], widths[rows] = 0.0, 0.0
+        return LawCurves(np.array([0, end]), self.starts[:end], self.origins[:end], widths, pieces)
 
     def at(self, law: Indices | int, approach: Array) -> LawPoint:
         """Return what laws give at local approaches, in their shape.
@@ -125,12 +134,49 @@ class LawCurves:
             law: Index of the law of every approach, or the law of all.
             approach: Local approaches [mm].
         """
-        piece = (self.knots[law] <= approach[..., None]).sum(axis=-1)
-        return self.within(law, piece, approach - self.origins[law, piece])
+        piece = self._pieces(self.starts, law, approach)
+        return self._within(piece, approach - self.origins[piece])
 
-    def within(self, law: Indices | int, piece: Indices, distance: Array) -> LawPoint:
+    def at_closure(self, law: Indices | int, closures: Array) -> LawPoint:
+        """Return what laws, whose closures rise from row to row, give at closures.
+
+        Newton's steps, halved where they would leave the bracket, end at rounding. All closures are
+        inverted together: a finite element mesh asks for thousands at once.
+
+        Args:
+            law: Index of the law of every closure, or the law of all.
+            closures: Closures, of any shape [mm].
+        """
+        rows = np.where(np.isinf(self.starts), -np.inf, self.coefficients[:, 3, 0])
+        piece = self._pieces(rows, law, closures)
+        a, b, c, d = np.moveaxis(self.coefficients[piece, :, 0], -1, 0)
+        d, widths = d - closures, self.widths[piece]
+        distance = -d / np.maximum((a * widths + b) * widths + c, _LEAST_SLOPE)
+        low = np.where(widths == 0.0, distance, 0.0)
+        high = low + widths
+        for _ in range(_MOST_STEPS):
+            residual, slope = _horner((a, b, c, d), distance)
+            low = np.where(residual < 0.0, distance, low)
+            high = np.where(residual > 0.0, distance, high)
+            newton = distance - residual / np.maximum(slope, _LEAST_SLOPE)
+            inside = (newton >= low) & (newton <= high)
+            before, distance = distance, np.where(inside, newton, 0.5 * (low + high))
+            if np.all(np.abs(distance - before) <= _ROUNDING * np.abs(distance)):
+                break
+        return self._within(piece, distance)
+
+    def _pieces(self, begin: Array, law: Indices | int, values: Array) -> Indices:
+        """Return the last pieces of laws that begin at values or below, in their shape."""
+        low, high = (np.broadcast_to(self.first[law + i], values.shape) for i in (0, 1))
+        while np.any(high - low > 1):
+            middle = (low + high) // 2
+            above = begin[middle] <= values
+            low, high = np.where(above, middle, low), np.where(above, high, middle)
+        return low
+
+    def _within(self, piece: Indices, distance: Array) -> LawPoint:
         """Return what laws give at distances from the origins of pieces, in their shape [mm]."""
-        powers = np.moveaxis(self.coefficients[law, piece], (-2, -1), (0, 1))
+        powers = np.moveaxis(self.coefficients[piece], (-2, -1), (0, 1))
         values, slopes = _horner(powers, distance)
         power = np.maximum(values[1], 0.0)
         root = np.sqrt(power)
@@ -143,37 +189,6 @@ class LawCurves:
             separation=values[3],
             contacts=values[4].astype(np.int64),
         )
-
-    def at_closure(self, closures: Array) -> LawPoint:
-        """Return what a single law, whose closure rises from row to row, gives at closures.
-
-        Newton's steps, halved where they would leave the bracket, end at rounding. All closures are
-        inverted together: a finite element mesh asks for thousands at once.
-
-        Args:
-            closures: Closures, of any shape [mm].
-        """
-        rows = self.coefficients[0, 1:, 3, 0]
-        piece = np.searchsorted(rows, closures, side="right")
-        cubic = np.moveaxis(self.coefficients[0, piece, :, 0], -1, 0).copy()
-        cubic[3] -= closures
-        widths = np.concatenate(([0.0], np.diff(self.knots[0]), [0.0]))[piece]
-        rises = np.concatenate(([1.0], np.diff(rows), [1.0]))[piece]
-        straight = (piece == 0) | (piece == len(rows))
-        slopes = np.where(straight, np.maximum(cubic[2], _LEAST_SLOPE), 1.0)
-        low = np.where(straight, -cubic[3] / slopes, 0.0)
-        high = low + widths
-        distance = low - cubic[3] / rises * widths
-        for _ in range(_MOST_STEPS):
-            residual, slope = _horner(cubic, distance)
-            low = np.where(residual < 0.0, distance, low)
-            high = np.where(residual > 0.0, distance, high)
-            newton = distance - residual / np.maximum(slope, _LEAST_SLOPE)
-            inside = (newton >= low) & (newton <= high)
-            before, distance = distance, np.where(inside, newton, 0.5 * (low + high))
-            if np.all(np.abs(distance - before) <= _ROUNDING * np.abs(distance)):
-                break
-        return self.within(0, piece, distance)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -228,6 +243,6 @@ class Tangent:
         return np.asarray(result)
 
 
-def _horner(powers: Array, t: Array) -> tuple[Array, Array]:
+def _horner(powers: Iterable[Array], t: Array) -> tuple[Array, Array]:
     a, b, c, d = powers
     return ((a * t + b) * t + c) * t + d, (3.0 * a * t + 2.0 * b) * t + c

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from geometry import InputError, PatchGrid, Regions
 from geometry.zero import FIRST_TOUCH
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import PlanePath
 from multiscale.readable import Caution, Detail, number, percent, quantity
 
@@ -59,6 +59,10 @@ class LawTable:
         if isinstance(index, str) and isinstance(self.patches, Regions):
             return self.laws[self.patches.index(index)]
         return self.laws[int(index)]
+
+    def together(self) -> PatchLaws:
+        """Return the laws as one, which evaluates them together."""
+        return PatchLaws(self.laws)
 
     @property
     def rows(self) -> int:

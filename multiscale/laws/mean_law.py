@@ -201,7 +201,8 @@ class PeriodicSamples:
 
     def _solve(self, separations: Array) -> list[list[SampleRow]]:
         """Return the rows of all samples at separations that fall, shared by the ranks."""
-        count = _ROWS_TOGETHER
+        quick = all(sample.quick for sample in self.samples)
+        count = len(separations) if quick else _ROWS_TOGETHER
         parts = [separations[k : k + count] for k in range(0, len(separations), count)]
         tasks = len(self.samples) * len(parts)
         full = self.full_contact if separations[-1] == 0.0 else [np.inf] * len(self.samples)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +18,10 @@ from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+_ROUNDING = 1e-12
+"""Share of the end of a table by which a converged closure may exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -139,8 +144,8 @@ class PatchLaw:
         """
         closures = np.asarray(closure, dtype=float)
         if not extend:
-            self._check_range(closures)
-        return self.rising_curves.at_closure(closures)
+            self.check_range(closures)
+        return self.rising_curves.at_closure(0, closures)
 
     def pressure(self, closure: ArrayLike) -> Array:
         """Return the pressure at any closure, as an iteration needs it [MPa].
@@ -194,10 +199,14 @@ class PatchLaw:
         """The curves up to where closure stops rising, and their tangents there."""
         return self.curves if self.is_function else self.curves.cut(self.rising_rows)
 
-    def _check_range(self, closures: Array) -> None:
+    def check_range(self, closures: Array) -> None:
+        """Refuse closures beyond the law's range [mm].
+
+        Raises:
+            InputError: When there are some.
+        """
         start, end = self.range
-        # a converged closure may exceed the end of the table by its own rounding
-        if np.any(closures > end + 1e-12 * abs(end)):
+        if np.any(closures > _with_rounding(end)):
             problem = "closure beyond the end of the patch law"
             if not self.is_function:
                 problem += ", where pressure stops being a function of closure"
@@ -209,7 +218,7 @@ class PatchLaw:
 
 
 class PatchLaws:
-    """N patch laws, evaluated together at one local approach each.
+    """N patch laws, evaluated together: a `ContactLaws` of `macro`.
 
     Args:
         laws: The laws, in the order of the flat patch index.
@@ -220,6 +229,7 @@ class PatchLaws:
     """
 
     def __init__(self, laws: Sequence[PatchLaw]) -> None:
+        self._laws = tuple(laws)
         self._index = np.arange(len(laws))
         self._curves = LawCurves.packed([law.curves for law in laws])
         self.first_touch = np.array([law.first_touch for law in laws])
@@ -228,9 +238,46 @@ class PatchLaws:
             [law.first_touch if law.is_open else law.rows.approach[-1] for law in laws]
         )
 
+    def __len__(self) -> int:
+        return len(self._laws)
+
     def along(self, approach: Array) -> LawPoint:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
         return self._curves.at(self._index, approach)
+
+    def at(self, patch: Indices, closure: Array, *, extend: bool = False) -> LawPoint:
+        """Return what laws give at closures, as `PatchLaw.at` does for one.
+
+        Args:
+            patch: Flat patch indices, shape (n,).
+            closure: Closures there, shape (n,) [mm].
+            extend: Whether to continue along the tangents beyond the tables instead of raising.
+
+        Raises:
+            InputError: When a closure lies beyond the range of its law and `extend` is false.
+        """
+        if not extend:
+            beyond = closure > _with_rounding(self._ends)[patch]
+            if beyond.any():
+                of_one = patch == patch[beyond][0]
+                self._laws[patch[beyond][0]].check_range(closure[of_one])
+        return self._rising.at_closure(patch, closure)
+
+    def pressures(self, patch: Indices, closure: Array) -> Array:
+        """Return pressures at closures of patches, with tangents beyond the tables, (n,) [MPa]."""
+        return self.at(patch, closure, extend=True).pressure
+
+    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
+        """Return the derivatives of `pressures` over the closures, shape (n,) [MPa/mm]."""
+        return self.at(patch, closure, extend=True).stiffness
+
+    @cached_property
+    def _ends(self) -> Array:
+        return np.array([law.range[1] for law in self._laws])
+
+    @cached_property
+    def _rising(self) -> LawCurves:
+        return LawCurves.packed([law.rising_curves for law in self._laws])
 
 
 def repaired_law(law: PatchLaw) -> PatchLaw:
@@ -243,3 +290,8 @@ def repaired_law(law: PatchLaw) -> PatchLaw:
         return law
     rows, change = law.rows.with_rising_pressure()
     return replace(law, rows=rows, repaired=max(change, law.repaired))
+
+
+def _with_rounding(end: Any) -> Any:
+    """Return ends of tables with the rounding that converged closures may exceed them by."""
+    return end + _ROUNDING * np.abs(end)

@@ -5,14 +5,14 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from geometry import Control
-from micro import HalfSpaceModel
+from micro import HalfSpaceModel, Start, press_along
 
 Array = NDArray[np.float64]
 
@@ -45,6 +45,12 @@ class PeriodicSample:
     """
 
     model: HalfSpaceModel
+    _starts: dict[float, Start] = field(default_factory=dict, init=False)
+
+    @property
+    def quick(self) -> bool:
+        """Whether its rows take so little that one rank solves them all."""
+        return self.model.is_quick(Control(approach=self.reference))
 
     @property
     def area(self) -> float:
@@ -97,28 +103,28 @@ class PeriodicSample:
         return max(self.reference - state.approach, 0.0)
 
     def rows(self, separations: Array, full: float) -> list[SampleRow]:
-        """Return rows at separations, each solved from the one before.
+        """Return rows at separations, each solved from those next to it.
 
         Args:
             separations: Mean separations, falling [mm].
             full: Mean pressure that just closes the sample, for a separation of 0 [MPa].
         """
-        rows, start = [], None
-        for separation in separations:
-            if separation == 0.0 and not self.yields:
-                rows.append(SampleRow(full, 1.0, 1))
-            elif separation >= self.first_touch:
-                rows.append(SampleRow())
-            else:
-                approach = float(self.reference - separation)
-                state = self.model.press(Control(approach=approach), start=start)
-                start = state.guess
-                rows.append(
-                    SampleRow(
-                        pressure=state.mean_pressure,
-                        contact_area_fraction=state.contact_area_fraction,
-                        contacts=state.contacts,
-                        outside_range=bool(state.warning),
-                    )
-                )
-        return rows
+        approaches = {
+            separation: float(self.reference - separation)
+            for separation in separations.tolist()
+            if separation < self.first_touch and (separation > 0.0 or self.yields)
+        }
+        states = press_along(self.model, list(approaches.values()), known=self._starts)
+        if self.quick:
+            self._starts.update((state.approach, state.guess) for state in states)
+        found = {
+            separation: SampleRow(
+                pressure=state.mean_pressure,
+                contact_area_fraction=state.contact_area_fraction,
+                contacts=state.contacts,
+                outside_range=bool(state.warning),
+            )
+            for separation, state in zip(approaches, states, strict=True)
+        }
+        closed = {0.0: SampleRow(full, 1.0, 1)}
+        return [(found.get(one) or closed.get(one) or SampleRow()) for one in separations.tolist()]

@@ -26,9 +26,13 @@ from multiscale.output.report import report_html
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
+from multiscale.scene.scene import Scene
 from support.collective import on_root, shared
 from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
+
+_MOST_PROCESSES = 3
+"""Processes that draw; a run has five to eight figures."""
 
 _FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
 
@@ -58,7 +62,7 @@ def write_results(
     Note:
         Collective: all ranks draw, rank 0 writes.
     """
-    drawn = (figures or RunFigures(run)).drawn()
+    drawn = (figures or RunFigures(run.scene, run.comm)).drawn(run)
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = Pictures(dict(chain.from_iterable(one.files.items() for one in drawn)))
     with run.phase("writing"):
@@ -163,71 +167,82 @@ def surface_drawing(coupling: Coupling) -> Drawing:
 class RunFigures:
     """The figures of a run.
 
-    Ranks share them at its end. Of a process on its own with a further core, another process draws
+    Ranks share them at its end. Of a process on its own with a further core, other processes draw
     them: surface and laws while load steps are made.
 
     Args:
-        run: The run.
+        scene: The scene.
+        comm: MPI communicator; None for this process alone.
     """
 
-    def __init__(self, run: Run) -> None:
-        self._run, self._figures = run, run.scene.output.figures
+    def __init__(self, scene: Scene, comm: Any) -> None:
+        self._figures, self._comm = scene.output.figures, comm
         self._process: FigureProcess | None = None
         self._begun: dict[str, Future[Pictures]] = {}
 
     def __enter__(self) -> RunFigures:
-        """Return the figures."""
+        """Start the processes that draw, which load what they need while the run is set up."""
+        if self._figures and self._comm is None and (count := cores()) > 1:
+            with suppress(OSError):  # none can be started, and figures are drawn here
+                self._process = FigureProcess(min(count, _MOST_PROCESSES))
         return self
 
     def __exit__(self, *error: object) -> None:
-        """End the process that draws."""
+        """End the processes that draw."""
         if self._process is not None:
             self._process.close()
 
-    def begin(self) -> None:
-        """Have those drawn beside the load steps that do not depend on them."""
-        # larger ones take minutes beside their figures, and long to send
-        few = self._run.coupling.surface.heights.size <= 2**20
-        if self._figures and self._run.comm is None and cores() > 1 and few:
-            with suppress(OSError):  # no process can be started, and figures are drawn here
-                self._process = FigureProcess()
-                for drawing in self._before_load_steps():
-                    self._begun[drawing.name] = self._process.draw(drawing)
+    def begin(self, run: Run) -> None:
+        """Have those drawn beside the load steps that do not depend on them.
 
-    def drawn(self) -> list[Pictures]:
+        Args:
+            run: The run.
+        """
+        # larger ones take minutes beside their figures, and long to send
+        if self._process is not None and run.coupling.surface.heights.size > 2**20:
+            self._process.close()
+            self._process = None
+        if self._process is not None:
+            for drawing in self._before_load_steps(run):
+                self._begun[drawing.name] = self._process.draw(drawing, beside=True)
+
+    def drawn(self, run: Run) -> list[Pictures]:
         """Return the files of all figures; none of a run without load steps, or that wants none.
+
+        Args:
+            run: The run.
 
         Note:
             Collective.
         """
-        if not self._figures or not self._run.steps:
+        if not self._figures or not run.steps:
             return []
-        with self._run.phase("output"):
-            drawings = [*self._after_load_steps(), *self._before_load_steps()]
+        with run.phase("output"):
+            drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
             if self._process is None:
-                comm = self._run.comm
+                comm = self._comm
                 return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
-            draw, begun = self._process.draw, self._begun
-            starts = not all(one.done() for one in begun.values())  # then this one helps
-            ahead = [begun.get(drawing.name) or draw(drawing) for drawing in drawings]
-            return [
-                pictures_of(drawing) if starts and one.cancel() else one.result()
-                for drawing, one in zip(drawings, ahead, strict=True)
-            ]
+            ahead = []
+            for drawing in drawings:
+                begun = self._begun.get(drawing.name)
+                if begun is None or begun.cancel():
+                    begun = self._process.draw(drawing)
+                ahead.append(begun)
+            return [one.result() for one in ahead]
 
-    def _before_load_steps(self) -> Iterator[Drawing]:
-        yield surface_drawing(self._run.coupling)
-        if (laws := self._run.laws) is not None:
+    def _before_load_steps(self, run: Run) -> Iterator[Drawing]:
+        yield surface_drawing(run.coupling)
+        if (laws := run.laws) is not None:
             kinds = file_kinds(self._figures)
             yield Drawing("laws", "figures.curves.law_figure", (laws,), kinds)
 
-    def _after_load_steps(self) -> Iterator[Drawing]:
+    def _after_load_steps(self, run: Run) -> Iterator[Drawing]:
         """Yield the figures of what was found.
 
         Note:
             Collective.
         """
-        run, coupling, history = self._run, self._run.coupling, self._run.history()
+        coupling, history = run.coupling, run.history()
         surface, of_samples = replace(coupling.surface), coupling.regions is not None
         face = coupling.face_pressures()
         figures: dict[str, tuple[str, Any]] = {

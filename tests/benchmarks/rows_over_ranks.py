@@ -45,7 +45,7 @@ def measure(choice: argparse.Namespace) -> None:
     """Make the laws on this rank and the others; rank 0 prints the facts as JSON."""
     from mpi4py import MPI
 
-    import macro  # noqa: F401 imports are no part of the times
+    import macro.bodies  # noqa: F401 imports are no part of the times
     from multiscale import Scene, consistent_laws
     from multiscale.run import Run
 

@@ -36,7 +36,7 @@ def test_importing_it_loads_nothing(root):
     assert found.stdout.strip() == "[]"
 
 
-LAZY = [(package, name) for package in (geometry, micro, multiscale) for name in dir(package)]
+LAZY = [(package, name) for package in PACKAGES.values() for name in dir(package)]
 
 
 @pytest.mark.parametrize(("package", "name"), LAZY, ids=lambda one: getattr(one, "__name__", one))

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from geometry.rigid_plane import Control
+from micro import HalfSpaceModel
 from multiscale import Run, Scene, run
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
 from multiscale.output.results import write_results, write_tables
@@ -155,6 +156,28 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     again.resume(kept.steps, kept.position, kept.state, kept.laws)
     list(again.load_steps())
     assert again.steps[-1].errors == whole.steps[-1].errors
+
+
+@pytest.mark.parametrize("grid", [64, 50])  # halves have solutions to start from, or do not
+def test_a_known_solution_saves_work_and_changes_no_error(monkeypatch, grid):
+    setup = Run(scene("concurrent", grid=grid)).coupling
+    probe = ErrorProbe(model=setup.micro, on_body=setup.put_on_body, order=2)
+    known = probe.on_body(setup.micro, 2).press(Control(approach=0.006))
+    press, used = HalfSpaceModel.press, []
+
+    def watched(*given, **options):
+        used.append(press(*given, **options))
+        return used[-1]
+
+    monkeypatch.setattr(HalfSpaceModel, "press", watched)
+    found, iterations = [], []
+    for start in (None, known.guess):
+        used.clear()
+        found.append(probe.measure(known.force, 0.006, (0.0, 0.0), start=start).parts)
+        iterations.append(sum(state.iterations for state in used))
+    assert iterations[1] < iterations[0]
+    # each force is right to 1e-5
+    assert found[1] == pytest.approx(found[0], abs=1e-5 * known.force)
 
 
 def test_fewer_modes_are_solved_on_the_body_itself():

@@ -102,7 +102,7 @@ TAKEN = (
     "from geometry.meshes.gmsh_session import gmsh_session;"
     "session = gmsh_session('box'); session.__enter__();"
     "inside = signal.getsignal(signal.SIGINT); session.__exit__(None, None, None);"
-    "import macro; assert inside is signal.getsignal(signal.SIGINT) is seen"
+    "import macro.bodies; assert inside is signal.getsignal(signal.SIGINT) is seen"
 )
 
 

@@ -376,6 +376,32 @@ def test_springs_in_the_matrix_follow_a_material_that_changes(body):
     np.testing.assert_allclose(forces(in_matrix=True), forces(in_matrix=False), rtol=1e-8)
 
 
+def test_one_interface_in_two_problems(body):
+    """What one problem's matrix keeps of the laws is nothing to the other's."""
+    space, problems = body.space, []
+    rough = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
+    for factor in (1.0, 20.0):
+        u = fem.Function(space)
+        held = [clamped(space, body.tags)]
+        problems.append(ContactProblem(factor * elastic(u), u, held, rough))
+    steps, forces = [], []
+    for approach in (4e-3, 6e-3, 8e-3):
+        for problem in problems:
+            rough.indenter = RigidPlane(approach=approach)
+            steps.append(problem.solve())
+            forces.append(rough.force)
+    assert max(steps) < 10
+    for factor, found in zip((1.0, 20.0), (forces[0::2], forces[1::2]), strict=True):
+        u = fem.Function(space)
+        alone = Interface(space, body.tags, TOP, laws=PowerLaw(3e6), indenter=PLANE)
+        held = [clamped(space, body.tags)]
+        problem = ContactProblem(factor * elastic(u), u, held, alone, in_matrix=False)
+        for approach, force in zip((4e-3, 6e-3, 8e-3), found, strict=True):
+            alone.indenter = RigidPlane(approach=approach)
+            problem.solve()
+            assert force == pytest.approx(alone.force, rel=1e-8)
+
+
 def test_problems_are_freed(body):
     space, u = body.space, fem.Function(body.space)
     rough = Interface(space, body.tags, TOP, laws=LAW, indenter=PLANE)

@@ -196,3 +196,32 @@ def test_fields_share_cells_that_borders_cut(element, tmp_path):
         # the second column of cells has a third of its width in the first patch
         expected = [3.0, 3.0 / 3 + 5.0 * 2 / 3, 5.0 * 2 / 3 + 8.0 / 3, 8.0]
         np.testing.assert_allclose(np.unique(loaded.round(9)), np.sort(expected), rtol=1e-8)
+
+
+class Springs:
+    """Springs of all patches, evaluated together."""
+
+    def __init__(self, *stiffness):
+        self.laws = [Spring(k=k) for k in stiffness]
+        self._k = np.array(stiffness)
+
+    def __len__(self):
+        return len(self._k)
+
+    def pressures(self, patch, closure):
+        return np.maximum(closure, 0.0) * self._k[patch]
+
+    def stiffnesses(self, patch, closure):
+        return np.where(closure > 0.0, self._k[patch], 0.0)
+
+
+@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
+def test_laws_together_are_the_laws_one_by_one(interface, mode):
+    together = Springs(1e3, 2e3, 5e3, 4e3)
+    control = Control(force=3.0, tilt=(1e-3, -2e-3))
+    one, other = (
+        LawContactProblem(interface, laws, mode).solve(control)
+        for laws in (together, together.laws)
+    )
+    assert one.approach == pytest.approx(other.approach, rel=1e-13)
+    np.testing.assert_allclose(one.patch_force, other.patch_force, rtol=1e-12)

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from macro import Block, LoadedFace, Material, block_mesh, patch_compliance_matrix
+from macro.contact.sampling import by_patch
 from support.errors import InputError
 
 NODES = 1e-10  # gmsh places nodes to about 1e-11
@@ -62,7 +63,7 @@ def test_laws_see_the_samples_of_their_own_patch():
     for mode in ("patchwise", "pointwise"):
         sampling = interface.sampling(mode)
         closure = np.zeros(len(sampling.weight))
-        np.testing.assert_array_equal(sampling.by_patch(laws, closure), sampling.patch)
+        np.testing.assert_array_equal(by_patch(laws, sampling.patch, closure), sampling.patch)
         expected = np.arange(6) * interface.patches.area
         np.testing.assert_allclose(sampling.patch_sums(sampling.patch * 1.0), expected, rtol=NODES)
 

@@ -49,7 +49,7 @@ def test_solves_the_fixed_point(control):
     )  # slopes are lagged until they change by 3e-9
     assert np.abs(gap[state.in_contact]).max() <= slack
     assert gap.min() >= -slack
-    assert state.gap == pytest.approx(gap, abs=1e-15)
+    assert state.gap == pytest.approx(gap, abs=slack)
     assert state.residual <= 3e-9
     # and they matter: a plane that may turn leans on what yields least
     small = replace(MODEL, slopes=()).press(control)
@@ -75,9 +75,34 @@ def test_up_and_down_are_one_path(control):
 
 
 def test_costs_less_than_two_more_solutions(control):
-    """Each starts from the last: measured 1.4 … 1.8 times the iterations without slopes."""
+    """Each starts from the last: measured 1.4 … 1.8 times the iterations without slopes.
+
+    By a matrix every solution takes a product or two, 2.8 times together.
+    """
     without = replace(MODEL, slopes=()).press(control)
-    assert MODEL.press(control).iterations < 2.5 * without.iterations
+    assert MODEL.press(control).iterations < 3.0 * without.iterations
+
+
+@pytest.mark.parametrize("approach", [1e-3, 0.3])
+def test_slopes_of_a_flat_surface_add_nothing(approach):
+    """Slopes then change nothing at all, which asks for no better solution than the tolerance."""
+    flat = replace(SURFACE, heights=np.zeros(SURFACE.grid))
+    slopes = FiniteSlopes(flat, SLOPES.material)
+    state = replace(MODEL, surface=flat, highest=0.0, slopes=(slopes,)).press(
+        Control(approach=approach)
+    )
+    without = replace(MODEL, surface=flat, highest=0.0, slopes=()).press(Control(approach=approach))
+    assert state.in_contact.all()
+    assert state.force == pytest.approx(without.force, rel=1e-10)
+
+
+def test_full_contact_pressed_on():
+    """Slopes add more the deeper the plane: what they change falls slowly, from any start."""
+    there = Control(approach=1.0)
+    before = MODEL.press(Control(approach=0.9))
+    states = [MODEL.press(there, start=start) for start in (None, before.guess)]
+    assert all(state.in_contact.all() for state in states)
+    assert states[0].force == pytest.approx(states[1].force, rel=1e-8)
 
 
 def test_slopes_that_do_not_agree_are_told():
@@ -90,7 +115,7 @@ def test_slopes_that_do_not_agree_are_told():
         def displacement(self, pressure):
             return 1e-4 * self.dice.random(pressure.shape)
 
-    message = r"the displacements by finite slopes did not converge: they still change by .*e-02"
+    message = r"the displacements by finite slopes did not converge: they still change by .*e-0[23]"
     with pytest.raises(NotConverged, match=message):
         replace(MODEL, slopes=(Unsteady(),)).press(Control(approach=8e-3))
 

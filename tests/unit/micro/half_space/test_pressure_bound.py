@@ -84,6 +84,23 @@ def test_a_sphere_pressed_far_beyond_yield():
     assert elastic.force > 10.0 * force
 
 
+@pytest.mark.parametrize("hardness", [0.05, 1.0, 50.0])
+@pytest.mark.parametrize("cells", [1, 3, 192, 1728, 1919, 1920])
+def test_force_that_cells_bear_at_the_bound(cells, hardness):
+    """A force of n H cells: nearly all that touch yield, or all, and none tells the approach."""
+    model = replace(ELASTIC, hardness=hardness)
+    force = cells * hardness * float(np.prod(SURFACE.spacing))
+    state = model.press(Control(force=force))
+    assert state.force == pytest.approx(force, rel=1e-12)
+    interference = model.interference(state.plane)
+    slack = 1.1e-9 * interference.max()
+    gap = state.displacement - interference
+    touching = state.pressure > 0.0
+    assert gap[~touching].min(initial=0.0) >= -slack
+    assert gap[state.yielding].max(initial=0.0) <= slack
+    assert np.abs(gap[touching & ~state.yielding]).max(initial=0.0) <= slack
+
+
 @pytest.mark.parametrize("hardness", [0.0, -1.0, np.nan])
 def test_refuses_hardness(hardness):
     with pytest.raises(InputError, match=f"{hardness}: the hardness must be"):

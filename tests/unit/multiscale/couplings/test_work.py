@@ -10,6 +10,7 @@ import pytest
 
 from geometry import BlockShape
 from micro import HalfSpaceModel
+from micro.complementarity import solver
 from multiscale import Run, Scene, make_setup
 from multiscale.couplings import cost, patch_laws
 from multiscale.couplings.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
@@ -82,7 +83,9 @@ def test_unknowns_of_a_mesh(element):
 
 @pytest.mark.parametrize("kind", ["analytic", "concurrent"])
 @pytest.mark.parametrize("grid", [64, 128])
-def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind):
+def test_products_of_load_steps_are_about_as_many_as_counted(grid, kind, monkeypatch):
+    """By transforms, which it is at most: few cells that can touch take less."""
+    monkeypatch.setattr(solver, "_MATRIX_WORK", 0.0)
     run = Run(scene(kind, grid=grid, micro={"model": "half-space", "finite_slopes": False}))
     counted = sum(step.newton_iterations for step in run.load_steps()) * grid**2
     assert run.coupling.work().products / 2.0 <= counted <= 2.0 * run.coupling.work().products

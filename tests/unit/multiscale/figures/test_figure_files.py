@@ -32,16 +32,17 @@ def surface_drawing(**changes):
     return Drawing(**(given | changes))
 
 
-@pytest.fixture
-def process():
-    made = FigureProcess()
+@pytest.fixture(params=[1, 2])
+def process(request):
+    made = FigureProcess(request.param)
     yield made
     made.close()
 
 
-def test_another_process_draws_the_same_bytes(process):
+def test_other_processes_draw_the_same_bytes(process):
     drawing = surface_drawing(kinds=("png", "svg"))
-    assert process.draw(drawing).result() == pictures_of(drawing)
+    drawn = [process.draw(drawing, beside=beside) for beside in (True, False, False)]
+    assert [one.result() for one in drawn] == [pictures_of(drawing)] * 3
 
 
 def test_an_error_while_drawing_is_told(process):
@@ -52,15 +53,18 @@ def test_an_error_while_drawing_is_told(process):
 
 
 @pytest.mark.parametrize("before", ["", "from petsc4py import PETSc"])  # it handles signals
-def test_figures_are_drawn_here_where_the_process_has_ended(before):
+@pytest.mark.parametrize("kill", ["kill", "killpg"])  # the first process, which is forked, or all
+def test_figures_are_drawn_here_where_a_process_has_ended(before, kill):
     script = (
         f"{before}\n"
         "import os, signal\n"
         "from multiscale.figures.files import FigureProcess\n"
         "from helpers_here import surface_drawing\n"
-        "process = FigureProcess()\n"
-        "os.kill(process._process.pid, signal.SIGKILL)\n"
-        "print(*process.draw(surface_drawing()).result().files)\n"
+        "process = FigureProcess(2)\n"
+        "process.draw(surface_drawing()).result()  # both run by then\n"
+        f"os.{kill}(process._process.pid, signal.SIGKILL)\n"
+        "drawn = [process.draw(surface_drawing(name=name)) for name in 'abc']\n"
+        "print(*(name for one in drawn for name in one.result().files))\n"
         "process.close()\n"
     ).replace("helpers_here", Path(__file__).stem)
     paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
@@ -68,7 +72,7 @@ def test_figures_are_drawn_here_where_the_process_has_ended(before):
         [sys.executable, "-c", script], capture_output=True, text=True, timeout=60,
         env=os.environ | {"PYTHONPATH": paths},
     )  # fmt: skip
-    assert (ended.returncode, ended.stdout) == (0, "s.png\n"), ended.stderr
+    assert (ended.returncode, ended.stdout) == (0, "a.png b.png c.png\n"), ended.stderr
 
 
 def test_a_process_that_is_closed_draws_no_more(process):
@@ -85,18 +89,30 @@ def has_ended(status):
         return True
 
 
-def test_the_process_ends_with_a_killed_one():
+@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "process.close()"])
+def test_the_processes_end_with_a_killed_one_and_when_they_are_closed(end):
     script = (
         "import os, signal\n"
         "from multiscale.figures.files import FigureProcess\n"
-        "print(FigureProcess()._process.pid, flush=True)\n"
-        "os.kill(os.getpid(), signal.SIGKILL)\n"
-    )
-    shown = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
-    status, until = Path(f"/proc/{int(shown.stdout)}/status"), time.monotonic() + 60.0
-    while time.monotonic() < until and not has_ended(status):
+        "from helpers_here import surface_drawing\n"
+        "process = FigureProcess(2)\n"
+        "for _ in range(2): process.draw(surface_drawing()).result()\n"
+        "first = process._process.pid\n"
+        "forks = open(f'/proc/{first}/task/{first}/children').read()\n"
+        "print(first, forks, flush=True)\n"
+        f"{end}\n"
+    ).replace("helpers_here", Path(__file__).stem)
+    paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+    shown = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": paths},
+    )  # fmt: skip
+    statuses = [Path(f"/proc/{int(number)}/status") for number in shown.stdout.split()]
+    assert len(statuses) == 2
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until and not all(map(has_ended, statuses)):
         time.sleep(0.05)
-    assert has_ended(status)
+    assert all(map(has_ended, statuses))
 
 
 @pytest.mark.parametrize(("asked", "ends"), [("true", {".png"}), ('"svg"', {".png", ".svg"})])

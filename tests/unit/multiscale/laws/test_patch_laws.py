@@ -114,3 +114,27 @@ def test_ends_and_touches():
     packed = PatchLaws(LAWS)
     np.testing.assert_array_equal(packed.first_touch, [1e-3, 2e-3, 5e-3, 1e-3, np.inf])
     np.testing.assert_allclose(packed.end, [9e-3, 9e-3, 5e-3, 9e-3, np.inf], rtol=1e-15)
+
+
+def test_laws_together_over_closure_are_the_laws():
+    packed, rng = PatchLaws(LAWS), np.random.default_rng(3)
+    patch = np.sort(rng.integers(0, len(LAWS), 200))
+    closure = rng.uniform(-1e-3, 12e-3, 200)
+    found = packed.at(patch, closure, extend=True)
+    for index, one in enumerate(LAWS):
+        own = patch == index
+        for values, expected in zip(found, one.at(closure[own], extend=True), strict=True):
+            # the inversion ends when the last closure is right to rounding
+            np.testing.assert_allclose(values[own], expected, rtol=1e-12, atol=1e-18)
+    np.testing.assert_array_equal(packed.pressures(patch, closure), found.pressure)
+    np.testing.assert_array_equal(packed.stiffnesses(patch, closure), found.stiffness)
+
+
+def test_laws_together_refuse_what_one_of_them_refuses():
+    packed, (_, end) = PatchLaws(LAWS), FALLING.range
+    within = np.array([8e-3, 8e-3, 4e-3, end * (1.0 + 1e-13), 1.0])
+    assert np.isfinite(packed.at(np.arange(5), within).pressure).all()
+    beyond = within + np.array([0.0, 0.0, 0.0, 1e-6, 0.0])
+    problem = rf"^{beyond[3]:.6g}.* stops being a function of closure .*up to {end:.6g} mm"
+    with pytest.raises(InputError, match=problem):
+        packed.at(np.arange(5), beyond)

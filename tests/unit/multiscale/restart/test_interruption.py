@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -173,7 +174,7 @@ import os, signal, sys
 from multiscale.cli import command_line, keys
 
 def hung_up(choice, options, comm):
-    import macro
+    import macro.bodies
     from petsc4py import PETSc
     os.kill(os.getpid(), signal.SIGHUP)
     print("went on")
@@ -181,6 +182,31 @@ def hung_up(choice, options, comm):
 keys.print_schema = hung_up
 sys.exit(command_line.main(["schema"]))
 """
+
+
+class Resource:
+    """Something that is told to end while Python frees it."""
+
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.0)  # the handler raises here, where nobody can catch it
+
+
+def test_a_signal_while_something_is_freed_is_not_lost(capsys):
+    with pytest.raises(Ended) as ended, signals_raise():
+        Resource()
+        time.sleep(30.0)
+    assert ended.value.exit_code == 130
+    assert capsys.readouterr().err == ""
+
+
+def test_what_a_compiled_module_prints_of_a_signal_is_not_shown(capsys):
+    """Numpy prints what interrupts the import of its array interface."""
+    with signals_raise():
+        sys.excepthook(Ended, Ended(2), None)
+        assert capsys.readouterr().err == ""
+        sys.excepthook(ValueError, ValueError("of somebody else"), None)
+    assert "of somebody else" in capsys.readouterr().err
 
 
 def test_petsc_does_not_take_the_signals(root):
@@ -200,7 +226,7 @@ def importing(choice, options, comm):
             os.kill(os.getpid(), signal.SIGTERM)
 
     sys.addaudithook(told)
-    import macro
+    import macro.bodies
     print("went on")
 
 keys.print_schema = importing

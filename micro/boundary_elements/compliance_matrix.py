@@ -1,0 +1,84 @@
+"""The compliance of few cells as one matrix, whose linear systems are solved by factors.
+
+Where a rigid body can touch few cells of a large surface, the sum of all terms between these cells
+is a small matrix. A product with it takes microseconds, and Cholesky's factors of the cells in
+contact are an exact inverse for the conjugate gradients, which then end after a step or two.
+
+Theory: docs/theory.md, section 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from micro.boundary_elements.half_space_grid import Cells
+from support.arrays import Array
+
+
+class ComplianceMatrix:
+    """Compliance of n cells, a column of them, by its matrix; see `GridCompliance`.
+
+    Args:
+        matrix: Displacements of the cells by unit pressures / E* on them, shape (n, n) [mm].
+
+    Attributes:
+        products: Products with pressures so far.
+    """
+
+    def __init__(self, matrix: Array) -> None:
+        self._matrix = matrix
+        self._last: tuple[Cells, Array, tuple[Array, bool]] | None = None
+        self.products = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Size of the matrix [B]."""
+        return self._matrix.nbytes
+
+    def displacement(self, pressure: Array, out: Array | None = None) -> Array:
+        """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
+
+        Args:
+            pressure: The pressures, shape (n, 1).
+            out: Where the displacement is put; new memory if not given.
+        """
+        self.products += 1
+        return np.matmul(self._matrix, pressure, out=out)
+
+    def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
+        """Return the displacements of some cells by pressures on them, shape (m,) [mm]."""
+        self.products += 1
+        return np.asarray(self._among(cells)[0] @ pressure)
+
+    def inverse_on(self, cells: Cells) -> FactoredInverse:
+        """Return the inverse of the compliance of some cells."""
+        return FactoredInverse(self._among(cells)[1])
+
+    def _among(self, cells: Cells) -> tuple[Array, tuple[Array, bool]]:
+        """Return the matrix of some cells, and its factors."""
+        if self._last is None or self._last[0] is not cells:
+            part = self._matrix[np.ix_(cells.flat, cells.flat)]
+            try:
+                factors = cho_factor(part, lower=True, check_finite=False)
+            except LinAlgError:  # to rounding, or terms that err: conjugate gradients then iterate
+                factors = cho_factor(np.diag(np.diag(part)), lower=True)
+            self._last = cells, part, factors
+        return self._last[1:]
+
+
+class FactoredInverse:
+    """Inverse of the compliance of n cells by Cholesky's factors; see `ContactInverse`.
+
+    Args:
+        factors: The factors.
+    """
+
+    accurate = False  # pressures by free motions are not to be left out: they cost little
+
+    def __init__(self, factors: tuple[Array, bool]) -> None:
+        self._factors = factors
+
+    def __call__(self, displacement: Array) -> Array:
+        """Return the pressures that displace the cells so, shape (n,)."""
+        return np.asarray(cho_solve(self._factors, displacement, check_finite=False))

@@ -1,0 +1,188 @@
+"""Extension of displacements from the cells in contact to all cells, at low elastic energy.
+
+With the compliance C of a half-space and displacements u of the cells A in contact, the pressures
+on A are C_AA⁻¹ u. The energy of that is the least of all displacements of the whole surface that
+are u on A. So C_AA⁻¹ = Eᵀ C⁻¹ E, where E is the extension of least energy, and any other extension
+makes an approximate inverse whose energy is larger. Extension by zeros, which cuts C⁻¹ down to A,
+makes it too large by a factor that grows with the logarithm of the size of a contact over that of a
+cell, and with the size of the grid over the distance of the contacts.
+
+Around a contact of size a the least energy has a displacement that falls as a/r, until other
+contacts are near. A pyramid of grids, each half as fine, imitates that. Weights say how much a cell
+knows: 1 in contact and 0 elsewhere on the finest grid. On the next one they are a share of the sum
+over the four cells below, and 1 at most, so that those of a lone contact fall with the size of the
+cells. On the way back every cell takes what it does not know from the next coarser grid.
+
+Theory: docs/theory.md, section 4.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from micro.boundary_elements.half_space_grid import Cells
+from support.arrays import Array
+from support.cores import BLOCK, blocks, in_threads
+
+Field = NDArray[np.float32]
+
+_SHARE = 0.32
+"""Weight of a coarse cell over the sum of the weights of its four cells. On 33 rough contacts of
+512² cells, 2 to 97 % of which touch, solutions took 17.8 products with 0.4, 16.4 with 0.35, 16.1
+with 0.3 and 17.1 with 0.25."""
+_SMALLEST = 2
+"""Cells along the shorter side of the coarsest grid."""
+
+
+class Extension:
+    """Extension of values on some cells to all cells of a period, and its transpose.
+
+    Args:
+        cells: The cells.
+        period: Cells (mx, my) of the period, which holds them.
+    """
+
+    def __init__(self, cells: Cells, period: tuple[int, int]) -> None:
+        self._place = rows, columns = cells.rows[cells.row], cells.column
+        shape = _halved(period)
+        self._block = (rows // 2) * shape[1] + columns // 2
+        sums = np.bincount(self._block, minlength=shape[0] * shape[1])
+        weight = sums.reshape(shape).astype(np.float32)
+        self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
+        self._unknown: list[Field] = []  # of each level but the finest, what it does not know
+        while True:
+            limited = np.minimum(_SHARE * weight, np.float32(1.0))
+            self._scales.append(np.divide(limited, weight, out=weight, where=weight > 0.0))
+            self._unknown.append(np.float32(1.0) - limited)
+            if min(shape) <= _SMALLEST:
+                break
+            weight = _sums(limited)
+            shape = _halved(shape)
+
+    def extended(self, values: Array, out: Field) -> None:
+        """Extend values.
+
+        Args:
+            values: Of the cells, shape (n,).
+            out: Overwritten by their extension, shape (mx, my).
+        """
+        scales = self._scales
+        sums = np.bincount(self._block, values, minlength=scales[0].size)
+        known = [sums.reshape(scales[0].shape).astype(np.float32) * scales[0]]
+        for scale in scales[1:]:
+            known.append(scale * _sums(known[-1]))
+        field = known.pop()
+        for mine, unknown in zip(reversed(known), self._unknown[-2::-1], strict=True):
+            finer = np.empty_like(mine)
+            _interpolate(field, finer)
+            finer *= unknown
+            finer += mine
+            field = finer
+        _interpolate(field, out)
+        out[self._place] = values
+
+    def gathered(self, field: Field) -> Array:
+        """Return the transpose of `extended` times a field.
+
+        Args:
+            field: Shape (mx, my); overwritten.
+
+        Returns:
+            Shape (n,).
+        """
+        own = field[self._place].astype(float)
+        field[self._place] = 0.0
+        levels = [_collected(field)]
+        for unknown in self._unknown[:-1]:
+            levels.append(_collected(unknown * levels[-1]))
+        total = levels.pop() * self._scales[-1]
+        for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
+            level += _repeated(total, level.shape)
+            total = scale * level
+        own += total.ravel()[self._block]
+        return own
+
+
+def _halved(shape: tuple[int, int]) -> tuple[int, int]:
+    """Return the shape of the next coarser grid."""
+    return (shape[0] + 1) // 2, (shape[1] + 1) // 2
+
+
+def _sums(fine: Field) -> Field:
+    """Return sums over the cells of the next coarser grid."""
+    odd = [(0, n % 2) for n in fine.shape]
+    full = np.pad(fine, odd) if odd != [(0, 0), (0, 0)] else fine
+    rows = full[0::2] + full[1::2]
+    return np.asarray(rows[:, 0::2] + rows[:, 1::2])
+
+
+def _repeated(coarse: Field, shape: tuple[int, ...]) -> Field:
+    """Return on every cell the value of the coarse one that covers it: `_sums` transposed."""
+    rows = np.repeat(coarse, 2, axis=1)[:, : shape[1]]
+    return np.repeat(rows, 2, axis=0)[: shape[0]]
+
+
+def _interpolate(coarse: Field, out: Field) -> None:
+    """Interpolate linearly, and periodically, from the middles of coarse cells to fine ones."""
+    (rows, columns), (_, width) = coarse.shape, out.shape
+
+    def work(here: slice) -> None:
+        near = coarse[np.arange(here.start - 1, here.stop + 1) % rows]
+        quarter = np.float32(0.25) * near
+        middle = near[1:-1] - quarter[1:-1]
+        across = np.empty((2 * len(middle), columns + 2), np.float32)
+        inner = across[:, 1:-1]
+        np.add(middle, quarter[:-2], out=inner[0::2])
+        np.add(middle, quarter[2:], out=inner[1::2])
+        across[:, 0], across[:, -1] = across[:, -2], across[:, 1]
+        quarter = np.float32(0.25) * across
+        middle = across[:, 1:-1] - quarter[:, 1:-1]
+        fine = out[2 * here.start : 2 * here.stop]
+        some = slice(len(fine))
+        np.add(middle[some], quarter[some, :-2], out=fine[:, 0::2])
+        odd = width // 2
+        np.add(middle[some, :odd], quarter[some, 2 : odd + 2], out=fine[:, 1::2])
+
+    in_threads(work, blocks(rows, BLOCK // (16 * width)))
+
+
+def _collected(fine: Field) -> Field:
+    """Return the transpose of `_interpolate` times a field."""
+    height, width = fine.shape
+    rows, columns = _halved((height, width))
+    result = np.empty((rows, columns), np.float32)
+
+    def along(part: Field) -> Field:
+        """Collect in every row."""
+        even = np.empty((len(part), columns + 1), np.float32)
+        odd = np.zeros_like(even)
+        even[:, :-1], odd[:, 1 : width // 2 + 1] = part[:, 0::2], part[:, 1::2]
+        even[:, -1], odd[:, 0] = even[:, 0], odd[:, -1]
+        quarter = even[:, 1:] + odd[:, :-1]
+        quarter -= even[:, :-1]
+        quarter -= odd[:, 1:]
+        quarter *= np.float32(0.25)
+        quarter += even[:, :-1]
+        quarter += odd[:, 1:]
+        return quarter
+
+    def work(here: slice) -> None:
+        count = here.stop - here.start
+        even, odd = np.zeros((2, count + 1, columns), np.float32)
+        found = along(fine[2 * here.start : 2 * here.stop])
+        even[:-1], odd[1 : 1 + len(found) // 2] = found[0::2], found[1::2]
+        even[-1] = along(fine[2 * (here.stop % rows)][None])[0]
+        before = 2 * ((here.start - 1) % rows) + 1
+        if before < height:
+            odd[0] = along(fine[before][None])[0]
+        quarter = even[1:] + odd[:-1]
+        quarter -= even[:-1]
+        quarter -= odd[1:]
+        quarter *= np.float32(0.25)
+        quarter += even[:-1]
+        quarter += odd[1:]
+        result[here] = quarter
+
+    in_threads(work, blocks(rows, BLOCK // (16 * width)))
+    return result
