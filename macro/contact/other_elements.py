@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
+from geometry.meshes.block import BlockShape
 from macro.bodies import Block
 from macro.contact.face_contact_state import FaceContactState
 from macro.contact.face_pair import FacePair
@@ -86,7 +87,9 @@ def face_on_half(face: ContactFace) -> LoadedFace | None:
         return None
     block, patches = face.body, face.patches
     shape = block.mesh.shape
-    if min(shape.cells) < 4 or not isinstance(patches, Outline):
+    if not isinstance(shape, BlockShape) or not isinstance(patches, Outline):
+        return None
+    if min(shape.cells) < 4:
         return None
     x, y, z = (count // 2 for count in shape.cells)
     mesh = block_mesh(replace(shape, cells=(x, y, z)), block.comm)

@@ -25,6 +25,7 @@ from helpers.random_bodies import drawn, stated_and_true
 
 COMM = MPI.COMM_WORLD
 ALLOWED = 1.5  # true over stated
+ROUNDING = 1e-9  # of the force, to which Newton's method converges; a uniform state has no error
 
 
 def main():
@@ -32,13 +33,14 @@ def main():
     parser.add_argument("--bodies", type=int, default=20)
     parser.add_argument("--first", type=int, default=0)
     choice = parser.parse_args()
-    ratios = []
+    ratios, kept = [], 0
     for seed in range(choice.first, choice.first + choice.bodies):
         body, began = drawn(seed), time.process_time()
         found = stated_and_true(body, COMM)
         once, twice = (found.forces[-2:] - found.forces[0]) / found.load
         stated = np.array([found.mesh, found.quadrature]) / found.load
         ratios.append(abs(twice) / stated.sum())
+        kept += abs(twice) <= ALLOWED * stated.sum() + ROUNDING
         if COMM.rank == 0:
             print(
                 f"| {seed} | {body.name} | {found.dofs[0]} | {stated[0]:.2e} | {stated[1]:.2e} | "
@@ -47,9 +49,8 @@ def main():
                 flush=True,
             )
     if COMM.rank == 0:
-        kept = np.array(ratios) <= ALLOWED
         print(
-            f"true within {ALLOWED} × stated: {kept.sum()} of {len(kept)}; true over stated in the "
+            f"true within {ALLOWED} × stated: {kept} of {len(ratios)}; true over stated in the "
             f"median {np.median(ratios):.2f}, at most {max(ratios):.2f}"
         )
 

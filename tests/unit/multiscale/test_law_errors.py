@@ -97,6 +97,15 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
     assert history.steps[-1].force_error_N > 0.0
 
 
+@pytest.mark.parametrize(("accuracy", "kept"), [(0.4, True), (0.001, False)])
+def test_an_accuracy_is_kept_or_said_not_to_be(mesh, accuracy, kept):
+    history = run(scene(mesh, accuracy=accuracy, law={"kind": "representative"}))
+    step = history.steps[-1]
+    assert history.accuracy.kept is kept
+    assert history.accuracy.error == pytest.approx(step.force_error_N / step.force_N, rel=1e-12)
+    assert ("is not kept" in history.notes[0]) is not kept
+
+
 def test_blocks_of_many_linear_cells_are_compared_with_fewer(mesh, monkeypatch):
     monkeypatch.setattr(law_errors, "MOST_CHECKED_UNKNOWNS", 500)
     block = {**CONSTANTS, "lengths": [1.1, 0.9], "height": 0.8}
