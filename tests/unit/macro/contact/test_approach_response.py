@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from helpers.body_meshes import box, hanging, standing
+from helpers.body_meshes import HIGH, box, hanging, standing
 
 from geometry import Material, PatchGrid
 from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem
+from macro import FacePair, LawContactProblem, Traction
 from macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
@@ -96,3 +96,19 @@ def test_two_bodies_change_their_elements_together():
     found = again.solve(control).force
     assert finer.body.dofs == sum(quadratic_dofs(each.body) for each in (both.first, both.second))
     assert 0.7 * known.force < found < 0.999 * known.force  # linear elements are too stiff
+
+
+def test_solutions_are_carried_to_other_elements_with_their_preload():
+    mesh = box((0, 0, -0.7), (1.3, 0.9, 0), (4, 3, 3))
+    pulled = {"tractions": [Traction(tag=HIGH, stress=(0.7, 0.2, -1.1))]}
+    linear, quadratic = (standing(mesh, SOFT, PATCHES, order, **pulled) for order in (1, 2))
+    control = Control(approach=9.3e-3)
+    known = problem(linear).solve(control)
+    finer = face_on(linear, lambda body: body.as_quadratic())
+    again = problem(finer)
+    start_from_elements(again, finer, known, linear)
+    expected = problem(face_on(quadratic, lambda body: body)).solve(control).force
+    assert abs(expected / known.force - 1.0) > 1e-3
+    coarse = face_on(finer, lambda body: linear.body)  # has the quadrature of the linear face
+    assert problem(coarse).solve(control).force == pytest.approx(known.force, rel=1e-9)
+    assert again.solve(control).force == pytest.approx(expected, rel=1e-4)  # at points of other degrees
