@@ -30,15 +30,21 @@ if TYPE_CHECKING:  # the names that this module has, see `LazyPackage`
     from macro import ContactProblem, Interface, LawOperator, vector_space
     from micro import HalfSpaceModel
     from multiscale import (
+        BodyFields,
         Comparison,
+        ContactHistory,
+        Difference,
         History,
         LawTable,
         LoadStep,
         Run,
         Scene,
         compare,
+        difference,
         export_laws,
         make_setup,
+        read_contact,
+        read_fields,
         read_history,
         read_laws,
         representative_law,

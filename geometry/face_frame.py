@@ -47,8 +47,13 @@ class FaceFrame:
         object.__setattr__(self, "axes", axes)
 
     @classmethod
-    def across(cls, normal: ArrayLike, origin: Sequence[float] | Array = (0, 0, 0)) -> FaceFrame:
-        """Return the frame with the default axes of a normal.
+    def across(
+        cls,
+        normal: ArrayLike,
+        origin: Sequence[float] | Array = (0, 0, 0),
+        along: Sequence[float] | None = None,
+    ) -> FaceFrame:
+        """Return the frame with the default axes of a normal, or along a direction.
 
         e1 is the global x axis made perpendicular to the normal n, or the global y axis where n is
         within 30 degrees of ±x; e2 = n × e1. For the top of a block these are x, y and z.
@@ -56,9 +61,10 @@ class FaceFrame:
         Args:
             normal: Outward normal, of any length, shape (3,).
             origin: Point of the plane with coordinates (0, 0), shape (3,) [mm].
+            along: Direction, of any length, that e1 is instead of x or y, shape (3,).
 
         Raises:
-            InputError: When the normal is no direction.
+            InputError: When the normal is no direction, or ``along`` has no part across it.
         """
         n = np.asarray(normal, dtype=float)
         if n.shape != (3,) or not np.isfinite(n).all() or not n.any():
@@ -72,14 +78,24 @@ class FaceFrame:
         n = np.where(np.abs(n) < 1e-12, 0.0, n)  # exactly across an axis but for rounding
         n /= np.linalg.norm(n)
         near_x = abs(n[0]) > np.cos(np.pi / 6.0) + 1e-9  # 30° sharp is not, whatever its rounding
-        along = np.array([0.0, 1.0, 0.0] if near_x else [1.0, 0.0, 0.0])
-        e1 = along - (along @ n) * n
-        e1 /= np.linalg.norm(e1)
+        default = (0.0, 1.0, 0.0) if near_x else (1.0, 0.0, 0.0)
+        wanted = np.array(default if along is None else along, dtype=float)
+        e1 = wanted - (wanted @ n) * n
+        length = np.linalg.norm(e1)
+        if not length > 1e-6 * np.linalg.norm(wanted):
+            raise InputError(
+                "the first axis of a face is along its normal, or no direction",
+                value=wanted.tolist(),
+                allowed=f"a direction across {np.round(n, 6).tolist()}",
+            )
+        e1 /= length
         axes = np.stack([e1, np.cross(n, e1), n]) + 0.0  # no negative zeros
         return cls(origin=np.asarray(origin, dtype=float), axes=axes)
 
     @classmethod
-    def through(cls, points: ArrayLike, normal: ArrayLike) -> FaceFrame:
+    def through(
+        cls, points: ArrayLike, normal: ArrayLike, along: Sequence[float] | None = None
+    ) -> FaceFrame:
         """Return the frame of a planar face, with default axes and the face's lower corner.
 
         The origin is the lower corner of the bounding rectangle of the points in (e1, e2), at the
@@ -88,14 +104,15 @@ class FaceFrame:
         Args:
             points: Points of the face, of all ranks together, shape (n, 3) [mm].
             normal: Outward normal of the face, of any length, shape (3,).
+            along: Direction of the first axis, see `across`.
 
         Raises:
-            InputError: When there are no points, or the normal is no direction.
+            InputError: When there are no points, or the axes are no directions.
         """
         places = np.asarray(points, dtype=float).reshape(-1, 3)
         if not len(places):
             raise InputError("a face without points has no frame")
-        frame = cls.across(normal)
+        frame = cls.across(normal, along=along)
         local = places @ frame.axes.T
         corner = np.array([*local[:, :2].min(axis=0), local[:, 2].max()])
         return cls(origin=corner @ frame.axes, axes=frame.axes)

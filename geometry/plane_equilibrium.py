@@ -140,10 +140,10 @@ class _FreeMotions(Generic[T]):
     def trial(self, plane: Array) -> _Trial[T]:
         """Evaluate the contacts under a plane (3,)."""
         response = self._respond(plane)
-        loads = response.loads * self._scale
+        loads = response.loads
         if not np.isfinite(loads).all():
             raise plane_failure(self._control, "NOT_A_NUMBER")
-        residual = (loads - self._control.loads)[self._free]
+        residual = ((loads - self._control.loads) * self._scale)[self._free]
         return _Trial(plane, residual, float(loads[0]), response)
 
     def begun(self, plane: Array, first_touch: float | None) -> _Trial[T]:

@@ -37,7 +37,11 @@ class Control:
             force is prescribed.
         force: Normal force, ≥ 0 [N]; None when the approach is prescribed.
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
-            the plane turn until the pressures have no moment about the middle.
+            the plane turn until the pressures have the prescribed moment about the middle.
+        moment: First moments of the pressures about the middle where the plane turns, as bolts
+            prescribe them [N mm]; laws on a mesh alone follow them.
+        body_state: Position among the states of what else loads the bodies, which none of them
+            changes by itself: 0.25 is a quarter of the way from the first state to the second.
 
     Raises:
         InputError: When not exactly one of approach and force is given, or a number is not finite
@@ -47,6 +51,8 @@ class Control:
     approach: float | None = None
     force: float | None = None
     tilt: tuple[float, float] | None = (0.0, 0.0)
+    moment: tuple[float, float] = (0.0, 0.0)
+    body_state: float = 0.0
 
     def __post_init__(self) -> None:
         if (self.approach is None) == (self.force is None):
@@ -70,8 +76,8 @@ class Control:
 
     @property
     def loads(self) -> Array:
-        """Loads along free motions: the force, and no moments, shape (3,) [N, N mm]."""
-        return np.array([self.force or 0.0, 0.0, 0.0])
+        """Loads along free motions: the force and the moments, shape (3,) [N, N mm]."""
+        return np.array([self.force or 0.0, *self.moment])
 
     @property
     def free(self) -> Flags:

@@ -16,11 +16,13 @@ from macro.contact.law_operator import LawsAtPoints as LawsAtPoints
 from macro.contact.law_problem import LawContactProblem as LawContactProblem
 from macro.contact.loaded_face import LoadedFace as LoadedFace
 from macro.contact.loaded_face import displacements_under as displacements_under
+from macro.contact.loaded_face import largest_rise as largest_rise
 from macro.contact.loaded_face import patch_compliance_matrix as patch_compliance_matrix
 from macro.contact.rough_face import RoughFace as RoughFace
 from macro.contact.unilateral_problem import UnilateralContactProblem as UnilateralContactProblem
 from macro.contact.unilateral_problem import nodal_contact as nodal_contact
 from macro.elastic_body import ElasticBody as ElasticBody
+from macro.fields import FieldStep as FieldStep
 from macro.fields import write_fields as write_fields
 from macro.fields import write_rough_fields as write_rough_fields
 from macro.mesh.block import BOTTOM as BOTTOM
@@ -32,8 +34,10 @@ from macro.mesh.block import rough_block_mesh as rough_block_mesh
 from macro.mesh.contact_face import ContactFacets as ContactFacets
 from macro.mesh.contact_face import contact_facets as contact_facets
 from macro.mesh.from_file import read_mesh as read_mesh
+from macro.mesh.supports import Loads as Loads
 from macro.mesh.supports import Support as Support
 from macro.mesh.supports import Traction as Traction
+from macro.mesh.supports import check_loads as check_loads
 from macro.mesh.supports import check_supports as check_supports
 from macro.mesh.tagged import TaggedMesh as TaggedMesh
 from macro.mesh.tagged import planar_face as planar_face

@@ -17,7 +17,7 @@ from geometry.materials import Material
 from macro.elastic_body import ElasticBody, Held
 from macro.linear_solvers.multigrid import Lattice, lattice_of
 from macro.mesh.block import FLAT, BlockMesh
-from macro.mesh.supports import Support, Traction
+from macro.mesh.supports import Loads, Support
 from macro.mesh.tagged import TaggedMesh
 from support.collective import together
 from support.errors import InputError
@@ -104,7 +104,8 @@ class MeshedBody(ElasticBody):
         mesh: The mesh with its markers.
         materials: Elastic constants by marker of the volumes, or those of the whole body.
         supports: Surfaces whose displacement is prescribed; they must hold the body.
-        tractions: Loaded surfaces, beside the contact.
+        loads: What loads it beside contact and supports: one state, or several that load steps
+            pass from one to the next.
         normal: Direction out of the contact face, along which `reaction` is taken, shape (3,).
         order: Degree of the displacements, 1 or 2.
 
@@ -118,7 +119,7 @@ class MeshedBody(ElasticBody):
     mesh: TaggedMesh
     materials: Material | Mapping[int, Material]
     supports: Sequence[Support]
-    tractions: Sequence[Traction] = ()
+    loads: Sequence[Loads] = (Loads(),)
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
     order: int = 1
 

@@ -5,7 +5,7 @@ Theory: section 11 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -22,7 +22,7 @@ from macro.linear_solvers.node_matrices import Stiffened
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver
 from macro.linear_solvers.solvers import solve_linear
-from macro.mesh.supports import Traction
+from macro.mesh.supports import Loads, Traction
 from support.arrays import Array
 from support.errors import InputError
 
@@ -68,6 +68,11 @@ def stiffness_form(space: Any, lame: tuple[Any, Any], quadrature_degree: int) ->
     return ufl.inner(stress(trial, (first, shear)), strain(test)) * dx
 
 
+def _vector(mesh: Any, values: Any) -> Any:
+    """Return a constant vector, as UFL."""
+    return fem.Constant(mesh, np.array(values, PETSc.ScalarType))
+
+
 def rigid_body_modes(points: Array, comm: Any) -> PETSc.NullSpace:
     """Return the six rigid body modes of nodes, the near-nullspace for algebraic multigrid.
 
@@ -110,7 +115,8 @@ class ElasticBody:
     Attributes:
         mesh: Its dolfinx mesh as ``mesh.mesh``, and ``mesh.facet_tags``.
         normal: Direction out of the contact face, along which `reaction` is taken, shape (3,).
-        tractions: Loaded surfaces, beside the contact.
+        loads: What loads it beside contact and supports: one state, or several that load steps
+            pass from one to the next.
         materials: Elastic constants of the whole body, or by marker of the volumes.
         degree: Polynomial degree of the displacements.
         held: What the supports prescribe.
@@ -122,7 +128,7 @@ class ElasticBody:
 
     mesh: Any
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    tractions: Sequence[Traction] = ()
+    loads: Sequence[Loads] = (Loads(),)
     materials: Any
     degree: Any
     held: Any
@@ -302,27 +308,67 @@ class ElasticBody:
             supported[part.dofs] = True
         return supported
 
-    @cached_property
-    def preload(self) -> Array | None:
-        """Displacements without contact, this rank's owned ones [mm]; None where there are none.
+    def preload(self, state: float = 0.0) -> Array | None:
+        """Return the displacements without contact, this rank's owned ones [mm].
 
-        They follow from tractions, and from supports that move.
+        They follow from tractions, temperatures, and supports that move.
+
+        Args:
+            state: Position among the states in `loads`: 0.25 is a quarter of the way from the
+                first to the second.
+
+        Returns:
+            Shape (owned_dofs,); None where nothing loads the body.
         """
-        moved = any(part.value for part in self.held)
-        if not moved and not self.tractions:
+        if not self.is_preloaded:
             return None
-        prescribed = fem.Function(self.space)
-        for part in self.held:
-            prescribed.x.array[part.dofs] = part.value
-        load = self.stiffness.createVecRight()
-        if moved:
-            load.axpy(-1.0, self._product(prescribed))
-        if self.tractions:
-            load.axpy(1.0, self._traction_load())
-        load.pointwiseMult(load, self.free)
-        solution = self.stiffness.createVecRight()
-        solve_linear(self.solver, load, solution)
-        return np.asarray(solution.array_r + prescribed.x.array[: self.owned_dofs])
+        first = min(int(state), len(self.loads) - 1)
+        share = state - first
+        found = self._preload_by(self.loads[first])
+        if share:
+            found = (1.0 - share) * found + share * self._preload_by(self.loads[first + 1])
+        return found
+
+    def free_strain(self, state: float = 0.0) -> Array:
+        """Return the strain of this rank's cells by temperature alone, shape (cells,).
+
+        Args:
+            state: Position among the states in `loads`, see `preload`.
+        """
+        first = min(int(state), len(self.loads) - 1)
+        found, share = self._cell_strain(self.loads[first]), state - first
+        if share:
+            found = (1.0 - share) * found + share * self._cell_strain(self.loads[first + 1])
+        return found
+
+    @property
+    def is_preloaded(self) -> bool:
+        """Whether anything but contact moves the body."""
+        return any(part.value for part in self.held) or any(one != Loads() for one in self.loads)
+
+    @cached_property
+    def _preloads(self) -> dict[Loads, Array]:
+        """Displacements by loads, as far as they were found."""
+        return {}
+
+    def _preload_by(self, loads: Loads) -> Array:
+        """Return the displacements by loads and by supports that move [mm]."""
+        if loads not in self._preloads:
+            prescribed = fem.Function(self.space)
+            for part in self.held:
+                prescribed.x.array[part.dofs] = part.value
+            load = self.stiffness.createVecRight()
+            if any(part.value for part in self.held):
+                load.axpy(-1.0, self._product(prescribed))
+            for form in self._load_forms(loads):
+                load.axpy(1.0, compat.assemble_vector(compat.compile_form(form)))
+            load.pointwiseMult(load, self.free)
+            solution = self.stiffness.createVecRight()
+            if load.norm():
+                solve_linear(self.solver, load, solution)
+            whole = solution.array_r + prescribed.x.array[: self.owned_dofs]
+            self._preloads[loads] = np.asarray(whole)
+        return self._preloads[loads]
 
     def reaction(self, displacement: PETSc.Vec) -> float:
         """Return the force that the supports bear against contact pressures, from nodal residuals.
@@ -347,14 +393,54 @@ class ElasticBody:
         """Return the product of the unconstrained stiffness and a function [N]."""
         return compat.assemble_vector(compat.compile_form(ufl.action(self.form, function)))
 
-    def _traction_load(self) -> PETSc.Vec:
-        test, mesh = ufl.TestFunction(self.space), self.mesh.mesh
-        ds = ufl.Measure("ds", domain=mesh, subdomain_data=self.mesh.facet_tags)
-        stresses = [
-            fem.Constant(mesh, np.array(each.stress, PETSc.ScalarType)) for each in self.tractions
-        ]
-        terms = [
-            ufl.inner(stress, test) * ds(each.tag)
-            for stress, each in zip(stresses, self.tractions, strict=True)
-        ]
-        return compat.assemble_vector(compat.compile_form(sum(terms[1:], terms[0])))
+    def _load_forms(self, loads: Loads) -> Iterator[Any]:
+        """Yield the virtual work of tractions, of pressures, and of stresses by temperature."""
+        test = ufl.TestFunction(self.space)
+        for each in loads.on_surfaces:
+            yield ufl.inner(self._stress_on(each), test) * self._ds(each.tag)
+        if any(strain for _, strain in loads.strain):
+            first, shear = (np.asarray(one) for one in self.cell_lame)
+            stress = (3.0 * first + 2.0 * shear) * self._cell_strain(loads)
+            dx = ufl.Measure("dx", domain=self.mesh.mesh)
+            yield compat.cell_constant(self.mesh.mesh, stress) * ufl.div(test) * dx
+
+    def pull_moments(self, loads: Loads, origin: Array, axes: Array) -> Array:
+        """Return the first moments of the pulls about a point, along their direction, (2,) [N mm].
+
+        Args:
+            loads: The loads.
+            origin: The point, shape (3,) [mm].
+            axes: Unit vectors along the two levers, shape (2, 3).
+
+        Note:
+            Collective.
+        """
+        mesh, moments = self.mesh.mesh, np.zeros(2)
+        normal = _vector(mesh, self.normal)
+        arm = ufl.SpatialCoordinate(mesh) - _vector(mesh, origin)
+        for each in loads.pulls:
+            for k, axis in enumerate(axes):
+                along = ufl.inner(arm, _vector(mesh, axis))
+                work = ufl.inner(self._stress_on(each), normal) * along * self._ds(each.tag)
+                moments[k] += fem.assemble_scalar(compat.compile_form(work))
+        return np.asarray(self.comm.allreduce(moments))
+
+    def _stress_on(self, traction: Traction) -> Any:
+        """Return the force per area on a loaded surface, as UFL [MPa]."""
+        mesh = self.mesh.mesh
+        against = fem.Constant(mesh, PETSc.ScalarType(traction.pressure))
+        stress = _vector(mesh, traction.stress)
+        return stress - against * ufl.FacetNormal(mesh)
+
+    @cached_property
+    def _ds(self) -> Any:
+        """Measure of the marked surfaces."""
+        return ufl.Measure("ds", domain=self.mesh.mesh, subdomain_data=self.mesh.facet_tags)
+
+    def _cell_strain(self, loads: Loads) -> Array:
+        """Return the free strain of this rank's cells, ghosts included, shape (cells,)."""
+        cells, tags = self.mesh.mesh.topology.index_map(3), self.mesh.cell_tags
+        strain = np.zeros(cells.size_local + cells.num_ghosts)
+        for tag, value in loads.strain:
+            strain[slice(None) if tag is None else tags.find(tag)] = value
+        return strain

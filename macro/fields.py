@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 import numpy as np
@@ -32,9 +32,23 @@ Pressures = Array | None
 quadrature points, shape (points,) [MPa]; None leaves them out."""
 
 
-def write_fields(
-    path: Path | str, face: LoadedFace, steps: Iterable[tuple[int, Array, Pressures]]
-) -> None:
+class FieldStep(NamedTuple):
+    """What the fields of a load step are made from.
+
+    Attributes:
+        number: Number of the load step.
+        displacement: This rank's owned displacements, dof by dof [mm].
+        pressures: The contact pressures.
+        body_state: Position among the states of the body's loads.
+    """
+
+    number: int
+    displacement: Array
+    pressures: Pressures
+    body_state: float = 0.0
+
+
+def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep]) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of load steps as XDMF.
 
     The numbers of the load steps are the times. A stress, and its equivalent by von Mises, is that
@@ -47,8 +61,7 @@ def write_fields(
     Args:
         path: File to write, ending in ``.xdmf``; an HDF5 file goes beside it.
         face: Patches on the contact face of a body.
-        steps: Number of each load step, this rank's owned displacements, dof by dof [mm], and the
-            pressures.
+        steps: The load steps.
 
     Note:
         Collective.
@@ -56,11 +69,11 @@ def write_fields(
     body = face.body
 
     def functions() -> Iterator[tuple[int, list[Any]]]:
-        for number, displacement, pressure in steps:
-            moved = body.function(displacement)
-            write_vtx(number, moved)
+        for step in steps:
+            moved, pressure = body.function(step.displacement), step.pressures
+            write_vtx(step.number, moved)
             shown = [] if pressure is None else [_facet_pressures(face, pressure)]
-            yield number, [*_of_body(body, moved), *shown]
+            yield step.number, [*_of_body(body, moved, step.body_state), *shown]
 
     with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())
@@ -96,12 +109,13 @@ def write_rough_fields(
     _write_xdmf(str(path), mesh, functions())
 
 
-def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
+def cell_stresses(body: ElasticBody, displacement: Any, body_state: float = 0.0) -> Array:
     """Return the stresses at the middles of this rank's cells, shape (cells, 3, 3) [MPa].
 
     Args:
         body: The body.
         displacement: Its displacements, ghosts up to date.
+        body_state: Position among the states of its loads, whose temperatures strain it freely.
     """
     mesh = body.mesh.mesh
     name, geometry = mesh.topology.cell_name(), compat.cell_vertices(mesh)
@@ -117,18 +131,19 @@ def cell_stresses(body: ElasticBody, displacement: Any) -> Array:
     strain = gradient(moved, compat.cell_nodes(body.space), body.degree) @ np.linalg.inv(
         gradient(mesh.geometry.x, geometry, compat.geometry_degree(mesh))
     )
-    strain = 0.5 * (strain + np.swapaxes(strain, 1, 2))
+    free = body.free_strain(body_state)[:, None, None] * np.eye(3)
+    strain = 0.5 * (strain + np.swapaxes(strain, 1, 2)) - free
     first, shear = (np.asarray(constant)[..., None, None] for constant in body.cell_lame)
     dilation = np.trace(strain, axis1=1, axis2=2)[:, None, None]
     return np.asarray(first * dilation * np.eye(3) + 2.0 * shear * strain)
 
 
-def _of_body(body: ElasticBody, displacement: Any) -> list[Any]:
+def _of_body(body: ElasticBody, displacement: Any, body_state: float = 0.0) -> list[Any]:
     """Return displacement, stress and von Mises' stress, as XDMF files can hold them."""
     mesh = body.mesh.mesh
     space = compat.vector_space(mesh, compat.geometry_degree(mesh))  # all that files can hold
     shown = _interpolated(space, displacement, "displacement")
-    values = cell_stresses(body, displacement)
+    values = cell_stresses(body, displacement, body_state)
     equivalent = compat.cell_constant(mesh, von_mises(values), "von_Mises")
     return [shown, compat.cell_constant(mesh, values, "stress"), equivalent]
 

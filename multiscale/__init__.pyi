@@ -15,6 +15,10 @@ from multiscale.laws.representative import representative_laws as representative
 from multiscale.loading.load_history import LoadHistory as LoadHistory
 from multiscale.loading.load_step import LoadStep as LoadStep
 from multiscale.loading.stepper import load_steps as load_steps
+from multiscale.results.body_fields import BodyFields as BodyFields
+from multiscale.results.body_fields import read_fields as read_fields
+from multiscale.results.contact_history import ContactHistory as ContactHistory
+from multiscale.results.contact_history import read_contact as read_contact
 from multiscale.results.extrapolation import extrapolated as extrapolated
 from multiscale.results.history import History as History
 from multiscale.results.reading import read_history as read_history
@@ -24,5 +28,7 @@ from multiscale.scene.scene import Scene as Scene
 from multiscale.setup import make_setup as make_setup
 from multiscale.studies.comparison import Comparison as Comparison
 from multiscale.studies.comparison import compare as compare
+from multiscale.studies.difference import Difference as Difference
+from multiscale.studies.difference import difference as difference
 from multiscale.studies.sweep import SweepResults as SweepResults
 from multiscale.studies.sweep import sweep as sweep

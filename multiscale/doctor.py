@@ -294,6 +294,7 @@ def _use_all_forms(element: str) -> None:
     from geometry.patches import PatchGrid
     from macro import (
         Block,
+        FieldStep,
         LoadedFace,
         Material,
         UnilateralContactProblem,
@@ -308,4 +309,5 @@ def _use_all_forms(element: str) -> None:
     block.reaction(rest)
     face = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
     with tempfile.TemporaryDirectory() as folder:
-        write_fields(Path(folder) / "fields.xdmf", face, [(0, rest.array_r, np.zeros(1))])
+        at_rest = FieldStep(0, rest.array_r, np.zeros(1))
+        write_fields(Path(folder) / "fields.xdmf", face, [at_rest])

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -83,11 +84,15 @@ class LawErrorProbe:
     probe_of: Callable[[RegionSamples, Surface], ErrorProbe]
     comm: Any = None
 
-    def measure(self, *, turns: bool) -> MeasuredErrors:
+    @cached_property
+    def control(self) -> Control:
+        """What prescribes the plane of the load step, by its approach."""
+        return self.problem.same_approach()
+
+    def measure(self) -> MeasuredErrors:
         """Measure the errors of the force at the approach.
 
-        Args:
-            turns: Whether the plane is free to turn. It then turns in every comparison.
+        A plane that is free to turn does so in every comparison.
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -98,7 +103,7 @@ class LawErrorProbe:
         causes = causes_of(self.samples)
         if not self.state.force:
             return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
-        response = self.problem.approach_response(turns=turns)
+        response = self.problem.approach_response()
         closure, patch = response.closure, response.sampling.patch
         pressure = self.state.sample_pressure
 
@@ -112,7 +117,7 @@ class LawErrorProbe:
                 found[here] = function(law, closure[here])
             return found
 
-        mesh, quadrature = self.discretisation(turns)
+        mesh, quadrature = self.discretisation()
         factors = np.array([mean_error(region.surfaces) for region in self.samples])
         scatter = by_region(lambda law, c: law.pressure_scatter(c))
         parts = {
@@ -135,13 +140,10 @@ class LawErrorProbe:
 
     # --- elements
 
-    def discretisation(self, turns: bool) -> tuple[float, float]:
+    def discretisation(self) -> tuple[float, float]:
         """Return the errors of the force by elements and by quadrature [N].
 
         The first is infinite where the elements are linear and quadratic ones too many.
-
-        Args:
-            turns: As for `measure`.
 
         Note:
             Collective.
@@ -149,22 +151,21 @@ class LawErrorProbe:
         from macro.contact.other_elements import bodies_of, face_on
 
         own, force = bodies_of(self.face), self.state.force
-        points = self._force_on(face_on(self.face, lambda body: body, finer=True), turns)
+        points = self._force_on(face_on(self.face, lambda body: body, finer=True))
         mesh = 0.0
         if any(body.degree == 2 for body in own):
             lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
-            mesh += OF_QUADRATIC * abs(self._force_on(lowered, turns) - force)
+            mesh += OF_QUADRATIC * abs(self._force_on(lowered) - force)
         if any(body.degree == 1 for body in own):
-            mesh += self._of_linear(own, points, turns)
+            mesh += self._of_linear(own, points)
         return mesh, abs(points - force)
 
-    def _of_linear(self, own: Sequence[Any], points: float, turns: bool) -> float:
+    def _of_linear(self, own: Sequence[Any], points: float) -> float:
         """Return the error of linear elements [N]; infinite where it is not measured.
 
         Args:
             own: The bodies.
             points: Force on them with a finer quadrature [N].
-            turns: As for `measure`.
         """
         from macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
 
@@ -177,34 +178,32 @@ class LawErrorProbe:
 
         if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
             other: Any = face_on(self.face, raised, finer=True)
-            error = OF_LINEAR * abs(self._force_on(other, turns) - points)
+            error = OF_LINEAR * abs(self._force_on(other) - points)
         else:
             other = face_on_half(self.face)
             if other is None:
                 return math.inf
             made.append(other.body)
-            error = OF_HALF * abs(self._force_on(other, turns, same=False) - self.state.force)
+            error = OF_HALF * abs(self._force_on(other, same=False) - self.state.force)
         del other
         free_bodies(made)
         return error
 
-    def _force_on(self, face: Any, turns: bool, *, same: bool = True) -> float:
+    def _force_on(self, face: Any, *, same: bool = True) -> float:
         """Return the force under the same plane on another face [N].
 
         Args:
             face: The face.
-            turns: As for `measure`.
             same: Whether its meshes are the same.
         """
         from macro.contact.other_elements import start_from_elements
 
-        problem, plane = self.problem_of(face), self.state.plane
+        problem = self.problem_of(face)
         if same:
-            start_from_elements(problem, face, self.state, self.face)
+            start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
             problem.start_from(self.state.patch_pressure)
-        tilt = None if turns else plane.tilt
-        return problem.solve(Control(approach=plane.approach, tilt=tilt)).force
+        return problem.solve(self.control).force
 
     # --- samples
 

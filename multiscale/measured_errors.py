@@ -286,7 +286,8 @@ def checked(
     Note:
         Collective.
     """
-    by_force, turns = load_history.quantity == "force", load_history.slopes is None
+    by_force = load_history.quantity_in(step.stage) == "force"
+    turns = load_history.slopes is None
     plane = step.force_N, step.approach_mm, step.tilt
 
     def measured() -> MeasuredErrors:

@@ -139,7 +139,7 @@ class Run:
 
     def _has_unloaded(self) -> bool:
         """Tell whether the load was larger at an earlier load step."""
-        return self.position.is_below_past(self.coupling.load_history)
+        return self.position.is_below_past
 
     @property
     def finished(self) -> bool:
@@ -206,7 +206,8 @@ class Run:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
         coupling, zero = self.coupling, self.coupling.zero
         steps, record = coupling.with_mesh_errors(self.steps)
-        by_force = coupling.load_history.quantity == "force"
+        last_stage = self.steps[-1].stage if self.steps else None
+        by_force = coupling.load_history.quantity_in(last_stage) == "force"
         unmeasured = coupling.unmeasured()
         accuracy = verdict(steps, self.given.accuracy, unmeasured, by_force=by_force)
         return History(

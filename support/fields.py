@@ -67,6 +67,8 @@ Pressure = Annotated[float, Unit("MPa")]
 PositivePressure = Annotated[float, Unit("MPa"), Positive]
 Slope = Annotated[float, Unit("")]
 Count = Annotated[int, Limits(ge=1, le=1_000_000_000)]
+Tag = str | Annotated[int, Limits(ge=0)]
+"""Physical name or number of a face in a mesh."""
 Heights = Annotated[int, Limits(ge=4, le=1_000_000_000)]
 """Number of heights along a side; fewer than four have no cubic interpolant."""
 

@@ -12,7 +12,7 @@ Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raise
 
 Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
 rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names:
-volume `flange`, surfaces `raised face`, `washers` and `pipe end`.
+volume `flange`, surfaces `raised face`, `washers`, `bore` and `pipe end`.
 """
 
 from math import cos, pi, sin
@@ -29,6 +29,13 @@ BOLTS, HOLE, WASHER = 62.5, 9.0, 15.0
 def cylinder(z: float, height: float, radius: float, x: float = 0.0, y: float = 0.0) -> tuple:
     """Return an upright cylinder."""
     return 3, gmsh.model.occ.addCylinder(x, y, z, 0, 0, height, radius)
+
+
+def around_axis(radius: float) -> list[int]:
+    """Return the surfaces that lie on an upright cylinder about the axis."""
+    wide = radius + 1e-3
+    box = gmsh.model.getEntitiesInBoundingBox(-wide, -wide, -1e3, wide, wide, 1e3, 2)
+    return [tag for _, tag in box if gmsh.model.getType(2, tag) == "Cylinder"]
 
 
 def build(size: float) -> None:
@@ -53,6 +60,7 @@ def build(size: float) -> None:
     name(2, in_plane(TOP, FACE + 1), "raised face")
     name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
     name(2, in_plane(-NECK, PIPE + 1), "pipe end")
+    name(2, around_axis(BORE), "bore")
 
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
     set_size(f"{size} * (1 + 0.15 * {away})")  # coarser with the distance from the face's rim

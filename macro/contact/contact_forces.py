@@ -113,6 +113,7 @@ class ContactForces:
         gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
 
     Attributes:
+        gap: The gap; set it anew where other loads of the body change it.
         laws: The laws of all patches.
         levers: Levers of this rank's samples about the middle of the patches.
         plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
@@ -137,7 +138,7 @@ class ContactForces:
         self.levers = PlaneLevers.at(
             sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
         )
-        self._gap = gap
+        self.gap = gap
         self.plane: Array = np.zeros(3)
         self.control = Control(approach=0.0)
         self._unloaded = False
@@ -175,7 +176,7 @@ class ContactForces:
 
         def closure(plane: Array) -> Array:
             # no other order of the sums: first touch is found to the last digit of closures
-            return matrix @ plane - self._gap - displacement
+            return matrix @ plane - self.gap - displacement
 
         def respond(plane: Array) -> PlaneResponse[Array]:
             closed = closure(plane)
@@ -209,11 +210,10 @@ class ContactForces:
             stiffness: Their stiffnesses, shape (n,) [MPa/mm].
         """
         levers, free, weight = self.levers, self.control.free, self._sampling.weight
-        closure = levers.matrix @ self.plane - self._gap - displacement
+        closure = levers.matrix @ self.plane - self.gap - displacement
         if not free.any():
             return closure
-        missing = np.array([self.control.force or 0.0, 0.0, 0.0])
-        missing -= levers.loads(weight * pressure(closure))
+        missing = self.control.loads - levers.loads(weight * pressure(closure))
         unit = levers.unit[free]
         resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
         scaled = np.linalg.lstsq(
@@ -221,7 +221,7 @@ class ContactForces:
         )
         self.plane = self.plane.copy()
         self.plane[free] += unit * scaled[0]
-        return levers.matrix @ self.plane - self._gap - displacement
+        return levers.matrix @ self.plane - self.gap - displacement
 
     def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
         """Write the forces B p(c(u)) at a displacement u.

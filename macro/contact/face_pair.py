@@ -119,10 +119,9 @@ class BodyPair:
         both = self.body, self.counter
         return self.solver if stiffened is None else joint_solver(both, self.stiffness, stiffened)
 
-    @cached_property
-    def preload(self) -> Array | None:
-        """Displacements without contact, this rank's owned ones [mm]; None where there are none."""
-        parts = [each.preload for each in (self.body, self.counter)]
+    def preload(self, state: float = 0.0) -> Array | None:
+        """Return the displacements without contact; see `ElasticBody.preload`."""
+        parts = [each.preload(state) for each in (self.body, self.counter)]
         if all(part is None for part in parts):
             return None
         both = np.zeros(self.owned_dofs)
@@ -235,6 +234,10 @@ class FacePair(ContactFace):
     def on_both(self) -> NDArray[np.bool_]:
         """Which of this rank's quadrature points of the first face lie on the second one, too."""
         return self._counter_rows[2]
+
+    def pull_moments(self, state: float) -> tuple[float, float]:
+        """Return the moments of what pulls the first body; see `LoadedFace.pull_moments`."""
+        return self.first.pull_moments(state)
 
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of both under pressures that are uniform on every patch.

@@ -6,6 +6,7 @@ Theory: section 11 of ``docs/theory.md``.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,13 +109,9 @@ class LawContactProblem:
             )
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
-        gap = together(face.comm, lambda: sampling.below(crown))
-        self._preload = body.preload
-        if self._preload is not None:
-            preload = body.stiffness.createVecRight()
-            preload.array[:] = self._preload
-            gap = gap + sampling.displacements(preload)
-        self.forces = ContactForces(face, sampling, laws, gap)
+        self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
+        self._preload: Array | None = None
+        self.forces = ContactForces(face, sampling, laws, self._undeformed_gap)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, body.solver
@@ -143,6 +140,9 @@ class LawContactProblem:
                 solutions stay what they were, so that a smaller step can be tried.
         """
         equilibrium = self.equilibrium
+        self._load_bodies(control.body_state)
+        if control.tilt is None and control.force:
+            control = replace(control, moment=self._face.pull_moments(control.body_state))
         self.forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
@@ -176,27 +176,35 @@ class LawContactProblem:
             samples = pressure[self._sampling.patch]
             self.basis.add(self._displacement(samples)[0], samples)
 
-    def start_at(self, displacement: Array, plane: RigidPlane) -> None:
+    def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
         """Take a displacement for the latest solution, such as that on other elements.
 
         Args:
             displacement: This rank's owned displacements, preload included, shape (n,) [mm].
             plane: The plane there.
+            body_state: Position among the states of what else loads the bodies, see `Control`.
 
         Note:
             Collective.
         """
-        start, preload = self.equilibrium.body.stiffness.createVecRight(), self._preload
-        start.array[:] = displacement - (0.0 if preload is None else preload)
+        self._load_bodies(body_state)
+        start = self.equilibrium.body.stiffness.createVecRight()
+        start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
         self._plane = np.array([plane.approach, *plane.tilt])
         self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
         self.basis.add(start, self.forces.pressure(self.forces.closure(start)))
 
-    def approach_response(self, *, turns: bool) -> ApproachResponse:
+    def same_approach(self) -> Control:
+        """Return what prescribes the latest plane by its approach; it turns where it was free."""
+        approach, *slopes = map(float, self._plane)
+        control = self.forces.control
+        tilt = None if control.tilt is None else (slopes[0], slopes[1])
+        return replace(control, approach=approach, force=None, tilt=tilt)
+
+    def approach_response(self) -> ApproachResponse:
         """Return what the latest equilibrium changes with the approach, to first order.
 
-        Args:
-            turns: Whether the plane turns with it, so that there is no moment; or keeps its slopes.
+        The plane turns with it where it is free to, so that its moments stay.
 
         Raises:
             NotConverged: When the linear solve fails.
@@ -205,9 +213,7 @@ class LawContactProblem:
             Collective; one linear solve.
         """
         forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
-        approach, *slopes = map(float, self._plane)
-        tilt = None if turns else (slopes[0], slopes[1])
-        forces.prescribe(Control(approach=approach, tilt=tilt), self._plane)
+        forces.prescribe(self.same_approach(), self._plane)
         stiffness = forces.stiffness(self._closure)
         forces.linearise(stiffness)
         self._preconditioner.update()
@@ -224,6 +230,15 @@ class LawContactProblem:
         compat.collect_garbage(load.comm)
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
+
+    def _load_bodies(self, state: float) -> None:
+        """Let the bodies take the displacements of their other loads, and the gap with them."""
+        body = self.equilibrium.body
+        self._preload = body.preload(state)
+        if self._preload is not None:
+            moved = body.stiffness.createVecRight()
+            moved.array[:] = self._preload
+            self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

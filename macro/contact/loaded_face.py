@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any, Literal, get_args
 
 import numpy as np
+from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
@@ -65,6 +66,7 @@ class ContactFace:
         areas: Areas of the patches, shape (N,) [mm²].
         patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
         pointwise: Laws at quadrature points.
+        pull_moments: Moments of what pulls the body, by the state of its loads.
 
     Note:
         Everything is collective.
@@ -76,6 +78,7 @@ class ContactFace:
     areas: Any
     patchwise: Any
     pointwise: Any
+    pull_moments: Any
 
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of pressures that are uniform on every patch.
@@ -204,6 +207,30 @@ class LoadedFace(ContactFace):
         local = [np.bincount(points.patch, points.weight * field, count) for field in fields]
         return np.asarray(self.comm.allreduce(np.array(local)))
 
+    def pull_moments(self, state: float) -> tuple[float, float]:
+        """Return the moments about the middle of the patches by what pulls the body, as bolts do.
+
+        Args:
+            state: Position among the states of the body's loads, see `ElasticBody.preload`.
+
+        Returns:
+            First moments of the pull along the axes of the face [N mm].
+        """
+        known = self._pull_moments
+        x, y = (float(np.interp(state, np.arange(len(known)), axis)) for axis in known.T)
+        return x, y
+
+    @cached_property
+    def _pull_moments(self) -> Array:
+        """Moments of what pulls the body in every state of its loads, shape (states, 2) [N mm]."""
+        frame, loads = self.facets.frame, self.body.loads
+        origin = frame.in_space([self.patches.middle])[0]
+        found = {
+            one: self.body.pull_moments(one, origin, frame.axes[:2]) if one.pulls else np.zeros(2)
+            for one in dict.fromkeys(loads)
+        }
+        return np.array([found[one] for one in loads])
+
     @cached_property
     def pointwise(self) -> Sampling:
         """Laws at quadrature points."""
@@ -313,6 +340,25 @@ def patch_compliance_matrix(face: ContactFace) -> Array:
     """
     work = displacements_under(face, np.eye(face.patches.count)) * face.areas  # [j, i], of i by j
     return np.asarray(0.5 * (work + work.T) / face.areas[:, None])
+
+
+def largest_rise(face: LoadedFace, state: float) -> float:
+    """Return how far loads besides the contact raise any point of a face at most, ≥ 0 [mm].
+
+    Args:
+        face: The contact face of a body.
+        state: Position among the states of its loads, see `ElasticBody.preload`.
+
+    Note:
+        Collective.
+    """
+    body = face.body
+    moved, preload = body.stiffness.createVecRight(), body.preload(state)
+    if preload is None:
+        return 0.0
+    moved.array[:] = preload
+    rise = -face.pointwise.displacements(moved)
+    return float(face.comm.allreduce(float(rise.max(initial=0.0)), op=MPI.MAX))
 
 
 def displacements_under(face: ContactFace, pressures: Array) -> Array:

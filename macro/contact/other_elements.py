@@ -99,7 +99,11 @@ def face_on_half(face: ContactFace) -> LoadedFace | None:
 
 
 def start_from_elements(
-    problem: LawContactProblem, face: ContactFace, known: FaceContactState, before: ContactFace
+    problem: LawContactProblem,
+    face: ContactFace,
+    known: FaceContactState,
+    before: ContactFace,
+    body_state: float = 0.0,
 ) -> None:
     """Take the solution on some elements for the latest one of a problem on others.
 
@@ -108,6 +112,7 @@ def start_from_elements(
         face: Its face.
         known: A solution.
         before: The face that it is of.
+        body_state: Position among the states of the bodies' loads there.
 
     Note:
         Collective.
@@ -116,7 +121,7 @@ def start_from_elements(
     whole = before.body.split(known.displacement) if isinstance(before, FacePair) else None
     for part, (one, other) in zip(whole or [known.displacement], pairs, strict=True):
         parts.append(part if one is other else _carried(part, one, other))
-    problem.start_at(np.concatenate(parts), known.plane)
+    problem.start_at(np.concatenate(parts), known.plane, body_state)
 
 
 def _carried(displacement: Array, of: Any, to: Any) -> Array:

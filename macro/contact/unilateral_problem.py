@@ -66,8 +66,9 @@ class UnilateralContactProblem:
         require_inside(face.lengths, patches)
         self.body, self.top = face.body, TopNodes(face, patches)
         x, y, distance = self.top.x, self.top.y, reference_height - self.top.height
-        if self.body.preload is not None:  # moved by its supports or other loads before contact
-            distance = distance - self.body.preload[self.top.dofs]
+        self._preload = self.body.preload()
+        if self._preload is not None:  # moved by its supports or other loads before contact
+            distance = distance - self._preload[self.top.dofs]
         self._plane = PlaneOverNodes(x, y, distance, face.lengths, self.body.comm)
         kind = PrimalDualActiveSet if method == "active-set" else AugmentedLagrangian
         self.method: PrimalDualActiveSet | AugmentedLagrangian = kind(face, self.top, self._plane)
@@ -136,7 +137,7 @@ class UnilateralContactProblem:
             patch_pressure=patch_force / top.patches.area,
             patch_closure=plane[0] + tilted - top.patch_means(downward),
             contact_area=top.covered_area(touching, nodal_force, np.maximum(gap, 0.0)),
-            displacement=moved + (0.0 if body.preload is None else body.preload),
+            displacement=moved + (0.0 if self._preload is None else self._preload),
             reaction=body.reaction(displacement),
             iterations=solution.iterations,
             linear_iterations=solution.linear_iterations,

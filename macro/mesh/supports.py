@@ -39,62 +39,117 @@ class Traction:
     Args:
         tag: Marker of its facets.
         stress: Force per area along x, y and z, shape (3,) [MPa].
+        pressure: Pressure against the outward normal, beside the stress [MPa].
     """
 
     tag: int
-    stress: tuple[float, float, float]
+    stress: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pressure: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Loads:
+    """All that loads a body beside its contact and its supports.
+
+    Args:
+        tractions: Loaded surfaces.
+        pulls: Surfaces that are pulled towards what the body is pressed on, as by bolts; the
+            reactions act there, and turn it.
+        strain: Free strain by a rise of temperature, equal in all directions, by marker of the
+            volumes; the marker None is the whole body.
+    """
+
+    tractions: tuple[Traction, ...] = ()
+    pulls: tuple[Traction, ...] = ()
+    strain: tuple[tuple[int | None, float], ...] = ()
+
+    @property
+    def on_surfaces(self) -> tuple[Traction, ...]:
+        """All loaded surfaces."""
+        return self.tractions + self.pulls
 
 
 def check_supports(
     tagged: TaggedMesh,
     supports: Sequence[Support],
     contact: int | None = None,
-    tractions: Sequence[Traction] = (),
     *,
     key: str | None = None,
 ) -> None:
-    """Refuse supports that do not hold the body, and loads that do nothing.
+    """Refuse supports that do not hold the body.
 
     Args:
         tagged: The mesh.
         supports: Surfaces with prescribed displacements.
         contact: Tag of the contact face.
-        tractions: Surfaces under tractions.
-        key: Section of the scene that has ``supports`` and ``tractions``, for errors.
+        key: Key of the scene that has the supports, for errors.
 
     Raises:
         InputError: On all ranks, when a surface has no facets or is the contact face, when two
             supports prescribe different displacements of one surface or of nodes that two surfaces
-            share, when a traction acts along what a support holds, and when a rigid motion is left;
-            the error says which.
+            share, and when a rigid motion is left; the error says which.
 
     Note:
         Collective.
     """
-    where = key and f"{key}.supports"
     for support in supports:
-        _check_surface(tagged, support.tag, contact, "held", where)
+        _check_surface(tagged, support.tag, contact, "held", key)
     for one, other in combinations(supports, 2):
         for axis, pair in enumerate(zip(one.displacement, other.displacement, strict=True)):
             if None not in pair and pair[0] != pair[1]:
-                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, where)
+                _check_apart(tagged, (one.tag, other.tag), "xyz"[axis], pair, key)
     left = free_motions(tagged, supports)
     if left:
         raise InputError(
             f"the supports leave the body free to move: {'; '.join(left)}",
-            key=where,
+            key=key,
             allowed="supports that hold all rigid motions, without help of the contact",
         )
+
+
+def check_loads(
+    tagged: TaggedMesh,
+    supports: Sequence[Support],
+    tractions: Sequence[Traction],
+    contact: int | None = None,
+    *,
+    key: str | None = None,
+) -> None:
+    """Refuse loads on surfaces that do nothing.
+
+    Args:
+        tagged: The mesh.
+        supports: Surfaces with prescribed displacements.
+        tractions: Loaded surfaces.
+        contact: Tag of the contact face.
+        key: Key of the scene that has the loads, for errors.
+
+    Raises:
+        InputError: On all ranks, when a surface has no facets or is the contact face, and when a
+            load acts along what a support holds.
+
+    Note:
+        Collective.
+    """
     for traction in tractions:
-        _check_surface(tagged, traction.tag, contact, "loaded", key and f"{key}.tractions")
+        _check_surface(tagged, traction.tag, contact, "loaded", key)
         for support in supports:
+            if support.tag != traction.tag:
+                continue
+            if traction.pressure and None not in support.displacement:
+                raise InputError(
+                    f"the surface {tagged.facet_name(support.tag)!r} is held, where a pressure of "
+                    f"{traction.pressure:g} MPa does nothing",
+                    key=key,
+                    allowed="pressures on surfaces that are free in some direction",
+                )
             for axis, stress in enumerate(traction.stress):
-                on_held = support.tag == traction.tag and support.displacement[axis] is not None
+                on_held = support.displacement[axis] is not None
                 if on_held and stress:
                     raise InputError(
                         f"the surface {tagged.facet_name(support.tag)!r} is held along "
                         f"{'xyz'[axis]}, where a traction of {stress:g} MPa does nothing",
-                        key=key and f"{key}.tractions",
+                        key=key,
                         allowed="tractions along directions that no support holds",
                     )
 

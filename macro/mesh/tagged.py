@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -147,6 +147,7 @@ def planar_face(
     *,
     name: str | None = None,
     deviation: float = 0.0,
+    along: Sequence[float] | None = None,
     key: str | None = None,
 ) -> PlanarFace:
     """Return the plane of a face, of any outline, that need not hang together.
@@ -158,6 +159,7 @@ def planar_face(
         deviation: Largest distance of a node from the plane half-way between the highest and the
             lowest that is allowed [mm]: half the height of a crown. Rounding of the coordinates
             always is.
+        along: Direction of the first axis of the face, see `FaceFrame.across`.
         key: Key of the scene that the name comes from, for errors.
 
     Raises:
@@ -182,7 +184,7 @@ def planar_face(
     area, total = comm.allreduce(float(areas.sum())), comm.allreduce(outward.sum(axis=0))
     if np.linalg.norm(total) < 0.5 * area:
         raise refused("is not planar: its facets face different ways and close around a body")
-    frame = FaceFrame.across(total)
+    frame = FaceFrame.across(total, along=along)
     lower, upper = bounding_box(corners.reshape(-1, 3) @ frame.axes.T, comm)
     upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
     flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
@@ -195,11 +197,25 @@ def planar_face(
             f"at most {deviation:.4g} mm" if deviation else "a planar face",
         )
     return PlanarFace(
-        frame=FaceFrame.through(np.stack([lower, upper]) @ frame.axes, total),
+        frame=FaceFrame.through(np.stack([lower, upper]) @ frame.axes, total, along),
         lengths=(float(lengths[0]), float(lengths[1])),
         area=area,
         deviation=off,
     )
+
+
+def surface_area(tagged: TaggedMesh, tag: int) -> float:
+    """Return the area of a body's outer surface with a tag, of straight facets [mm²].
+
+    Args:
+        tagged: The mesh.
+        tag: Tag of the facets.
+
+    Note:
+        Collective.
+    """
+    areas = np.linalg.norm(_facets(tagged, tag)[1], axis=1)
+    return float(tagged.comm.allreduce(float(areas.sum())))
 
 
 def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:

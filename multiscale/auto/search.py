@@ -139,7 +139,7 @@ class _Search:
             if new_surface:
                 surface = make_surface(with_value(scene, "surface.grid", cells))
                 model = replace(model, surface=surface, highest=surface.highest)
-                history = load_history_on(scene, (surface,))
+                history = load_history_on(scene, (surface,), surface.area)
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
                 model = replace(model, surface=coupling.surface).resampled(cells)

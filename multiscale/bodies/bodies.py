@@ -32,11 +32,9 @@ from multiscale.laws.consistent import Displacements
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, FacePair, LoadedFace
+    from macro import ElasticBody, FacePair, FieldStep, LoadedFace
     from macro.fields import Pressures
 
-Field = tuple[int, Array, "Pressures"]
-"""Number of the load step, this rank's displacements [mm], and the pressures [MPa]."""
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
 
@@ -236,6 +234,23 @@ class Bodies:
             total += float(moved @ one.areas / one.areas.sum())
         return total
 
+    def largest_preload(self) -> float:
+        """Return how far loads besides the contact raise the faces towards each other at most [mm].
+
+        It is the sum of the largest displacements out of both faces at any point, in any state of
+        the loads.
+
+        Note:
+            Collective.
+        """
+        from macro import FacePair, largest_rise
+
+        face = self.contact_face()
+        faces = (face.first, face.second) if isinstance(face, FacePair) else (face,)
+        return sum(
+            max(largest_rise(one, state) for state in range(len(one.body.loads))) for one in faces
+        )
+
     def _as_text(self) -> tuple[Any, ...]:
         """Return all that the compliance of the meshes depends on, besides the patches."""
         parts, scene, found = self.parts, self.parts.scene, list[Any]()
@@ -323,12 +338,14 @@ def write_solved(path: Path, bodies: Bodies, parts: PatchGrid, states: Mapping[i
     Note:
         Collective.
     """
+    from macro import FieldStep
+
     whole = bodies.contact_face()
 
-    def solved(face: LoadedFace) -> Iterator[Field]:
+    def solved(face: LoadedFace) -> Iterator[FieldStep]:
         for number, pressure in sorted(states.items()):
             solution = face.body.solve(face.load(pressure))
-            yield number, solution.x.array[: face.body.owned_dofs].copy(), pressure
+            yield FieldStep(number, solution.x.array[: face.body.owned_dofs].copy(), pressure)
 
     _write(path, whole, solved, parts=parts)
 
@@ -336,7 +353,7 @@ def write_solved(path: Path, bodies: Bodies, parts: PatchGrid, states: Mapping[i
 def write_displaced(
     path: Path,
     face: LoadedFace | FacePair,
-    states: Mapping[int, Array],
+    states: Mapping[int, tuple[Array, float]],
     pressures: Callable[[int, bool], Pressures],
 ) -> None:
     """Write the fields of bodies whose displacements are known.
@@ -344,18 +361,19 @@ def write_displaced(
     Args:
         path: File to write, ending in ``.xdmf``.
         face: The contact face of the body, or of both.
-        states: This rank's displacements by number of the load step [mm].
+        states: By number of the load step this rank's displacements [mm], and the position among
+            the states of the bodies' loads.
         pressures: What is shown as pressure, by load step and whether it is on the counter-body.
 
     Note:
         Collective.
     """
-    from macro import FacePair
+    from macro import FacePair, FieldStep
 
-    def halves(counter: bool) -> Iterator[Field]:
-        for number, moved in sorted(states.items()):
+    def halves(counter: bool) -> Iterator[FieldStep]:
+        for number, (moved, loads) in sorted(states.items()):
             own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
-            yield number, own, pressures(number, counter)
+            yield FieldStep(number, own, pressures(number, counter), loads)
 
     _write(path, face, lambda one: halves(one is getattr(face, "second", None)))
 
@@ -363,7 +381,7 @@ def write_displaced(
 def _write(
     path: Path,
     whole: LoadedFace | FacePair,
-    fields: Callable[[LoadedFace], Iterator[Field]],
+    fields: Callable[[LoadedFace], Iterator[FieldStep]],
     parts: PatchGrid | None = None,
 ) -> None:
     import macro

@@ -5,23 +5,26 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from geometry import InputError, Material
 from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.inputs.bodies import BodyFacts, SceneBody
+from multiscale.inputs.loads import body_states
+from multiscale.inputs.surfaces import located
+from multiscale.loading.body_loads import BodyLoads
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene
 from support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ContactFacets, MeshedBody, TaggedMesh
+    from macro import ContactFacets, Loads, MeshedBody, TaggedMesh
     from macro.mesh.tagged import PlanarFace
 
 
@@ -62,7 +65,13 @@ def read_bodies(scene: Scene, comm: Any) -> tuple[SceneBody | None, SceneBody | 
 class _Reader:
     """Reads one body of a scene."""
 
-    def __init__(self, scene: Scene, section: CounterBodySection, key: str, comm: Any) -> None:
+    def __init__(
+        self,
+        scene: Scene,
+        section: CounterBodySection,
+        key: Literal["body", "counter_body"],
+        comm: Any,
+    ) -> None:
         from mpi4py import MPI
 
         self._scene, self._section, self._key = scene, section, key
@@ -110,7 +119,7 @@ class _Reader:
 
     def _body(self, mesh: TaggedMesh, contact: Sequence[int], frame: FaceFrame) -> MeshedBody:
         """Return the elastic body with its supports and loads."""
-        from macro import MeshedBody, Support, Traction, check_supports
+        from macro import MeshedBody, Support, check_loads, check_supports
 
         section, key = self._section, self._key
         supports = [
@@ -120,17 +129,69 @@ class _Reader:
             )
             for one in section.supports
         ]
-        loads = [
-            Traction(tag=mesh.facet_tag(one.surface, key=f"{key}.tractions"), stress=one.stress)
-            for one in section.tractions
-        ]
         for tag in contact:
-            check_supports(mesh, supports, tag, loads, key=key)
+            check_supports(mesh, supports, tag, key=f"{key}.supports")
+        states = body_states(self._scene, key)
+        loads = [self._loads(mesh, one, frame) for one in states]
+        for state, one in zip(states, loads, strict=True):
+            keys = [self._key_of("tractions", load.surface) for load in state.tractions]
+            keys += [self._key_of("pretension", bolt.surface) for bolt in state.pretension]
+            for where, load in zip(keys, one.on_surfaces, strict=True):
+                for tag in contact:
+                    check_loads(mesh, supports, [load], tag, key=where)
         x, y, z = map(float, frame.normal)
         order = 1 if section.element == "linear" else 2
         return MeshedBody(
             mesh, self._materials(mesh), supports, loads, normal=(x, y, z), order=order
         )
+
+    def _loads(self, mesh: TaggedMesh, stated: BodyLoads, frame: FaceFrame) -> Loads:
+        """Return loads by the markers of the mesh."""
+        from macro import Loads, Traction
+        from macro.mesh.tagged import surface_area
+
+        tractions, pulls = list[Traction](), list[Traction]()
+        for load in stated.tractions:
+            tag = mesh.facet_tag(load.surface, key=self._key_of("tractions", load.surface))
+            stress = load.stress or (0.0, 0.0, 0.0)
+            tractions.append(Traction(tag=tag, stress=stress, pressure=load.pressure or 0.0))
+        for bolt in stated.pretension:
+            tag = mesh.facet_tag(bolt.surface, key=self._key_of("pretension", bolt.surface))
+            area = surface_area(mesh, tag) or 1.0  # a face without facets is refused later
+            x, y, z = (float(part) * bolt.pull / area for part in frame.normal)
+            pulls.append(Traction(tag=tag, stress=(x, y, z)))
+        return Loads(
+            tractions=tuple(tractions),
+            pulls=tuple(pulls),
+            strain=tuple(self._strains(mesh, stated)),
+        )
+
+    def _key_of(self, what: str, face: str | int) -> str:
+        """Return the key that loads a face first: that of the body, or that of a stage."""
+        stages = enumerate(self._scene.loading.stage)
+        later = ((f"load.stage.{n}.{self._key}", getattr(one, self._key)) for n, one in stages)
+        for key, loads in ((self._key, self._section), *later):
+            if loads is not None and face in {one.surface for one in getattr(loads, what)}:
+                return f"{key}.{what}"
+        return f"{self._key}.{what}"
+
+    def _strains(self, mesh: TaggedMesh, stated: BodyLoads) -> Iterator[tuple[int | None, float]]:
+        """Yield the free strains by temperatures, by markers of the volumes; None for all."""
+
+        def by_tag(named: Mapping[str | None, float], what: str) -> dict[int | None, float]:
+            key = f"{self._key}.{what}"
+            return {
+                name if name is None else mesh.cell_tag(name, key=key): value
+                for name, value in named.items()
+            }
+
+        rises = by_tag(stated.rises, "temperature")
+        expansions = by_tag(self._section.expansions, "materials")
+        tags = {*rises, *expansions}
+        for tag in sorted(tags - {None}) if tags != {None} else [None]:  # type: ignore[type-var]
+            rise = rises.get(tag, rises.get(None, 0.0))
+            if strain := rise * expansions.get(tag, expansions.get(None, 0.0)):
+                yield tag, strain
 
     def _facts(
         self,
@@ -163,9 +224,12 @@ class _Reader:
         curved = self._scene.law.representative
         # a gap counts as one between planes up to here: a sphere has slopes of 2 % at its edge
         allowed = 5e-3 * self._shortest(mesh) if curved else 0.0
-        faces = [
-            planar_face(mesh, tag, deviation=allowed, key=f"{self._key}.contact") for tag in tags
-        ]
+        along = getattr(self._section, "first_axis", None)
+        key = f"{self._key}.contact"
+        with located(self._scene, f"{self._key}.first_axis"):
+            faces = [
+                planar_face(mesh, tag, deviation=allowed, along=along, key=key) for tag in tags
+            ]
         first, corners = faces[0], []
         for face, tag in zip(faces, tags, strict=True):
             height = float(first.frame.height(face.frame.origin[None])[0])
@@ -177,7 +241,7 @@ class _Reader:
                     key="law.regions",
                 )
             corners += [face.frame.in_space([[0.0, 0.0], face.lengths])]
-        frame = FaceFrame.through(np.concatenate(corners), first.frame.normal)
+        frame = FaceFrame.through(np.concatenate(corners), first.frame.normal, along)
         lengths = frame.in_plane(np.concatenate(corners)).max(axis=0)
         return PlanarFace(
             frame=frame,
@@ -195,7 +259,7 @@ class _Reader:
         if section.whole_material is not None:
             return section.whole_material
         return {
-            mesh.cell_tag(name, key=f"{self._key}.materials"): one
+            mesh.cell_tag(name, key=f"{self._key}.materials"): one.elastic
             for name, one in section.materials.items()
         }
 

@@ -59,6 +59,8 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
             terminal.say(comm, text)
         terminal.show_files(comm, files)
+        if choice.open:
+            terminal.open_page(comm, files)
     if done.measure is None or (choice.against and done.against != choice.against):
         raise NotConverged(
             f"the comparison against {choice.against or 'anything'}",

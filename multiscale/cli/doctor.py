@@ -71,7 +71,8 @@ def show(topic: str, result: CheckResult) -> None:
         topic: What was checked.
         result: The result.
     """
-    console, colour = Console(highlight=False, soft_wrap=True), _COLOUR[result.state]
+    console = Console(highlight=False, soft_wrap=True, color_system=terminal.colours())
+    colour = _COLOUR[result.state]
     console.print(f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]{escape(result.text)}")
     if result.remedy:
         console.print(f"{'':22}→ {escape(result.remedy)}")

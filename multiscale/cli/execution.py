@@ -51,7 +51,8 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        with ended_if_told(), optional_packages():
+        quiet = terminal.quietly(getattr(choice, "quiet", False))
+        with ended_if_told(), optional_packages(), quiet:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             command(choice, _start_petsc(options), comm)
     except PatchlawError as error:

@@ -46,6 +46,15 @@ SYNTHESISED: Mapping[str, Any] = {
 }
 """The surface of a new scene without a file."""
 
+UNUSED: Mapping[str, Any] = {
+    "surface": {"filter": {"short": "8 um"}},
+    "micro": {"hardness": "2 GPa"},
+    "load": {"tilt": "free"},
+    "output": {"contact": "all", "fields": "last"},
+    "conductance": {"conductivity": ["50 W/m/K"]},
+}
+"""Keys that a new scene has as comments, unless it uses them, with values to start from."""
+
 _KEYS = {
     "force": "load.force",
     "approach": "load.approach",
@@ -103,7 +112,10 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
         )
     if choice.young_modulus is None:
         remarks.append("The block is of steel: write your constants in the section block.")
-    about = f"Made by patchlaw init. To run it: patchlaw run {path}; on a key: patchlaw help KEY"
+    about = (
+        f"Made by patchlaw init. To run it: patchlaw run {path}; on a key: patchlaw help KEY. What "
+        "is not used stands as a comment: remove the sign # before its key."
+    )
     data = scene.written
     if choice.surface is not None:  # relative paths start in the folder of the scene
         data = changed(data, "surface.file", os.path.relpath(choice.surface, path.parent))
@@ -206,7 +218,7 @@ def findings(surface: Surface) -> list[str]:
 
 
 def scene_text(data: Mapping[str, Mapping[str, Any]], remarks: Iterable[str]) -> str:
-    """Return a scene file in which a comment explains every key.
+    """Return a scene file in which a comment explains every key, and those of `UNUSED` as comments.
 
     Args:
         data: The sections with their keys.
@@ -215,12 +227,15 @@ def scene_text(data: Mapping[str, Mapping[str, Any]], remarks: Iterable[str]) ->
     keys, order = scene_keys(), list(scene_keys())
     head = "\n#\n".join(_comment(remark) for remark in remarks)
     parts = [head]
-    for section, values in data.items():
-        lines = [_comment(keys[section].meaning), f"[{section}]"]
+    for section in dict.fromkeys([*data, *UNUSED]):
+        used, mark = data.get(section, {}), "" if section in data else "# "
+        lines = [_comment(keys[section].meaning), f"{mark}[{section}]"]
         for key, value in sorted(
-            values.items(), key=lambda one: order.index(f"{section}.{one[0]}")
+            (UNUSED.get(section, {}) | used).items(),
+            key=lambda one: order.index(f"{section}.{one[0]}"),
         ):
-            lines += [_comment(keys[f"{section}.{key}"].meaning), f"{key} = {_toml(value)}"]
+            mark = "" if key in used else "# "
+            lines += [_comment(keys[f"{section}.{key}"].meaning), f"{mark}{key} = {_toml(value)}"]
         parts.append("\n".join(lines))
     return "\n\n".join(parts) + "\n"
 

@@ -40,6 +40,8 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
             kept, notice = on_root(comm, lambda: _earlier(choice, folder, scene))
             if choice.resume and kept is None and _is_finished(folder, scene, comm):
                 terminal.say(comm, f"this run is finished; its results are in {folder}")
+                if choice.open:
+                    terminal.open_page(comm, sorted(folder.glob("report.html")))
                 return
             with RunFigures(scene, comm) as figures:
                 with terminal.following(comm) as (begun, _):
@@ -54,10 +56,12 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     failure = _make_load_steps(run, checkpoints, figures, interruption)
                     if run.steps:
                         checkpoints.finish()  # writing results may fail
-                    _write(folder, run, figures, failure, options)
+                    files = _write(folder, run, figures, failure, options)
                     if failure is not None:
                         raise failure
                     checkpoints.remove()
+            if choice.open:
+                terminal.open_page(comm, files)
 
 
 def _earlier(
@@ -124,9 +128,9 @@ def _write(
     figures: RunFigures,
     failure: PatchlawError | None,
     options: list[str],
-) -> None:
-    """Write and show the results, also of a run that ended early."""
-    comm = run.comm
+) -> list[Path]:
+    """Write and show the results, also of a run that ended early; return their files."""
+    comm, files = run.comm, list[Path]()
     if failure is not None and _is_finished(folder, run.given, comm):
         terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
@@ -137,3 +141,4 @@ def _write(
         terminal.show_history(comm, run.history())
         terminal.show_times(comm, run.clock.times)
         terminal.show_files(comm, files)
+    return files

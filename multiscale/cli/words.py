@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from multiscale.exports import FORMATS
-from multiscale.studies import AGAINST
+from multiscale.studies import AGAINST, AT
 from support.quantities import parse_duration
 
 SWEEP_ENDING = "-sweep"
@@ -19,6 +19,10 @@ SWEEP_ENDING = "-sweep"
 
 COMPARE_ENDING = "-compare"
 """What the results folder of a comparison is called after the scene's name."""
+
+
+DIFF_ENDING = "-diff"
+"""What the results folder of two runs beside each other is called after their names."""
 
 
 class UsageError(Exception):
@@ -80,6 +84,12 @@ def _removed_ranks(text: str) -> NoReturn:
     raise argparse.ArgumentTypeError("is no option any more; mpirun -n N patchlaw compare SCENE")
 
 
+_QUIET = ("init", "run", "compare", "sweep", "laws", "surface", "diff")
+"""Commands that are called for the files that they write, not for what they print."""
+
+_WITH_PAGE = ("run", "compare", "diff")
+"""Commands that write a report."""
+
 _TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
 
 
@@ -96,6 +106,11 @@ def command_parser() -> argparse.ArgumentParser:
     def command(name: str, function: str, summary: str) -> argparse.ArgumentParser:
         made = commands.add_parser(name, help=summary, description=summary)
         made.set_defaults(function=function)
+        if name in _QUIET:
+            alone = "print nothing but errors and cautions, these on the error stream"
+            made.add_argument("-q", "--quiet", action="store_true", help=alone)
+        if name in _WITH_PAGE:
+            made.add_argument("--open", action="store_true", help="open the report in a browser")
         return made
 
     _add_init(command("init", "init.write_scene", "Write a scene for a surface, with comments."))
@@ -164,6 +179,17 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
+    beside = "Set the results of two runs beside each other: curves, ratios with both errors."
+    diff = command("diff", "diff.diff_results", beside)
+    folders = "folder that patchlaw run wrote"
+    diff.add_argument("first", metavar="RESULTS", type=Path, help=folders)
+    diff.add_argument("second", metavar="RESULTS", type=Path, help="the other one")
+    equal = (
+        f"what is equal where they are compared: {' or '.join(AT)}; by default what both prescribe"
+    )
+    diff.add_argument("--at", choices=AT, help=equal)
+    where = f"folder of the comparison (default: results/FIRST-SECOND{DIFF_ENDING})"
+    diff.add_argument("--out", type=Path, metavar="DIR", help=where)
     plan = "Say what a run would do, and why; run nothing expensive."
     unused = "accepted so that the words of a run can be reused: a plan writes nothing"
     _add_scene(command("plan", "plan.plan_scene", plan), folder=unused)
@@ -179,6 +205,10 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
     topic = "a section or a key, such as load or load.force; all sections by default"
     keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
+    shells = "Print what lets a shell complete commands, options and keys of scenes."
+    complete = command("completion", "completion.print_completion", shells)
+    ways = 'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"'
+    complete.add_argument("shell", choices=("bash", "zsh"), help=ways)
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."
     doctor = command("doctor", "doctor.examine_machine", checks)
     doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")

@@ -166,7 +166,7 @@ class ContactSolver(StepSolver):
 def plane_at_largest_load(
     load_history: LoadHistory, solver: StepSolver | None, surface: Surface
 ) -> RigidPlane | None:
-    """Return the rigid plane at the largest load.
+    """Return the rigid plane at the largest load; of several, that which comes nearest.
 
     Args:
         load_history: The loads.
@@ -176,12 +176,16 @@ def plane_at_largest_load(
     Raises:
         NotConverged: When the plane is not found in smaller steps either.
     """
-    if load_history.quantity != "force" and load_history.slopes is not None:
-        return RigidPlane.above(surface, load_history.largest, load_history.slopes)
-    if solver is None:
-        return None
-    (step,) = load_steps(solver, load_history.up_to_largest)
-    return RigidPlane.above(surface, step.approach_mm, step.tilt)
+    planes = []
+    for control in load_history.largest_controls:
+        if control.approach is not None and control.tilt is not None:
+            planes.append(RigidPlane.above(surface, control.approach, control.tilt))
+            continue
+        if solver is None:
+            return None
+        (step,) = load_steps(solver, load_history.straight_to(control))
+        planes.append(RigidPlane.above(surface, step.approach_mm, step.tilt))
+    return max(planes, key=lambda plane: plane.approach)
 
 
 def on_few_cells(model: HalfSpaceModel) -> ContactSolver:

@@ -11,11 +11,17 @@ from micro import MicroModel
 from multiscale.inputs.bodies import BodyFacts, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import heights_per_wave
+from multiscale.loading.body_loads import BodyLoads
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.scene.sections import MicroSection
 
 _INTERACTING = ("elliptic", "circular")
+_LOADS = {
+    "approach": ("mm", "an approach"),
+    "force": ("N", "a force"),
+    "pressure": ("MPa", "a mean pressure"),
+}
 
 
 def materials(parts: SceneParts) -> str:
@@ -93,11 +99,18 @@ def micro_model(section: MicroSection, model: MicroModel | None) -> str:
 def load(parts: SceneParts) -> str:
     """Say the load steps."""
     history = parts.scene.loading
-    forced = history.quantity == "force"
-    unit, what = ("N", "a force") if forced else ("mm", "an approach")
-    way = ", ".join(quantity(point, unit, 6) for point in history.points)
-    again = f", {history.cycles} times" * (history.cycles > 1)
-    text = f"{history.count} steps to {what} of {way}{again}"
+    key, points = history.stated
+    if points is None:
+        text = f"{history.count} steps: {'; '.join(stages(parts))}"
+    else:
+        unit, what = _LOADS[key]
+        way = ", ".join(quantity(point, unit, 6) for point in points)
+        again = f", {history.cycles} times" * (history.cycles > 1)
+        text = f"{history.count} steps to {what} of {way}{again}"
+    sections = (("body", parts.scene.body), ("counter-body", parts.scene.counter_body))
+    known = [one for name, section in sections if section for one in body_loads(section, name)]
+    if known:
+        text += f"; from the start {', '.join(known)}"
     if parts.zero:
         depth = quantity(parts.zero, "mm", 4)
         text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
@@ -109,6 +122,48 @@ def load(parts: SceneParts) -> str:
         tx, ty = history.slopes
         text += f", tilted by {1e3 * tx:.3g} and {1e3 * ty:.3g} µm/mm along x and y"
     return text
+
+
+def stages(parts: SceneParts) -> Iterator[str]:
+    """Yield what every stage of the load history does."""
+    ways = parts.load_history.ways
+    for index, stage in enumerate(parts.scene.loading.stage):
+        legs = [leg for leg in ways if leg.stage == index]
+        loads: list[str] = []
+        if stage.hold is not None:
+            loads.append(f"{stage.hold} held")
+        elif stage.approach is not None:
+            loads.append(f"approach to {quantity(stage.approach, 'mm', 6)}")
+        elif stage.pressure is not None:
+            loads.append(f"mean pressure to {quantity(stage.pressure, 'MPa', 6)}")
+        elif stage.force is not None:
+            loads.append(f"force to {quantity(stage.force, 'N', 6)}")
+        for name, part in (("body", stage.body), ("counter-body", stage.counter_body)):
+            if part is not None:
+                loads += body_loads(part, name)
+        cyclic = f", {stage.cycles} times there and back" if stage.cycles else ""
+        steps = sum(leg.steps for leg in legs)
+        what = ", ".join(loads) or "nothing changes"
+        yield f"stage {stage.name or index + 1} in {steps}: {what}{cyclic}"
+
+
+def body_loads(loads: BodyLoads, name: str) -> Iterator[str]:
+    """Yield what loads a body beside the contact.
+
+    Args:
+        loads: The loads.
+        name: What the body is called.
+    """
+    for one in loads.tractions:
+        if one.stress is None:
+            how = f"a pressure of {quantity(one.pressure or 0.0, 'MPa')}"
+        else:
+            how = f"({', '.join(f'{part:.6g}' for part in one.stress)}) MPa"
+        yield f"{how} on {one.surface!r} of the {name}"
+    for bolt in loads.pretension:
+        yield f"bolts on {bolt.surface!r} pulling with {quantity(bolt.pull, 'N', 6)}"
+    for volume, rise in loads.rises.items():
+        yield f"{rise:+.6g} K in {f'{volume!r} of ' if volume else ''}the {name}"
 
 
 def body(parts: SceneParts) -> str:

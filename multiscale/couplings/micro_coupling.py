@@ -144,6 +144,8 @@ class MicroCoupling(PressedSurface):
         """Return why a run does not measure the errors of its load steps; empty where it does."""
         if self.cells is None:
             return f"{self.micro.name} contacts have no measure of it, half-space has"
+        if self.scene.loads_bodies:
+            return "the measure does not know of loads of the body besides the contact"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     # --- what is known before the run

@@ -14,6 +14,7 @@ from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import on_body
+from multiscale.couplings.contact_solver import plane_at_largest_load
 from multiscale.couplings.describe import times
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -37,6 +38,10 @@ _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 class PatchLaws(LawCoupling, MicroCoupling):
     """A coupling with a law for every patch of the surface."""
 
+    def _rise(self) -> float:
+        """Return how far loads besides the contact raise the face at most [mm]; collective."""
+        return self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+
     @property
     def table_rows(self) -> int:
         """Most rows of a table of laws."""
@@ -55,6 +60,8 @@ class PatchLaws(LawCoupling, MicroCoupling):
         coupling, patches = self.scene.coupling, self.patches.count
         if self.scene.decomposed:
             return NewtonChoice(True, "the decomposed block is its compliance")
+        if self.scene.loads_bodies:
+            return NewtonChoice(False, "loads besides the contact deform the mesh")
         flat = 0 if table is None else sum(law.is_flat for law in table.laws)
         if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
             why = (
@@ -112,7 +119,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
     def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""
         solver = self.contact_solver(self.model_behind_laws())
-        solved = solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+        solved = solver.press(step.under_its_plane)
         detail = solver.detail(solver.latest)
         with_peak = replace(step, peak_pressure_MPa=solved.peak_pressure_MPa)
         return None if detail is None else (with_peak, detail)
@@ -154,11 +161,11 @@ class ConsistentCoupling(PatchLaws):
             self._model = self.model_on_body()
 
     def _make_table(self, observe: Observer | None) -> LawTable:
-        history, displacements = self.load_history, self._displacements(self.newton().condensed)
+        displacements = self._displacements(self.newton().condensed)
         return consistent_laws(
             self._model,
             self.patches,
-            largest=history.control(history.largest),
+            largest=self._largest_control(),
             displacements=displacements,
             pointwise=self.scene.coupling.interface == "pointwise",
             mean_heights=self.mean_heights,
@@ -168,12 +175,23 @@ class ConsistentCoupling(PatchLaws):
             observe=observe,
         )
 
+    def _largest_control(self) -> Control:
+        """Return the load that laws are made up to: other loads of the body raise its face."""
+        controls, rise = self.load_history.largest_controls, self._rise()
+        if len(controls) == 1 and not rise:
+            return controls[0]
+        solver = self.contact_solver(self._model)
+        plane = plane_at_largest_load(self.load_history, solver, self.surface)
+        assert plane is not None
+        return Control(approach=plane.approach + rise, tilt=self.load_history.slopes)
+
     def _displacements(self, dense: bool) -> Any:
         return self.bodies.patch_displacements(dense=dense, solutions=self.table_rows)
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
-        free = table.path is not None and self.load_history.slopes is None
+        turns = self.load_history.slopes is None and not self.scene.loads_bodies
+        free = table.path is not None and turns
         if free and self.scene.coupling.interface == "patchwise":
             return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
         return super()._solver_of(table)
@@ -208,13 +226,13 @@ class IsolatedCoupling(PatchLaws):
     @property
     def _closes_at_corners(self) -> bool:
         """Whether closures at corners count: contacts under a force may lie at a corner."""
-        return super()._closes_at_corners or self.scene.loading.force is not None
+        return super()._closes_at_corners or self.load_history.quantity == "force"
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         return isolated_laws(
             self.model_alone(),
             self.patches,
-            closure_ends=self.largest_closures,
+            closure_ends=self.largest_closures + self._rise(),
             love=self.scene.coupling.love,
             mean_heights=self.mean_heights,
             tolerance=self.table_tolerance,

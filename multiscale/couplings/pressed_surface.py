@@ -43,7 +43,7 @@ class PressedSurface(Coupling):
         body, counter = source.facts
         body = body or BodyFacts.of_block(scene, surface, cls.unstated_cells(scene))
         materials = MaterialPair(first=body.materials[0], second=second_material(scene, counter))
-        history = load_history_on(scene, (surface,))
+        history = load_history_on(scene, (surface,), surface.area)
         check_load(scene, history, (surface,), surface.area, body if cls.has_body else None)
         patches = PatchGrid(grid=patch_grid(scene), lengths=surface.lengths)
         return {

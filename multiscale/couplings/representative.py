@@ -42,11 +42,15 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, with_errors
-from multiscale.readable import Observer, number, quantity
+from multiscale.readable import Caution, Observer, number, percent, quantity
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LoadedFace
+
+
+_SEEN = 0.01
+"""Displacement that laws leave out, relative to the approach, from which a run warns of it."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -76,7 +80,7 @@ class RepresentativeCoupling(LawCoupling):
         samples = region_samples(scene, body.materials, second_material(scene, counter))
         surface, materials = samples[0].surfaces[0], samples[0].materials
         surfaces = tuple(one for region in samples for one in region.surfaces)
-        history, plane = load_history_on(scene, surfaces), None
+        history, plane = load_history_on(scene, surfaces, body.area), None
         check_load(scene, history, surfaces, body.area, body)
         modulus, hardness = materials.contact_modulus, scene.micro.hardness
         model = HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, hardness=hardness)
@@ -160,7 +164,7 @@ class RepresentativeCoupling(LawCoupling):
 
     def checked(self, step: LoadStep) -> LoadStep:
         """Return a load step with its errors measured, by further steps on the same bodies."""
-        solver, history = self.solver, self.load_history
+        solver = self.solver
         assert isinstance(solver, ExtendedLaws)
         problem, state = solver.solved
         probe = LawErrorProbe(
@@ -173,8 +177,8 @@ class RepresentativeCoupling(LawCoupling):
             probe_of=self._probe_of,
             comm=self.comm,
         )
-        found = probe.measure(turns=history.slopes is None)
-        return with_errors(step, found, by_force=history.quantity == "force")
+        by_force = problem.forces.control.force is not None
+        return with_errors(step, probe.measure(), by_force=by_force)
 
     def _probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
         """Return what measures the errors of one sample."""
@@ -248,12 +252,11 @@ class RepresentativeCoupling(LawCoupling):
             mean = force / face.area
             return stated or self._peak(mean, force=force), None
         tilt, lengths = history.slopes or (0.0, 0.0), face.lengths
-        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum())
+        raised = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        approach = history.largest + 0.5 * float(np.abs(np.multiply(lengths, tilt)).sum()) + raised
         mean = approach / self.bodies.mean_compliance()
         pressure = stated or self._peak(mean, approach=approach)
-        first = self.bodies.first
-        preloaded = first is not None and first.body.preload is not None
-        return pressure, None if preloaded else 1.15 * approach
+        return pressure, None if self.scene.loads_bodies else 1.15 * approach
 
     def _peak(self, mean: float, *, force: float = 0.0, approach: float = 0.0) -> float:
         """Return the largest local pressure that laws are made for [MPa].
@@ -319,6 +322,16 @@ class RepresentativeCoupling(LawCoupling):
             yield from self.table.notes(self.table_tolerance)
         yield from super().notes(steps)
         yield from self._extensions
+        if steps and self.both_elastic:
+            step = max(steps, key=lambda one: one.force_N)
+            moved, approach = self._left_out(step.mean_pressure_MPa), abs(step.approach_mm)
+            share = f", {percent(moved / approach)} of its approach" if approach else ""
+            text = (
+                "the counter-body, a half-space, is elastic on the scale of the sample alone: "
+                f"under the whole face it would add about {quantity(moved, 'mm', 2)} at load step "
+                f"{step.step}{share}"
+            )
+            yield Caution(f"{text}; give it a mesh") if moved > _SEEN * approach else text
 
     @property
     def areas(self) -> Array:
@@ -357,13 +370,22 @@ class RepresentativeCoupling(LawCoupling):
                     f"the heights of {region.name} do not continue periodically: their sample is "
                     "four mirror images, twice as long and wide"
                 )
-        history, second = self.load_history, self.materials.second
-        if self.both_elastic and second is not None and history.quantity == "force":
-            pressure = history.largest / self.body.area
-            # mean displacement of a square of a half-space by a uniform pressure
-            moved = 0.95 * pressure * side * second.surface_compliance
+        if self.both_elastic and self.load_history.quantity == "force":
+            moved = self._left_out(self.load_history.largest / self.body.area)
             yield (
                 "the compliance of the counter-body, a half-space, counts on the scale of the "
                 f"sample alone; under the whole face it would add about {1e3 * moved:.3g} µm: give "
                 "it a mesh where that matters"
             )
+
+    def _left_out(self, pressure: float) -> float:
+        """Return the mean displacement of a half-space under a face, which laws leave out [mm].
+
+        It is that of a square of the face's area under a uniform pressure (Love 1929).
+
+        Args:
+            pressure: Mean pressure on the face [MPa].
+        """
+        second = self.materials.second
+        compliance = 0.0 if second is None else second.surface_compliance
+        return 0.946 * pressure * math.sqrt(self.body.area) * compliance

@@ -1,4 +1,4 @@
-"""The contact at one load step: maps of pressures and gaps, sizes of spots, share of pressures."""
+"""The contact at one load step: maps of pressures, gaps and plastic depths, sizes of spots."""
 
 from __future__ import annotations
 
@@ -12,9 +12,18 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from geometry.surface import Surface
-from multiscale.figures.maps import coarsened, colour_bar, draw_face, draw_pressures, map_axes
+from multiscale.figures.contact_scales import ContactScales
+from multiscale.figures.maps import (
+    coarsened,
+    colour_bar,
+    draw_face,
+    draw_pressures,
+    map_axes,
+    say,
+)
 from multiscale.figures.style import (
     BLUE,
+    DEPTHS,
     GAPS,
     ONE_COLUMN,
     PRESSURES,
@@ -33,62 +42,116 @@ def load_text(step: Any) -> str:
 
 def record_text(record: Any) -> str:
     """Return what a recorded contact is of, as titles say it."""
-    return f"load step {record.step}: {load_text(record)}, {len(record.spots)} spots"
+    falls = ", unloading" * record.unloading
+    spots = f"{len(record.spots)} spots" if _touches(record) else "no contact"
+    return f"load step {record.step}{falls}: {load_text(record)}, {spots}"
+
+
+def _touches(record: Any) -> bool:
+    return bool(record.force_N > 0.0)
 
 
 @styled()
-def contact_figure(record: Any) -> Figure:
-    """Draw pressures and gaps as maps, and how large spots and pressures are.
+def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
+    """Draw pressures, gaps and plastic depths as maps, and how large spots and values are.
 
     Spots without fields are drawn as circles of their areas, coloured by their largest pressures.
 
     Args:
         record: A `multiscale.results.contact_record.ContactRecord`.
+        scales: Ends of the colour scales; by default those that suit this contact.
     """
-    fields = record.pressure_MPa is not None
-    if not fields:
+    scales = scales or ContactScales.of([record])
+    if record.pressure_MPa is None:
         figure, (spots, sizes) = panels(1, 2, 2.9, bars=[0], title=record_text(record))
-        draw_contact(spots, record)
-    else:
-        figure, (pressures, gaps, sizes, shares) = panels(
-            2, 2, 5.4, bars=[0, 1], title=record_text(record)
-        )
-        draw_contact(pressures, record)
-        _draw_gaps(gaps, record)
-        _draw_shares(shares, record)
+        draw_contact(spots, record, scales)
+        _draw_sizes(sizes, record)
+        return figure
+    figure, (sizes, shares) = _maps(record, scales, 1)
     _draw_sizes(sizes, record)
+    more = "contact that bears more"
+    _draw_shares(shares, record.pressure_MPa, ("contact pressure", "MPa"), more)
     return figure
 
 
-def draw_contact(axes: Any, record: Any) -> None:
+@styled()
+def contact_maps(record: Any, scales: ContactScales) -> Figure:
+    """Draw pressures, gaps and plastic depths as maps; spots without fields as circles.
+
+    Args:
+        record: A `multiscale.results.contact_record.ContactRecord`.
+        scales: Ends of the colour scales.
+    """
+    if record.pressure_MPa is None:
+        return contact_figure(record, scales)
+    return _maps(record, scales, 0)[0]
+
+
+def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, list[Any]]:
+    """Return a figure with the maps of a contact, and its two panels of each further row."""
+    yields = record.plastic_depth_mm is not None
+    rows, bars = 1 + yields + more_rows, [0, 1, *([2] if yields else [])]
+    title = record_text(record)
+    figure, (pressures, gaps, *others) = panels(rows, 2, 2.7 * rows, bars=bars, title=title)
+    draw_contact(pressures, record, scales)
+    _draw_gaps(gaps, record, scales.gap)
+    if yields:
+        depths, shares, *others = others
+        _draw_depths(depths, record, scales.depth)
+        deeper = "yielded area that is deeper"
+        _draw_shares(shares, record.plastic_depth_mm, ("plastic depth", "mm"), deeper)
+    return figure, others
+
+
+def draw_contact(axes: Any, record: Any, scales: ContactScales | None = None) -> None:
     """Draw the map of contact pressures, white where there are none; of spots alone circles.
 
     Args:
         axes: Axes to draw into.
         record: A `multiscale.results.contact_record.ContactRecord`.
+        scales: Ends of the colour scales; by default those that suit this contact.
     """
-    if record.pressure_MPa is None:
-        _draw_spots(axes, record)
+    scales = scales or ContactScales.of([record])
+    if not _touches(record):
+        map_axes(axes, record.lengths_mm)
+        say(axes, f"no contact:\nthe force at load step {record.step} is zero")
+        axes.set_title("contact pressure")
         return
-    unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
-    shown = np.ma.masked_less_equal(pressure, 0.0)
-    # few cells carry the largest pressures
-    top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
-    image = _draw_field(axes, record, shown, PRESSURES, Normalize(0.0, top), largest=True)
+    if record.pressure_MPa is None:
+        _draw_spots(axes, record, scales.spot)
+        return
+    unit, size = usual_unit([scales.pressure], "MPa")
+    shown = np.ma.masked_less_equal(np.asarray(record.pressure_MPa) / size, 0.0)
+    scale = Normalize(0.0, scales.pressure / size)
+    image = _draw_field(axes, record, shown, PRESSURES, scale, largest=True)
     colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
     peak = quantity(float(np.max(record.pressure_MPa)), "MPa", 3)
     axes.set_title(f"contact pressure, at most {peak}")
 
 
-def _draw_gaps(axes: Any, record: Any) -> None:
+def _draw_gaps(axes: Any, record: Any, top: float) -> None:
     closed = np.asarray(record.pressure_MPa) > 0.0
-    unit, gap = _in_unit(np.maximum(np.asarray(record.gap_mm), 0.0), "mm")
-    shown = np.ma.masked_where(closed, gap)
-    top = float(shown.max()) if not closed.all() else 1.0
+    unit, size = usual_unit([top], "mm")
+    shown = np.ma.masked_where(closed, np.maximum(np.asarray(record.gap_mm) / size, 0.0))
     axes.set_facecolor(VERMILLION)
-    image = _draw_field(axes, record, shown, GAPS, Normalize(0.0, top), largest=False)
+    scale = Normalize(0.0, top / size or 1.0)
+    image = _draw_field(axes, record, shown, GAPS, scale, largest=False)
     colour_bar(image, axes, f"gap [{unit}]")
-    axes.set_title("gap; contact in red")
+    axes.set_title("gap; contact in red" if closed.any() else "gap; no contact")
+
+
+def _draw_depths(axes: Any, record: Any, top: float) -> None:
+    depth = np.asarray(record.plastic_depth_mm)
+    if not depth.any():
+        map_axes(axes, record.lengths_mm)
+        say(axes, "nothing has yielded")
+        axes.set_title("plastic depth")
+        return
+    unit, size = usual_unit([top], "mm")
+    shown = np.ma.masked_less_equal(depth / size, 0.0)
+    image = _draw_field(axes, record, shown, DEPTHS, Normalize(0.0, top / size), largest=True)
+    colour_bar(image, axes, f"plastic depth [{unit}]")
+    axes.set_title(f"plastic depth, at most {quantity(float(depth.max()), 'mm', 3)}")
 
 
 def _draw_field(
@@ -116,7 +179,7 @@ def _draw_field(
     return axes.tripcolor(mesh, facecolors=filled, rasterized=True, **look)
 
 
-def _draw_spots(axes: Any, record: Any) -> None:
+def _draw_spots(axes: Any, record: Any, top: float) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
     many = len(diameter) > 500  # whose outlines would hide their colours
@@ -125,9 +188,9 @@ def _draw_spots(axes: Any, record: Any) -> None:
         offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
         rasterized=many,
     )  # fmt: skip
-    name, pressure = _in_unit(record.peak_pressure_MPa, "MPa")
-    spots.set_array(pressure)
-    spots.set_clim(0.0, float(pressure.max(initial=0.0)) or 1.0)
+    name, size = usual_unit([top], "MPa")
+    spots.set_array(record.peak_pressure_MPa / size)
+    spots.set_clim(0.0, top / size or 1.0)
     axes.add_collection(spots)
     colour_bar(spots, axes, f"largest pressure of the spot [{name}]")
     axes.set_title("spots, as circles of their areas")
@@ -138,6 +201,8 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     axes.set(xlabel="area of a spot [µm²]", ylabel="number of spots", title="sizes of the spots")
     exponent = np.log10(1e6 * record.area_mm2)
     if not exponent.size:
+        axes.set(xticks=[], yticks=[])
+        say(axes, "no spots")
         return
     low, high = np.floor(exponent.min()), np.floor(exponent.max()) + 1.0
     bins = np.logspace(low, high, int(8 * (high - low)) + 1)
@@ -147,22 +212,19 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 
-def _draw_shares(axes: Any, record: Any) -> None:
-    """Draw which share of the contact bears more than a pressure."""
-    unit, pressure = _in_unit(np.asarray(record.pressure_MPa), "MPa")
-    axes.set(xlabel=f"contact pressure [{unit}]", ylabel="contact that bears more [%]")
-    axes.set_title("pressures in the contact")
-    loaded = np.sort(pressure[pressure > 0.0], axis=None)
-    if loaded.size:
-        share = np.linspace(0.0, 100.0, 401)
-        axes.plot(np.percentile(loaded, 100.0 - share), share, color=BLUE)
-        axes.set(xlim=(0.0, None), ylim=(0.0, 100.0))
-
-
-def _in_unit(values: Any, unit: str) -> tuple[str, Any]:
-    """Return the unit that suits the largest of values, and the values in it."""
-    name, size = usual_unit([float(np.max(values, initial=0.0))], unit)
-    return name, values / size
+def _draw_shares(axes: Any, values: Any, quantity_and_unit: tuple[str, str], share: str) -> None:
+    """Draw which share of the points with a value above zero has more than each value."""
+    text, unit = quantity_and_unit
+    known = np.asarray(values)[np.asarray(values) > 0.0]
+    name, size = usual_unit([float(np.max(known, initial=0.0))], unit)
+    axes.set(xlabel=f"{text} [{name}]", ylabel=f"{share} [%]", title=f"{text}s, by share")
+    if not known.size:
+        axes.set(xticks=[], yticks=[])
+        say(axes, "none")
+        return
+    percents = np.linspace(0.0, 100.0, 401)
+    axes.plot(np.percentile(known / size, 100.0 - percents), percents, color=BLUE)
+    axes.set(xlim=(0.0, None), ylim=(0.0, 100.0))
 
 
 @styled()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from multiscale.figures.style import (
 
 @styled()
 def history_figure(history: Any, kind: str) -> Figure:
-    """Draw force, contact area and mean separation of a run.
+    """Draw force, contact area and mean separation of a run; dashed where the load falls.
 
     Args:
         history: A `multiscale.results.history.History`.
@@ -40,9 +41,11 @@ def history_figure(history: Any, kind: str) -> Figure:
     level = not any(any(step.tilt) for step in history.steps)
     touch = -history.steps[0].zero_mm if level and len(history) else np.nan
     approach = 1e3 * np.append(touch, history.approach_mm)
-    force.plot(approach, pressure, **look)
-    area.plot(pressure, 100 * np.append(0.0, history.contact_area_fraction), **look)
-    gap.plot(1e3 * history.mean_separation_mm, history.mean_pressure_MPa, **look)
+    falls = history.unloading
+    draw_path(force, approach, pressure, np.append(False, falls), look)
+    share = 100 * np.append(0.0, history.contact_area_fraction)
+    draw_path(area, pressure, share, np.append(False, falls), look)
+    draw_path(gap, 1e3 * history.mean_separation_mm, history.mean_pressure_MPa, falls, look)
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
     area.set(ylabel="contact area fraction [%]")
@@ -52,6 +55,30 @@ def history_figure(history: Any, kind: str) -> Figure:
     show_unit(gap.xaxis, "mean separation", "mm", history.mean_separation_mm, 1e-3)
     add_legend(figure)
     return figure
+
+
+def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:
+    """Draw points along a path: where the load falls, dashed and with hollow markers.
+
+    Args:
+        axes: Axes to draw into.
+        x: Abscissae of the n points.
+        y: Their ordinates.
+        falls: Whether the load falls to each point, shape (n,); it does not to the first.
+        look: Look of the line, with its label.
+    """
+    turns = [0, *np.flatnonzero(np.diff(falls.astype(int))), len(x) - 1]
+    # above the others, with which it may coincide
+    falling = {"color": "0.6", "ls": "--", "mfc": "white", "label": "unloading", "zorder": 3}
+    labelled = set()
+    for start, end in pairwise(turns):
+        here = look | (falling if falls[end] else {})
+        if here["label"] in labelled:
+            here["label"] = None
+        labelled.add(here["label"])
+        part = slice(start, end + 1)
+        # a turning point is marked by the part that ends there
+        axes.plot(x[part], y[part], markevery=slice(1 if start else 0, None), **here)
 
 
 def draw_error_band(force: Any, area: Any, history: Any, *, colour: str) -> None:

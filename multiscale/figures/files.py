@@ -52,6 +52,15 @@ class Pictures(NamedTuple):
     files: dict[str, bytes]
     problem: str = ""
 
+    def without(self, beginning: str) -> Pictures:
+        """Return the files whose names do not begin as those do that only a report shows.
+
+        Args:
+            beginning: The beginning of their names.
+        """
+        kept = {name: one for name, one in self.files.items() if not name.startswith(beginning)}
+        return Pictures(kept, self.problem)
+
 
 def file_kinds(figures: bool | str) -> tuple[str, ...]:
     """Return the kinds of files that a scene's `output.figures` asks for."""

@@ -10,7 +10,7 @@ from matplotlib.colors import Normalize, to_rgb
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
-from multiscale.figures.style import BLUE, NO_CONTACT, ORANGE, PRESSURES
+from multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
 from multiscale.readable import number, usual_unit
 
 Array = NDArray[np.float64]
@@ -41,6 +41,17 @@ def map_axes(axes: Any, lengths: tuple[float, float]) -> float:
     axes.spines[:].set_visible(True)
     axes.grid(False)
     return scale
+
+
+def say(axes: Any, text: str) -> None:
+    """Write into the middle of axes why they are empty.
+
+    Args:
+        axes: The axes.
+        text: What to say.
+    """
+    middle = {"ha": "center", "va": "center", "transform": axes.transAxes}
+    axes.text(0.5, 0.5, text, color=GREY, **middle)
 
 
 def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither") -> Any:
@@ -113,7 +124,9 @@ def draw_pressures(
         for (x, y), value in zip(scale * patches.centres, pressure, strict=True):
             colour = "white" if value > 0.6 * norm.vmax else "black"
             axes.text(x, y, _number(value), ha="center", va="center", color=colour, fontsize=7)
-    if label:
+    if not pressure.max(initial=0.0) > 0.0:
+        say(axes, "no contact")
+    elif label:
         colour_bar(image, axes, f"{label} [{unit}]")
     return image
 
@@ -143,6 +156,9 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
     look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
     loaded = pressure > 0.0
     axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
+    if not loaded.any():
+        say(axes, "no contact")
+        return
     place = scale * x[loaded], scale * y[loaded]
     name, unit = usual_unit([float(pressure.max())], "MPa")
     dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)

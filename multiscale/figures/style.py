@@ -48,6 +48,8 @@ PRESSURES = ListedColormap(colormaps["YlOrRd"](np.linspace(0.12, 1.0, 256)), nam
 """Colours of contact pressures, from pale yellow; what carries none is `NO_CONTACT`."""
 GAPS = ListedColormap(colormaps["Blues"](np.linspace(0.0, 0.85, 256)), name="gaps")
 """Colours of gaps, white where the sides nearly touch."""
+DEPTHS = ListedColormap(colormaps["Purples"](np.linspace(0.25, 1.0, 256)), name="depths")
+"""Colours of plastic depths, from pale purple; what has not yielded is white."""
 STRESSES = colormaps["GnBu"]
 """Colours of stresses inside a body."""
 NO_CONTACT = "white"

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import chain
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,8 +12,11 @@ from geometry import InputError, Surface
 from geometry.zero import Zero
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
+from multiscale.loading.body_loads import BodyLoads
 from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stages import states_of
 from multiscale.scene.scene import Scene
+from support.fields import part_of
 
 Problem = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
@@ -46,12 +48,13 @@ def check_patches(scene: Scene, limits: Mapping[str, Sequence[int]]) -> None:
             )
 
 
-def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
-    """Return the load history of a scene, counted from first touch.
+def load_history_on(scene: Scene, surfaces: Sequence[Surface], area: float) -> LoadHistory:
+    """Return the load history of a scene, with approaches from first touch and forces.
 
     Args:
         scene: The scene, whose approaches count from its zero.
         surfaces: Its surface, or samples of it.
+        area: Nominal area of the contact face [mm²].
 
     Raises:
         InputError: When the zero is none of the surface, or the plane does not touch it.
@@ -59,18 +62,31 @@ def load_history_on(scene: Scene, surfaces: Sequence[Surface]) -> LoadHistory:
     loading = scene.loading
     with located(scene, "load.zero"):
         depth = Zero(loading.zero).depth(surfaces)
-    if loading.approach is None:
-        return replace(loading, depth=depth)
-    points = tuple(value + depth for value in loading.approach)
-    if not points[0] > 0.0 or min(points) < 0.0:
+    pulls = [] if scene.body is None else [one.pull for one in body_states(scene, "body")]
+    history = loading.on_face(depth, area, pulls)
+    points = history.approach
+    if points is not None and (not points[0] > 0.0 or min(points) < 0.0):
         raise InputError(
             f"does not touch the surface, or turns before first touch, {depth:.6g} mm above the "
             f"{loading.zero}",
             key="load.approach",
-            value=list(loading.approach),
+            value=list(loading.approach or ()),
             allowed=f"> {-depth:.6g} mm",
         )
-    return replace(loading, approach=points, depth=depth)
+    return history
+
+
+def body_states(scene: Scene, name: Literal["body", "counter_body"]) -> list[BodyLoads]:
+    """Return the states of a body's loads, see `multiscale.loading.stages.states_of`.
+
+    Args:
+        scene: The scene.
+        name: Section of the body.
+    """
+    section, stages = getattr(scene, name), scene.loading.stage
+    base = BodyLoads(**part_of(section, BodyLoads))
+    lasting = [one.cycles is None for one in stages]
+    return states_of(base, [getattr(one, name) for one in stages], lasting)
 
 
 def check_load(
@@ -94,9 +110,10 @@ def check_load(
     problems = chain(
         _without_steps(scene),
         _lost(scene, load_history, surfaces),
-        _beyond_hardness(scene, area),
+        _without_load(scene, load_history),
+        _beyond_hardness(scene, load_history, area),
         _without_gap(scene, surfaces[0], load_history),
-        () if body is None else _beyond_body(load_history, area, body),
+        () if body is None else _beyond_body(scene, load_history, area, body),
     )
     for key, value, problem, allowed in problems:
         raise InputError(problem, key=key, value=value, allowed=allowed)
@@ -118,14 +135,14 @@ def _lost(
         yield "load.approach", list(stated), "is lost in the rounding of the heights", allowed
 
 
-def _beyond_hardness(scene: Scene, area: float) -> Iterator[Problem]:
+def _beyond_hardness(scene: Scene, load_history: LoadHistory, area: float) -> Iterator[Problem]:
     """Yield forces whose mean pressure the hardness does not bear anywhere."""
-    force, hardness = scene.loading.force, scene.micro.hardness
-    if force is None or hardness is None or hardness > (mean := max(force) / area):
+    force, hardness = load_history.largest, scene.micro.hardness
+    if load_history.quantity != "force" or hardness is None or hardness > (mean := force / area):
         return
     problem = (
         "leaves no equilibrium: even where all of the face touches, the force of "
-        f"{max(force):.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
+        f"{force:.6g} N on {area:.6g} mm² needs a mean pressure of {mean:.6g} MPa"
     )
     allowed = f"> {mean:.6g} MPa, or a smaller load.force"
     yield "micro.hardness", f"{hardness:.6g} MPa", problem, allowed
@@ -133,24 +150,38 @@ def _beyond_hardness(scene: Scene, area: float) -> Iterator[Problem]:
 
 def _without_gap(scene: Scene, surface: Surface, load_history: LoadHistory) -> Iterator[Problem]:
     """Yield approaches that leave a periodic surface no gap, unless it yields."""
-    points, most = scene.loading.approach, surface.highest - surface.mean_height
-    if points is None or not scene.surface.periodic or scene.law.representative:
+    most = surface.highest - surface.mean_height
+    periodic = scene.surface.periodic and not scene.law.representative
+    if load_history.quantity != "approach" or not periodic:
         return
-    if scene.micro.hardness is None and (deepest := load_history.largest) >= most:
+    if scene.micro.hardness is None and load_history.largest >= most:
         problem = "leaves no gap on the periodic surface, whose mean displacement counts as none"
         allowed = (
-            f"less than {most - deepest + max(points):.6g} mm, where the plane reaches the mean "
+            f"less than {most - load_history.depth:.6g} mm, where the plane reaches the mean "
             "height; beyond it load.force"
         )
-        yield "load.approach", list(points), problem, allowed
+        key, points = scene.loading.stated
+        yield f"load.{key}", points, problem, allowed
 
 
-def _beyond_body(load_history: LoadHistory, area: float, body: BodyFacts) -> Iterator[Problem]:
-    key, most = "load.approach", f"the body's height, {body.depth:.6g} mm"
-    largest = body.depth
+def _without_load(scene: Scene, load_history: LoadHistory) -> Iterator[Problem]:
+    """Yield stages that press nothing."""
+    if load_history.largest > 0.0 or (scene.law.representative and scene.loads_bodies):
+        return
+    if scene.loading.stage:
+        allowed = "an approach, a force or a pressure of one of the stages"
+        yield "load.stage", None, "presses nothing: no stage has a load of the plane", allowed
+
+
+def _beyond_body(
+    scene: Scene, load_history: LoadHistory, area: float, body: BodyFacts
+) -> Iterator[Problem]:
+    most, largest = f"the body's height, {body.depth:.6g} mm", body.depth
     if load_history.quantity == "force":
-        key, largest = "load.force", body.materials[0].young_modulus * area
+        largest = body.materials[0].young_modulus * area
         most = f"E times area, {largest:.6g} N"
+    if scene.loading.pressure is not None:
+        most = f"E, {body.materials[0].young_modulus:.6g} MPa"
     if load_history.largest > largest:
-        points = list(load_history.points)
-        yield key, points, "presses the body to nothing", f"at most {most}"
+        key, points = scene.loading.stated
+        yield f"load.{key}", points, "presses the body to nothing", f"at most {most}"

@@ -137,7 +137,7 @@ def reference_meshes(
     block, reference = block_section(scene), scene.reference
     hexahedral, fine = reference.hexahedral, reference.fine
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
-    prescribed = scene.loading.force is None and scene.loading.tilt != "free"
+    prescribed = scene.loading.quantity == "approach" and scene.loading.tilt != "free"
     largest = approach if prescribed else 1.1 * approach  # blocks yield more than half-spaces
     with located(scene, _key(hexahedral)):
         if fine is not None and not hexahedral:

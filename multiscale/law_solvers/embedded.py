@@ -43,6 +43,7 @@ class EmbeddedLaws(LawSolver):
         super().__init__(table)
         self.face = face
         self._last: FaceContactState | None = None
+        self._body_state = 0.0
         self._take(problem, table)
 
     def _take(self, problem: LawContactProblem, table: LawTable) -> None:
@@ -93,7 +94,7 @@ class EmbeddedLaws(LawSolver):
         """Return this rank's displacements, and the pressures of patches or at its points."""
         of_patches = isinstance(self.table.patches, PatchGrid)
         shown = step.patches.pressure_MPa if of_patches else self.point_pressures
-        return self.displacement, shown
+        return (self.displacement, step.body_state), shown
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
@@ -129,13 +130,15 @@ class EmbeddedLaws(LawSolver):
             problem = "a flat patch, whose pressure is a function of closure nowhere"
             raise self.beyond_law(control, problem) from error
         step = self._step(control, state)
-        self._last = state
+        self._last, self._body_state = state, control.body_state
         return step
 
     def state(self) -> Any:
         """Return the latest plane and pressures, which determine the displacements."""
         last = self._last
-        return None if last is None else (last.approach, last.tilt, last.patch_pressure)
+        if last is None:
+            return None
+        return last.approach, last.tilt, last.patch_pressure, self._body_state
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -143,9 +146,10 @@ class EmbeddedLaws(LawSolver):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
-            approach, tilt, pressure = state
+            approach, tilt, pressure, body_state = state
             self._problem.start_from(pressure)
-            self._last = self._problem.solve(Control(approach=approach, tilt=tilt))
+            control = Control(approach=approach, tilt=tilt, body_state=body_state)
+            self._last, self._body_state = self._problem.solve(control), body_state
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from geometry import Control
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.stepper import BeyondLaws, StepSolver
@@ -45,6 +47,11 @@ class LawSolver(StepSolver):
                 "where the closure of a law falls the mesh cannot follow: take coupling.newton = "
                 "'condensed', which goes on, or coupling.kind = 'concurrent', which needs no law"
             )
+        elif self.face is not None and any(map(_is_loaded, self.meshed_bodies)):
+            remedy = (
+                "loads of the body shift the pressures further than the laws were made for: take "
+                "law.kind = 'representative', whose laws are extended, or a smaller load"
+            )
         else:
             remedy = (
                 "the block lets the plane come or turn further than the half-space that the laws "
@@ -52,3 +59,8 @@ class LawSolver(StepSolver):
             )
         reason = f"LAW_RANGE: {problem}"
         return BeyondLaws(f"the patches at {control}", reason=reason, iterations=0, remedy=remedy)
+
+
+def _is_loaded(body: Any) -> bool:
+    """Tell whether anything but contact moves a body."""
+    return bool(body.is_preloaded)

@@ -1,8 +1,10 @@
-"""Load histories: what scenes prescribe of the rigid plane."""
+"""Load histories: what scenes prescribe of the rigid plane, and of bodies stage by stage."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Annotated, Literal
 
@@ -10,14 +12,16 @@ import numpy as np
 
 from geometry import Control, InputError
 from geometry.zero import FIRST_TOUCH, Zero
+from multiscale.loading.stages import Leg, Quantity, Repeats, Stage, legs_of
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
-_Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
+Plane = tuple[float, float]
+"""Approach of the plane [mm], and force of the contact [N]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True)
 class LoadHistory:
     """The motion of the rigid plane: turning points of its approach, or of the force on it.
 
@@ -28,16 +32,21 @@ class LoadHistory:
             and 1. On measured surfaces one point decides about first touch, and no single one about
             the others. Approaches may be negative there.
         approach: Approach of the rigid plane, counted from ``zero``, or a list of turning points
-            [mm]. Exactly one of ``approach`` and ``force`` is given.
-        force: Force on the rigid plane, or a list of turning points [N].
+            [mm]. Exactly one of ``approach``, ``force``, ``pressure`` and ``stage`` is given.
+        force: Force on the rigid plane, or a list of turning points [N]. Where the body has a
+            ``pretension`` the contact bears its pull besides.
+        pressure: The same as mean pressure: force over the nominal area of the contact face [MPa].
+        stage: Parts of the load history in turn, each with loads of the plane and of the bodies.
         steps: Load steps to every turning point.
         cycles: How often the plane goes through the turning points, of which it needs two at least.
         tilt: Slopes of the approach along x and y about the middle of the interface; ``free`` lets
-            the plane turn until the pressures have no moment.
+            the plane turn until the pressures have no moment beside that of bolts.
         force_change: Largest change of the force in one step, relative to the largest force so far;
             a step that exceeds it is halved. When not given no step is halved.
         depth: How far the zero lies below the highest point of the surface. On a surface, where
             it is known, approaches count from first touch, which this is added for [mm].
+        pulls: Pull of bolts before every stage and at its end, in turn, where the bodies are known;
+            without stages the pull alone [N].
 
     Raises:
         InputError: When there is no load or two, or a load history makes no sense.
@@ -46,11 +55,14 @@ class LoadHistory:
     zero: str = FIRST_TOUCH
     approach: Annotated[tuple[float, ...], Unit("mm", several=True)] | None = None
     force: Annotated[tuple[float, ...], Unit("N", several=True)] | None = None
-    steps: _Repeats = 8
-    cycles: _Repeats = 1
+    pressure: Annotated[tuple[float, ...], Unit("MPa", several=True)] | None = None
+    stage: tuple[Stage, ...] = ()
+    steps: Repeats = 8
+    cycles: Repeats = 1
     tilt: Tilt = (0.0, 0.0)
     force_change: Annotated[float, Limits(ge=1e-3, lt=1)] | None = None
     depth: float = field(default=0.0, metadata={KEY: None})
+    pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
 
     def __post_init__(self) -> None:
         check_limits(self)
@@ -58,73 +70,127 @@ class LoadHistory:
             object.__setattr__(self, "zero", Zero(self.zero).name)
         except InputError as error:
             raise error.located(key="zero") from None
-        if self.approach is not None:
-            _check_points(self.approach, "mm", "approach", from_zero=self.zero == FIRST_TOUCH)
-        if self.force is not None:
-            _check_points(self.force, "N", "force", from_zero=True)
-        if (self.approach is None) == (self.force is None):
-            raise InputError("needs exactly one load", allowed="either 'approach' or 'force'")
+        stated = [key for key in _LOADS if getattr(self, key) not in (None, ())]
+        for key, (unit, from_zero) in _LOADS.items():
+            points = getattr(self, key)
+            if unit and points is not None:
+                from_zero = from_zero or self.zero == FIRST_TOUCH
+                _check_points(points, unit, key, from_zero=from_zero)
+        if len(stated) != 1:
+            raise InputError(
+                "needs exactly one load", allowed="'approach', 'force', 'pressure' or 'stage'"
+            )
         if self.cycles > 1 and len(self.points) < 2:
             raise InputError(
                 f"cycles = {self.cycles} needs two turning points",
-                allowed="a list of loads, or cycles = 1",
+                allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
             )
 
     @property
-    def quantity(self) -> Literal["approach", "force"]:
-        """What is prescribed."""
-        return "approach" if self.force is None else "force"
+    def quantity(self) -> Quantity:
+        """What is prescribed; a force where stages prescribe both."""
+        if self.stage:
+            of_stages = {leg.quantity for leg in self.ways}
+            return "force" if "force" in of_stages else "approach"
+        return "force" if self.approach is None else "approach"
+
+    def quantity_in(self, stage: int | None) -> Quantity:
+        """Return what is prescribed in a stage.
+
+        Args:
+            stage: Its number, from 1; None for a history without stages.
+        """
+        if stage is None:
+            return self.quantity
+        return next(leg.quantity for leg in self.ways if leg.stage == stage - 1)
+
+    @property
+    def stated(self) -> tuple[str, list[float] | None]:
+        """The key of the load, and its turning points as they were stated; None of stages."""
+        key = next(key for key in _LOADS if getattr(self, key) not in (None, ()))
+        return key, None if self.stage else list(getattr(self, key))
 
     @property
     def points(self) -> tuple[float, ...]:
-        """Its values at the ends of the legs, the first of which starts at zero [mm or N]."""
-        return self.approach or self.force or ()
+        """The quantity's values at the ends of the legs, as far as known beforehand [mm or N].
+
+        Forces are those of the contact: bolts pull besides the force on the plane.
+        """
+        return self._ends(self.quantity)
+
+    def _ends(self, quantity: Quantity) -> tuple[float, ...]:
+        """Return the values of a quantity at the ends of the legs that prescribe it."""
+        known = []
+        for leg in self.ways if self.stage else self.ways[: len(self.ways) // self.cycles]:
+            if leg.quantity == quantity and leg.end is not None:
+                pull = self._pull(self._state(leg, 1.0)) if quantity == "force" else 0.0
+                known.append(leg.end + pull)
+        return tuple(known)
 
     @property
     def slopes(self) -> tuple[float, float] | None:
         """Slopes of the plane; None lets it turn freely."""
         return None if self.tilt == "free" else self.tilt
 
-    @property
-    def targets(self) -> list[float]:
-        """Values of the prescribed quantity at the load steps, before any is halved."""
-        first, later = self.cycle_from(0.0), self.cycle_from(self.points[-1])
-        return first + (self.cycles - 1) * later
+    @cached_property
+    def ways(self) -> tuple[Leg, ...]:
+        """The straight ways between turning points, or through stages."""
+        if self.stage:
+            return tuple(legs_of(self.stage, self.steps))
+        points = self.cycles * (self.approach or self.force or self.pressure or ())
+        ends = pairwise((0.0, *points))
+        return tuple(Leg(0, self.quantity, start, end, self.steps) for start, end in ends)
 
-    def cycle_from(self, value: float) -> list[float]:
-        """Return the values of the prescribed quantity in a cycle that starts at a value."""
-        ends = np.array((value, *self.points))
-        legs = np.linspace(ends[:-1], ends[1:], self.steps + 1, axis=1)[:, 1:]
-        return [float(each) for each in legs.ravel()]
+    @cached_property
+    def _begins(self) -> list[int]:
+        """Number of load steps before every leg, and of all."""
+        return [0, *(int(count) for count in np.cumsum([leg.steps for leg in self.ways]))]
 
     @property
     def legs(self) -> int:
         """Number of ways from one turning point to the next."""
-        return self.cycles * len(self.points)
+        return len(self.ways)
 
     @property
     def count(self) -> int:
         """Number of load steps, before any is halved."""
-        return self.steps * self.legs
+        return self._begins[-1]
 
     @property
     def largest(self) -> float:
-        """Largest value of the prescribed quantity."""
-        return max(self.points)
+        """Largest value of the prescribed quantity that is known beforehand."""
+        return max(self.points, default=0.0)
 
     @property
     def unloads(self) -> bool:
-        """Whether the load falls anywhere."""
-        points = self.points[-1:] * (self.cycles > 1) + self.points
-        return any(later < earlier for earlier, later in pairwise(points))
+        """Whether the load falls anywhere, or may fall at some points of a face."""
+        if len({leg.quantity for leg in self.ways}) > 1 or any(
+            one.hold or one.loads_bodies for one in self.stage
+        ):
+            return True
+        return any(leg.end < leg.start for leg in self.ways)  # type: ignore[operator]
 
     @property
-    def up_to_largest(self) -> LoadHistory:
-        """The history of one load step, straight to the largest load."""
-        load = (self.largest,)
-        if self.quantity == "force":
-            return LoadHistory(force=load, steps=1, tilt=self.tilt)
-        return LoadHistory(approach=load, steps=1, tilt=self.tilt)
+    def largest_controls(self) -> list[Control]:
+        """What prescribes the largest approach and the largest force, as far as there are any."""
+        ends = {quantity: self._ends(quantity) for quantity in ("approach", "force")}
+        found = {quantity: max(values, default=0.0) for quantity, values in ends.items()}
+        return [
+            Control(**{quantity: value}, tilt=self.slopes)  # type: ignore[arg-type]
+            for quantity, value in found.items()
+            if value > 0.0
+        ]
+
+    def straight_to(self, control: Control) -> LoadHistory:
+        """Return the history of one load step, straight to an approach or a force.
+
+        Args:
+            control: What it prescribes.
+        """
+        tilt: Tilt = "free" if control.tilt is None else control.tilt
+        if control.approach is None:
+            return LoadHistory(force=(control.force or 0.0,), steps=1, tilt=tilt)
+        return LoadHistory(approach=(control.approach,), steps=1, tilt=tilt)
 
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""
@@ -132,11 +198,128 @@ class LoadHistory:
             return Control(force=value, tilt=self.slopes)
         return Control(approach=value, tilt=self.slopes)
 
+    def stage_at(self, time: float) -> int | None:
+        """Return the number of the stage of a load step, from 1; None without stages.
+
+        Args:
+            time: The load step, counted from 0 before the first one; between two it is none.
+        """
+        return self.ways[self._leg_at(time)].stage + 1 if self.stage else None
+
+    def begins_stage(self, time: float) -> bool:
+        """Tell whether a stage begins after a load step, counted likewise."""
+        leg = self._leg_at(time + 0.5)
+        return time == self._begins[leg] and (
+            leg == 0 or self.ways[leg].stage != self.ways[leg - 1].stage
+        )
+
+    def control_at(self, time: float, origin: Plane = (0.0, 0.0)) -> Control:
+        """Return what a load step prescribes.
+
+        Args:
+            time: Its number; load steps that were put in between have numbers between.
+            origin: The plane when the stage began.
+        """
+        index = self._leg_at(time)
+        leg, begin = self.ways[index], self._begins[index]
+        done = time - begin
+        state = self._state(leg, done / leg.steps)
+        pull_before = self._pull(2.0 * leg.stage)
+        now = origin[0] if leg.quantity == "approach" else origin[1] - pull_before
+        start, end = (now if value is None else value for value in (leg.start, leg.end))
+        value = end if done == leg.steps else start + done * ((end - start) / leg.steps)
+        if leg.quantity == "approach":
+            return Control(approach=value, tilt=self.slopes, body_state=state)
+        force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand
+        return Control(force=force, tilt=self.slopes, body_state=state)
+
+    def _leg_at(self, time: float) -> int:
+        """Return the index of the leg that a load step is on."""
+        return max(int(np.searchsorted(self._begins, time)) - 1, 0)
+
+    def _state(self, leg: Leg, share: float) -> float:
+        """Return the position among the states of the bodies' loads."""
+        if not self.stage:
+            return 0.0
+        return 2.0 * leg.stage + (share if leg.there else 1.0 - share)
+
+    def _pull(self, state: float) -> float:
+        """Return the pull of bolts at a position among the states of the bodies' loads [N]."""
+        if not any(self.pulls):
+            return 0.0
+        return float(np.interp(state, np.arange(len(self.pulls)), self.pulls))
+
+    def on_face(self, depth: float, area: float, pulls: Sequence[float]) -> LoadHistory:
+        """Return the history on a contact face, with approaches from first touch and with forces.
+
+        Args:
+            depth: How far the zero lies below the highest point of the surface [mm].
+            area: Nominal area of the face [mm²].
+            pulls: See the class.
+
+        Raises:
+            InputError: When the force that is left for the contact is negative.
+        """
+
+        def lowered(points: Sequence[float] | None, by: float) -> tuple[float, ...] | None:
+            return None if points is None else tuple(point + by for point in points)
+
+        force = self.force
+        if self.pressure is not None:
+            force = tuple(pressure * area for pressure in self.pressure)
+        stages = tuple(
+            replace(
+                one,
+                approach=None if one.approach is None else one.approach + depth,
+                force=one.force if one.pressure is None else one.pressure * area,
+                pressure=None,
+            )
+            for one in self.stage
+        )
+        found = replace(
+            self,
+            approach=lowered(self.approach, depth),
+            force=force,
+            pressure=None,
+            stage=stages,
+            depth=depth,
+            pulls=tuple(pulls),
+        )
+        for leg in found.ways if found.stage else ():
+            found._check_pulled(leg)
+        return found
+
+    def _check_pulled(self, leg: Leg) -> None:
+        """Refuse stages whose forces pull the plane off, or whose plane is clear at the start."""
+        stage, key = self.stage[leg.stage], f"load.stage.{leg.stage}"
+        if leg.quantity == "force" and leg.end is not None:
+            pull = self._pull(2.0 * leg.stage + leg.there)
+            if leg.end + pull < 0.0:
+                raise InputError(
+                    "pulls the plane off the surface",
+                    key=f"{key}.force",
+                    value=leg.end,
+                    allowed=f"≥ {-pull:.6g} N, the pull of the bolts",
+                )
+        if stage.approach is not None and stage.approach < 0.0:
+            raise InputError(
+                "turns before first touch", key=f"{key}.approach", value=stage.approach - self.depth
+            )
+
     def shown(self, control: Control) -> Control:
         """Return a control whose approach counts from the zero, as users see it."""
         if control.approach is None:
             return control
         return replace(control, approach=control.approach - self.depth)
+
+
+_LOADS = {
+    "approach": ("mm", False),
+    "force": ("N", True),
+    "pressure": ("MPa", True),
+    "stage": ("", False),
+}
+"""Keys of loads, with the unit of turning points, and whether they never fall below 0."""
 
 
 def _check_points(points: tuple[float, ...], unit: str, key: str, *, from_zero: bool) -> None:

@@ -9,8 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry import PatchGrid, Regions
+from geometry import Control, PatchGrid, Regions
 from support.arrays import Array
+
+_SAME = 1e-6
+"""Relative change below which the forces, or approaches, of two load steps count as the same."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +87,8 @@ class LoadStep:
         electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
             none.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
+        stage: Number of the stage, from 1; None where the load history has none.
+        body_state: Position among the states of the bodies' loads, see `geometry.Control`.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
@@ -119,6 +124,8 @@ class LoadStep:
     gap_conductance_W_per_K: float | None = None
     electrical_conductance_S: float | None = None
     zero_mm: float = 0.0
+    stage: int | None = None
+    body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
 
     @classmethod
@@ -193,6 +200,27 @@ class LoadStep:
             meshes=tuple((approach - zero, *others) for approach, *others in self.meshes),  # type: ignore[misc]
             patches=replace(self.patches, closure_mm=self.patches.closure_mm - zero),
         )
+
+    def is_unloading(self, before: LoadStep | None) -> bool:
+        """Tell whether the force fell to this load step, or under the same force the approach.
+
+        Args:
+            before: The load step before it; None for the first.
+        """
+        if before is None:
+            return False
+        for here, there in (
+            (self.force_N, before.force_N),
+            (self.approach_mm, before.approach_mm),
+        ):
+            if abs(here - there) > _SAME * max(abs(here), abs(there)):
+                return here < there
+        return False
+
+    @property
+    def under_its_plane(self) -> Control:
+        """What brings the plane of the load step, counted from first touch, back to where it is."""
+        return Control(approach=self.approach_mm, tilt=self.tilt, body_state=self.body_state)
 
     @property
     def first_touch_approach_mm(self) -> float | None:

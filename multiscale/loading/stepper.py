@@ -19,6 +19,7 @@ from support.arrays import Array
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""
+_SMALLEST = 1.0 / 2**_MOST_HALVINGS
 
 
 class StepSolver(ABC):
@@ -149,28 +150,29 @@ class LoadPosition:
 
     Attributes:
         steps: Load steps accepted so far.
-        targets: Targets of the load history that were begun so far.
-        ahead: The latest target and values that are to be reached before it, the next one last;
-            empty once the target is reached.
-        smallest: Smallest increment on the way to it.
-        value: Prescribed quantity at the last accepted step [mm or N].
+        targets: Load steps of the history that were begun so far, without halved ones.
+        ahead: The latest of them, and what is to be reached before it, the next one last, counted
+            in load steps of the history; empty once it is reached.
+        time: The last accepted step, counted likewise.
+        approach: Approach there [mm].
         force: Force there [N].
         largest: Largest force so far [N].
+        origin: Approach [mm] and force [N] when the present stage began.
     """
 
     steps: int = 0
     targets: int = 0
     ahead: tuple[float, ...] = ()
-    smallest: float = 0.0
-    value: float = 0.0
+    time: float = 0.0
+    approach: float = 0.0
     force: float = 0.0
     largest: float = 0.0
+    origin: tuple[float, float] = (0.0, 0.0)
 
-    def is_below_past(self, history: LoadHistory) -> bool:
-        """Tell whether the load was larger at an earlier load step, given its history."""
-        begun = history.targets[: self.targets]
-        reached = begun[:-1] if self.ahead else begun
-        return self.value < max(reached, default=self.value)
+    @property
+    def is_below_past(self) -> bool:
+        """Whether the force was larger at an earlier load step, by more than solvers leave."""
+        return self.force < (1.0 - 1e-6) * self.largest
 
     def is_at_end(self, load_history: LoadHistory) -> bool:
         """Whether all load steps of a load history are accepted."""
@@ -226,28 +228,32 @@ class LoadStepper:
 
     def __iter__(self) -> Iterator[LoadStep]:
         """Yield the load steps from the position on."""
-        targets = self._load_history.targets
-        while not self.position.is_at_end(self._load_history):
+        history = self._load_history
+        while not self.position.is_at_end(history):
             now = self.position
             if not now.ahead:
-                target = targets[now.targets]
-                smallest = abs(target - now.value) / 2**_MOST_HALVINGS
-                now = replace(now, targets=now.targets + 1, ahead=(target,), smallest=smallest)
+                if history.begins_stage(now.time):
+                    now = replace(now, origin=(now.approach, now.force))
+                target = now.targets + 1
+                now = replace(now, targets=target, ahead=(float(target),))
             began = time.perf_counter()
             self.position = now
             step = self._within_limit(now.ahead[-1])
             self._seconds += time.perf_counter() - began
             if step is None:
-                between = 0.5 * (now.value + now.ahead[-1])
+                between = 0.5 * (now.time + now.ahead[-1])
                 self.position = replace(now, ahead=(*now.ahead, between))
             else:
                 yield self._accepted(step)
 
+    def _control(self, target: float) -> Control:
+        return self._load_history.control_at(target, self.position.origin)
+
     def _within_limit(self, target: float) -> LoadStep | None:
-        """Press to a value; return None when the force would change by too much."""
-        divisible = abs(target - self.position.value) > self.position.smallest
-        by_force = self._load_history.quantity == "force"
-        if divisible and by_force and self._exceeds_limit(target):
+        """Press to a load step; return None when the force would change by too much."""
+        divisible = target - self.position.time > _SMALLEST
+        force = self._control(target).force
+        if divisible and force is not None and self._exceeds_limit(force):
             return None
         past = getattr(self._solver, "past", None)
         step = self._reached(target)
@@ -266,16 +272,16 @@ class LoadStepper:
         return abs(force - last) > limit * max(largest, force) * (1.0 + 1e-9)
 
     def _reached(self, target: float) -> LoadStep:
-        """Press to a value, through smaller steps where the whole one fails."""
-        last, ahead = self.position.value, [target]
+        """Press to a load step, through smaller ones where the whole one fails."""
+        last, ahead = self.position.time, [target]
         while True:
-            control = self._load_history.control(ahead[-1])
+            control = self._control(ahead[-1])
             try:
                 step = self._solver.press(control)
             except NotConverged as error:
                 self._newton += error.iterations
                 beyond = isinstance(error, BeyondLaws)
-                if beyond or abs(ahead[-1] - last) <= self.position.smallest:
+                if beyond or ahead[-1] - last <= _SMALLEST:
                     shown = self._load_history.shown(control)
                     halved = "" if beyond else f"it was halved {_MOST_HALVINGS} times; "
                     raise NotConverged(
@@ -290,7 +296,8 @@ class LoadStepper:
             self._linear += step.linear_iterations
             last = ahead.pop()
             if not ahead:
-                return step
+                state = control.body_state
+                return replace(step, stage=self._load_history.stage_at(last), body_state=state)
 
     def _accepted(self, step: LoadStep) -> LoadStep:
         """Number a step, give it all iterations and the time that led to it, and move on."""
@@ -306,7 +313,8 @@ class LoadStepper:
             now,
             steps=now.steps + 1,
             ahead=now.ahead[:-1],
-            value=now.ahead[-1],
+            time=now.ahead[-1],
+            approach=step.approach_mm,
             force=step.force_N,
             largest=max(now.largest, step.force_N),
         )

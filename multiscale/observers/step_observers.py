@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from geometry import Control, NotConverged
+from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.energy import with_work
 from multiscale.loading.load_step import LoadStep
@@ -104,12 +104,13 @@ class ContactRecorder(StepObserver):
         self._asked = "none" if coupling.has_laws and asked == "auto" else asked
         self.records: list[ContactRecord] = []
         self._state: Any = None
-        self._seen = 0
+        self._seen, self._unloading = 0, False
         self._failures: list[str] = []
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Record the contact of a load step if it is requested."""
         self._state, self._seen = self._coupling.solver.latest, step.step
+        self._unloading = step.is_unloading(before)
         return self._recorded(step) if last or self._asked == "all" else step
 
     def finish(self, step: LoadStep) -> LoadStep:
@@ -132,7 +133,8 @@ class ContactRecorder(StepObserver):
             step, detail = contact
             shown = step.counted_from(self._coupling.zero)
             lengths = self._coupling.surface.lengths
-            self.records.append(ContactRecord.of(detail, shown, lengths))
+            record = ContactRecord.of(detail, shown, lengths, unloading=self._unloading)
+            self.records.append(record)
         self.release()
         return step
 
@@ -240,7 +242,7 @@ class FieldRecorder(StepObserver):
             solver.past = (None, None)
             again = [step for step in steps if step.step <= max(missing)]
         for step in again:
-            solver.press(Control(approach=step.approach_mm, tilt=step.tilt))
+            solver.press(step.under_its_plane)
             if step.step in missing:
                 self.observe(step, None, last=step is steps[-1])
         solver.past = past

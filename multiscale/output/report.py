@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from importlib.metadata import version
 from typing import Any
+
+import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
+from multiscale.results.contact_record import ContactRecord
+from multiscale.results.history import History
 from multiscale.results.html_page import filled
 from multiscale.run import Run
 
@@ -31,6 +35,31 @@ _MORE = {
     "electrical_conductance_S": ("electrical conductance", "S"),
 }
 """What some runs know of their load steps: attribute, name and unit."""
+
+
+CONTACT_OF_STEP = "contact_of_step_"
+"""Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
+the number of the load step follows."""
+
+_MOST_CONTACTS = 40
+"""Contacts that a report shows at most, each with a picture of some 100 kB."""
+
+
+def shown_contacts(contacts: Sequence[ContactRecord]) -> list[ContactRecord]:
+    """Return the contacts that a report shows: all of up to 40, else as many at equal distances.
+
+    The first, the last and that of the largest force are among them. A single contact has a
+    figure of its own.
+
+    Args:
+        contacts: The contacts of the load steps.
+    """
+    count = len(contacts)
+    if count <= _MOST_CONTACTS:
+        return list(contacts) if count > 1 else []
+    most = max(range(count), key=lambda index: contacts[index].force_N)
+    chosen = {most, *np.linspace(0, count - 1, _MOST_CONTACTS - 1).round().astype(int).tolist()}
+    return [contacts[index] for index in sorted(chosen)]
 
 
 def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any]) -> str:
@@ -62,10 +91,41 @@ def report_html(run: Run, pictures: Mapping[str, bytes], facts: Mapping[str, Any
         folded=[pair for pair in folded if pair[0] != "inputs"],
         measured=next((step for step in reversed(history.steps) if step.errors), None),
         pictures=pictures,
+        **_contacts(history, pictures),
+        unloaded=_unloaded(history),
         made=_made(facts),
         citations=citations(),
         percent=percent,
         quantity=quantity,
+    )
+
+
+def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]:
+    """Return pictures and captions of contacts, and the number of that of the largest force."""
+    known = shown_contacts(history.contact_records)
+    known = [one for one in known if f"{CONTACT_OF_STEP}{one.step}.png" in pictures]
+    contacts = []
+    for record in known:
+        way = "unloading" if record.unloading else "loading"
+        spots = f"{len(record.spots)} spots" if record.force_N > 0.0 else "no contact"
+        load = f"{quantity(record.approach_mm, 'mm')}, force {quantity(record.force_N, 'N')}"
+        caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
+        contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
+    forces = [record.force_N for record in known]
+    return {"contacts": contacts, "first_contact": forces.index(max(forces)) if forces else 0}
+
+
+def _unloaded(history: History) -> str:
+    """Return a sentence where the last load step has no force but others have."""
+    if not len(history) or history.steps[-1].force_N > 0.0:
+        return ""
+    most = max(history.steps, key=lambda step: step.force_N)
+    if not most.force_N > 0.0:
+        return "The force is zero at all load steps: nothing is in contact."
+    last, force = history.steps[-1].step, quantity(most.force_N, "N")
+    return (
+        f"At load step {last} the force is zero and nothing is in contact; it was largest at load "
+        f"step {most.step}, {force}."
     )
 
 

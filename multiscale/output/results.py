@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.couplings.coupling import Coupling
+from multiscale.figures.contact_scales import ContactScales
 from multiscale.figures.files import (
     Drawing,
     FigureProcess,
@@ -22,7 +23,7 @@ from multiscale.figures.files import (
 )
 from multiscale.laws.law_file import hdf5_bytes, write_laws
 from multiscale.output.provenance import provenance
-from multiscale.output.report import report_html
+from multiscale.output.report import CONTACT_OF_STEP, report_html, shown_contacts
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.history import COLUMNS, History
 from multiscale.run import Run
@@ -77,7 +78,7 @@ def _write(folder: Path, run: Run, pictures: Pictures, options: list[str]) -> li
     files = write_tables(folder, history) + write_contacts(folder, run.contacts)
     if table is not None:
         files.append(write_laws(folder / "laws.h5", table))
-    files += write_pictures(folder, pictures)
+    files += write_pictures(folder, pictures.without(CONTACT_OF_STEP))
     facts = provenance(run, options=options)
     files.append(write_text(folder / "provenance.json", json.dumps(facts, indent=2) + "\n"))
     if run.scene.output.report:
@@ -141,7 +142,11 @@ def write_contacts(folder: Path, contacts: Sequence[ContactRecord]) -> list[Path
         file.attrs["units"] = "mm, N, MPa"
         for record in contacts:
             group = file.create_group(f"step_{record.step}")
-            group.attrs.update(approach_mm=record.approach_mm, force_N=record.force_N)
+            group.attrs.update(
+                approach_mm=record.approach_mm,
+                force_N=record.force_N,
+                unloading=record.unloading,
+            )
             for name in FIELDS:
                 if (data := getattr(record, name)) is not None:
                     # most of a map of pressures is zero
@@ -162,6 +167,15 @@ def surface_drawing(coupling: Coupling) -> Drawing:
     surface = replace(coupling.surface)  # without its interpolant, which is not drawn
     about = surface, coupling.summits, coupling.patches, spectrum
     return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
+
+
+def _contacts_of_steps(contacts: Sequence[ContactRecord]) -> Iterator[Drawing]:
+    """Yield figures of several contacts, which have the same colour scales, for the report."""
+    shown = shown_contacts(contacts)
+    scales = ContactScales.of(shown)
+    for record in shown:
+        name = f"{CONTACT_OF_STEP}{record.step}"
+        yield Drawing(name, "figures.contact.contact_maps", (record, scales))
 
 
 class RunFigures:
@@ -257,8 +271,10 @@ class RunFigures:
             contact = run.contacts[-1]
             figures["contact"] = "contact.contact_figure", (contact,)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
-            if self._figures in ("all", "svg") and of_cells:
+            if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
+        if run.scene.output.report:
+            yield from _contacts_of_steps(run.contacts)

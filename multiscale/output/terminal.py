@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from rich.console import Console
 from rich.markup import escape
@@ -24,6 +27,22 @@ if TYPE_CHECKING:
 TABLE_WIDTH = 100
 """Characters of a line that tables take at least, in a log file too."""
 
+_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
+
+
+@contextmanager
+def quietly(quiet: bool) -> Iterator[None]:
+    """Print nothing but errors and cautions, which go to the error stream.
+
+    Args:
+        quiet: Whether it is so; otherwise nothing changes.
+    """
+    token = _QUIET.set(quiet)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)
+
 
 def speaks(comm: Any) -> bool:
     """Tell whether this process prints and writes files.
@@ -32,6 +51,11 @@ def speaks(comm: Any) -> bool:
         comm: MPI communicator, or None.
     """
     return comm is None or comm.rank == 0
+
+
+def colours() -> Literal["auto"] | None:
+    """Return which colours a console of rich has: none, nor bold letters, with ``NO_COLOR``."""
+    return None if os.environ.get("NO_COLOR") else "auto"
 
 
 def _console(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Console:
@@ -46,7 +70,11 @@ def _console(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Consol
         stderr: Whether it prints to the error stream.
     """
     console = Console(
-        stderr=stderr, soft_wrap=not least_width, highlight=False, quiet=not speaks(comm)
+        stderr=stderr,
+        soft_wrap=not least_width,
+        highlight=False,
+        quiet=not speaks(comm) or (_QUIET.get() and not stderr),
+        color_system=colours(),
     )
     if least_width:
         console.width = max(console.width, least_width)
@@ -219,7 +247,7 @@ def progress(
 
 
 def show_history(comm: Any, history: History) -> None:
-    """Print the force–approach table and the notes of the run.
+    """Print the force–approach table and the notes of the run; quietly, its cautions alone.
 
     Args:
         comm: MPI communicator, or None.
@@ -228,17 +256,35 @@ def show_history(comm: Any, history: History) -> None:
     if not speaks(comm):
         return
     header, rows = history.table(most=60)
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for name in header:
-        table.add_column(escape(name.replace(" [", "\n[")), justify="right")
-    for row in rows:
-        table.add_row(*row)
     # A reference has one more column.
     console = _console(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
-    console.print(table)
+    console.print(_table([name.replace(" [", "\n[") for name in header], rows))
+    if _QUIET.get():
+        console = _console(comm, stderr=True)
     for note in history.notes:
+        if _QUIET.get() and not isinstance(note, Caution):
+            continue
         label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
         console.print(f"{label} {escape(note)}")
+
+
+def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> None:
+    """Print a table whose first column is text.
+
+    Args:
+        comm: MPI communicator, or None.
+        table: Its headings and rows.
+    """
+    _console(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0))
+    for index, name in enumerate(header):
+        table.add_column(escape(name), justify="left" if index < text_columns else "right")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
 
 
 def show_files(comm: Any, files: Sequence[Path]) -> None:
@@ -254,3 +300,19 @@ def show_files(comm: Any, files: Sequence[Path]) -> None:
         names = ", ".join(path.name for path in files if path not in beside)
         also = "; pictures also as .svg" if beside else ""
         say(comm, f"results in {files[0].parent}: {names}{also}")
+
+
+def open_page(comm: Any, files: Sequence[Path]) -> None:
+    """Show the page among files in the user's browser, or say why not.
+
+    Args:
+        comm: MPI communicator, or None.
+        files: The files written.
+    """
+    if not speaks(comm):
+        return
+    page = next((path for path in files if path.suffix == ".html"), None)
+    if page is None:
+        say(comm, "note: no report was written that could be opened")
+    elif not webbrowser.open(page.resolve().as_uri()):
+        say(comm, f"note: no browser was found to open {page} with")

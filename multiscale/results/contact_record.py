@@ -30,6 +30,7 @@ class ContactRecord:
         step: Number of the load step.
         approach_mm: Approach of the plane [mm].
         force_N: Force of all spots [N].
+        unloading: Whether the load fell to this load step.
         lengths_mm: Sides of the surface [mm].
         spots: A row for each spot, see `SPOT_COLUMNS`: the place of its largest pressure, its real
             contact area, its force and that pressure, shape (m, 5).
@@ -52,15 +53,24 @@ class ContactRecord:
     pressure_MPa: Array | None = None
     gap_mm: Array | None = None
     plastic_depth_mm: Array | None = None
+    unloading: bool = False
 
     @classmethod
-    def of(cls, state: ContactState, step: LoadStep, lengths: tuple[float, float]) -> ContactRecord:
+    def of(
+        cls,
+        state: ContactState,
+        step: LoadStep,
+        lengths: tuple[float, float],
+        *,
+        unloading: bool = False,
+    ) -> ContactRecord:
         """Return the record of a load step.
 
         Args:
             state: The contact, with its spots.
             step: The load step.
             lengths: Sides of the surface [mm].
+            unloading: Whether the load fell to it.
         """
         assert state.spots is not None
         columns = (
@@ -84,6 +94,7 @@ class ContactRecord:
             pressure_MPa=state.pressure,
             gap_mm=state.gap,
             plastic_depth_mm=state.plastic_depth,
+            unloading=unloading,
         )
 
     @property
@@ -112,7 +123,7 @@ class ContactRecord:
             yield (self.step, number, *spot)
 
     def plot(self) -> Any:
-        """Draw pressures, gaps and the sizes of the spots.
+        """Draw pressures, gaps, plastic depths and the sizes of the spots.
 
         Returns:
             A matplotlib figure; a notebook shows it.

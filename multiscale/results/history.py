@@ -15,6 +15,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
 from multiscale.results.contact_record import ContactRecord
+from multiscale.results.data_frames import data_frame
 from multiscale.results.html_page import Table, table_html
 from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
@@ -190,6 +191,10 @@ class History:
         heading="from first touch", table="more",
     )  # fmt: skip
 
+    stage = Column(
+        "Number of the stage, where the load history has stages", heading="stage", table="more"
+    )
+
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
     seconds: dict[str, float] = field(default_factory=dict)
@@ -213,6 +218,14 @@ class History:
     def closure_mm(self) -> Array:
         """Mean closure of each patch at each step, shape (steps, N) [mm]."""
         return np.array([step.patches.closure_mm for step in self.steps])
+
+    @property
+    def unloading(self) -> NDArray[np.bool_]:
+        """Whether the load fell to each load step, shape (steps,)."""
+        before = (None, *self.steps)
+        return np.array(
+            [step.is_unloading(last) for step, last in zip(self.steps, before, strict=False)], bool
+        )
 
     @property
     def contact(self) -> ContactRecord | None:
@@ -285,6 +298,13 @@ class History:
             for column in columns
             if column.table != "more" or any(column.of(step) for step in shown)
         )
+        if "curve" in names and (falls := self.unloading).any():
+            ways = ["unloading" if fall else "loading" for fall in falls]
+            texts = {
+                "step": texts.pop("step"),
+                "load": ways if whole else [*ways[:half], *ways[-half:]],
+                **texts,
+            }
         if self.reference is not None and "curve" in names:
             heading, cells = self.reference.cells
             texts[heading] = list(cells) if whole else [*cells[:half], *cells[-half:]]
@@ -312,25 +332,6 @@ class History:
 
 COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
 """The columns of ``history.csv``, in their order."""
-
-
-def data_frame(records: list[dict[str, Any]]) -> Any:
-    """Return records as a pandas data frame, with a column for each of their keys.
-
-    Args:
-        records: The rows.
-
-    Raises:
-        ImportError: When pandas, which patchlaw does not require, is not installed.
-    """
-    try:
-        from pandas import DataFrame
-    except ImportError as error:
-        raise ImportError(
-            "a data frame needs pandas (Debian: apt install python3-pandas); `records` gives the "
-            "same rows without it"
-        ) from error
-    return DataFrame(records)
 
 
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:

@@ -7,7 +7,8 @@ from typing import Annotated, Literal
 
 from geometry.materials import Material, PoissonRatio
 from geometry.meshes.block import BlockMeshing, Element
-from multiscale.scene.surface import NAMES_A_FILE, Auto, Tag
+from multiscale.loading.body_loads import BodyLoads
+from multiscale.scene.surface import NAMES_A_FILE, Auto
 from support.errors import InputError
 from support.fields import (
     Count,
@@ -16,7 +17,7 @@ from support.fields import (
     Positive,
     PositiveLength,
     PositivePressure,
-    Pressure,
+    Tag,
     Unit,
     changed_fields,
     part_of,
@@ -25,6 +26,7 @@ from support.quantities import example
 
 Cells = tuple[Count, Count, Count]
 Component = Length | Literal["free"]
+Expansion = Annotated[float, Unit("1/K")]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,25 +79,30 @@ class SupportSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class TractionSection:
-    """A face that is loaded.
+class VolumeSection(Material):
+    """The material of a volume.
 
     Args:
-        surface: Physical name or number of the face.
-        stress: Force per area along the axes x, y and z of the mesh.
+        young_modulus: Young's modulus.
+        poisson_ratio: Poisson's ratio.
+        thermal_expansion: Coefficient of linear thermal expansion.
     """
 
-    surface: Tag
-    stress: tuple[Pressure, Pressure, Pressure]
+    thermal_expansion: Expansion = 0.0
+
+    @property
+    def elastic(self) -> Material:
+        """Its elastic constants."""
+        return Material(**part_of(self, Material))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class CounterBodySection:
+class CounterBodySection(BodyLoads):
     """The elastic body on the other side; a rigid plane without this section.
 
     With elastic constants alone it is a half-space. With a mesh it is a second body, whose contact
     face lies opposite to that of the first one, in the same plane; the meshes need not match. Its
-    supports move with the approach.
+    supports move with the approach. Its other keys are those of the loads of a body.
 
     Args:
         mesh: File of the mesh, gmsh's .msh or .xdmf, with named or numbered faces. A relative path
@@ -106,10 +113,9 @@ class CounterBodySection:
         supports: Faces that are held; together they leave no rigid motion.
         materials: Elastic constants by physical name or number of the volumes; instead of these,
             one material for the whole body.
-        tractions: Faces that are loaded besides the contact, by loads that stay while the plane
-            approaches.
         young_modulus: Young's modulus of the whole body.
         poisson_ratio: Poisson's ratio of the whole body.
+        thermal_expansion: Coefficient of linear thermal expansion of the whole body.
     """
 
     mesh: Annotated[str, NAMES_A_FILE] | None = None
@@ -117,12 +123,20 @@ class CounterBodySection:
     contact: Tag | None = None
     element: Literal["linear", "quadratic"] = "linear"
     supports: tuple[SupportSection, ...] = ()
-    materials: dict[str, Material] = field(default_factory=dict)
-    tractions: tuple[TractionSection, ...] = ()
+    materials: dict[str, VolumeSection] = field(default_factory=dict)
     young_modulus: PositivePressure | None = None
     poisson_ratio: PoissonRatio | None = None
+    thermal_expansion: Expansion | None = None
 
     def __post_init__(self) -> None:
+        if self.thermal_expansion is not None and self.materials:
+            raise InputError(
+                "is that of the whole body, which has materials by volume",
+                key="thermal_expansion",
+                value=self.thermal_expansion,
+                allowed="thermal_expansion of each of the materials",
+            )
+        self.check_expands(self)
         alone = (self.young_modulus, self.poisson_ratio)
         stated = sum(value is not None for value in alone)
         if stated == 1 or (stated == 2) == bool(self.materials):
@@ -145,6 +159,41 @@ class CounterBodySection:
             )
 
     @property
+    def is_loaded(self) -> bool:
+        """Whether loads, or supports that move, deform the body without contact."""
+        moved = any(part not in ("free", 0.0) for one in self.supports for part in one.displacement)
+        return moved or bool(self.tractions or self.pretension or any(self.rises.values()))
+
+    @property
+    def expansions(self) -> dict[str | None, float]:
+        """Coefficients of thermal expansion by volume; None stands for the whole body [1/K]."""
+        if self.materials:
+            return {name: one.thermal_expansion for name, one in self.materials.items()}
+        return {} if self.thermal_expansion is None else {None: self.thermal_expansion}
+
+    def check_expands(self, loads: BodyLoads, key: str = "temperature") -> None:
+        """Refuse temperatures of what does not expand.
+
+        Args:
+            loads: Loads of the body.
+            key: Key of their temperature.
+
+        Raises:
+            InputError: When nothing, or no volume of the name, expands.
+        """
+        for name, rise in loads.rises.items():
+            named = name is not None and self.materials
+            known = name in self.materials if named else any(self.expansions.values())
+            if rise and not known:
+                raise InputError(
+                    f"changes nothing{'' if name is None else f' in {name!r}'}, which does not "
+                    "expand",
+                    key=key,
+                    value=loads.temperature,
+                    allowed="with thermal_expansion beside it, or of one of the materials",
+                )
+
+    @property
     def whole_material(self) -> Material | None:
         """The material of the whole body; None where volumes have their own."""
         if self.young_modulus is None or self.poisson_ratio is None:
@@ -163,11 +212,15 @@ class BodySection(CounterBodySection):
         place: Lower corner of the surface's rectangle in the coordinates of the contact face, which
             count from the lower corner of its bounding rectangle; in the middle of the face when
             not given.
+        first_axis: Direction in the mesh that the first axis of the contact face has, where it is
+            made perpendicular to the normal: that of x, or of y where the face looks along x, when
+            not given.
     """
 
     mesh: Annotated[str, NAMES_A_FILE]
     contact: Tag
     place: tuple[Length, Length] | None = None
+    first_axis: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

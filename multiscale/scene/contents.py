@@ -90,6 +90,16 @@ class SceneSections:
         return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
 
     @property
+    def loads_bodies(self) -> bool:
+        """Whether anything but the contact moves a body: loads, stages, supports that move."""
+        stages = any(one.loads_bodies for one in self.loading.stage)
+        return stages or any(section.is_loaded for section in self._meshed)
+
+    @property
+    def _meshed(self) -> list[CounterBodySection]:
+        return [one for one in (self.body, self.counter_body) if one is not None]
+
+    @property
     def on_mesh(self) -> bool:
         """Whether laws lie on finite elements of the body, plain or condensed."""
         return self.kind not in ("analytic", "concurrent", "reference") and not self.decomposed
@@ -106,7 +116,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     problems = chain(
-        *(rule(scene) for rule in (_bodies, _surfaces, _couplings)),
+        *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings)),
         _representative_laws(scene, of_coupling),
         _micro_models(scene),
     )
@@ -132,6 +142,46 @@ def _bodies(scene: SceneSections) -> Iterator[Problem]:
             "block.lengths",
             "needs law.kind = 'representative'",
             "leave it out; the sides of the block are those of the surface, and block.margin",
+        )
+
+
+def _body_loads(scene: SceneSections) -> Iterator[Problem]:
+    """Yield loads of bodies that are not there, and what does not know of them."""
+    sections = {"body": scene.body, "counter_body": scene.counter_body}
+    for number, stage in enumerate(scene.loading.stage):
+        for name, section in sections.items():
+            loads, key = getattr(stage, name), f"load.stage.{number}.{name}"
+            if loads is None:
+                continue
+            if section is None or section.mesh is None:
+                yield key, f"loads a mesh, and there is no [{name}] of one", f"[{name}] with a mesh"
+            else:
+                section.check_expands(loads, f"{key}.temperature")
+    if scene.counter_body is not None and scene.counter_body.pretension:
+        yield (
+            "counter_body.pretension",
+            "bolts pull the body towards the counter-body, whose supports move with them",
+            "body.pretension; what bolts do to the counter-body is one of its tractions",
+        )
+    if not scene.loads_bodies:
+        return
+    key = "load.stage" if any(one.loads_bodies for one in scene.loading.stage) else "body"
+    reason = "loads of the body besides the contact need laws on its mesh"
+    ways = "coupling.kind = 'consistent' or 'isolated'; or law.kind = 'representative'"
+    if scene.kind in ("analytic", "concurrent", "auto"):
+        yield "coupling.kind", f"is '{scene.kind}', but {reason}", ways
+    if scene.law.representative:
+        return
+    if scene.coupling.newton == "condensed":
+        yield "coupling.newton", f"is 'condensed', but {reason}", "'full' or 'auto'"
+    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
+    if half_space and scene.kind == "isolated":
+        yield key, "does not go with isolated laws against a half-space", ways
+    if scene.output.contact in ("last", "all"):
+        yield (
+            "output.contact",
+            "the contact problem behind laws does not know of loads of the body",
+            "'none' or 'auto'; or no loads of the body",
         )
 
 

@@ -16,8 +16,9 @@ _OF_NUMBER = re.compile(r"[0-9]\.[0-9]+(?!\.)")
 _START = 4096  # bytes that tell a scene from heights
 _DEEPEST = 100  # sections within sections
 _EXCLUSIVE = {
-    "approach": ("force",),
-    "force": ("approach",),
+    "approach": ("force", "pressure", "stage"),
+    "force": ("approach", "pressure", "stage"),
+    "pressure": ("approach", "force", "stage"),
     "file": ("spectrum", "heights"),
     "spectrum": ("file", "heights"),
     "heights": ("file", "spectrum"),

@@ -253,9 +253,10 @@ class OutputSection:
         check: Load steps whose errors are measured by solving further contact problems, where the
             micro model is ``half-space``.
         contact: Load steps whose contact is written, with a row for every spot and, where the model
-            has cells or nodes, maps of pressure and gap. With laws the contact problem that they
-            stand for is then solved, once for each of these steps. "auto" is "last" without laws
-            and "none" with laws. "none" leaves out the interfacial stiffness as well.
+            has cells or nodes, maps of pressure and gap. With "all" the report has a slider over
+            the load steps, whose pictures take half a second each. With laws the contact problem
+            that they stand for is then solved, once for each of these steps. "auto" is "last"
+            without laws and "none" with laws. "none" leaves out the interfacial stiffness as well.
     """
 
     figures: bool | Literal["all", "svg"] = True

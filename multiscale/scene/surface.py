@@ -16,12 +16,10 @@ from geometry.preparation import Preparation
 from geometry.spectrum import Spectrum
 from support.checks import real_array
 from support.errors import InputError
-from support.fields import Heights, Length, Limits, PositiveLength, Unit, changed_fields
+from support.fields import Heights, Length, Limits, PositiveLength, Tag, Unit, changed_fields
 
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
-Tag = str | Annotated[int, Limits(ge=0)]
-"""Physical name or number of a face in a mesh."""
 
 NAMES_A_FILE = "names a file"
 """Marks keys whose value is the name of a file that results depend on."""

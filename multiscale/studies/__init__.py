@@ -5,9 +5,13 @@
                                                                            `sweep`, `process`
     SweepResults                    rows, means and bands of a sweep       `results`
     Comparison                      error over time of all ways            `comparison`, `errors`
+    Difference                      two runs beside each other             `difference`
 
-`sweep` and `compare` do all of this.
+`sweep`, `compare` and `difference` do all of this.
 """
 
 AGAINST = {"reference": "reference", "concurrent": "concurrent", "half-space": "analytic"}
 """What the others can be compared against, the best first, and the coupling of each."""
+
+AT = ("pressure", "approach")
+"""What two runs can have in common where they are compared."""

@@ -217,7 +217,7 @@ class _Catalogue:
         if loads.approach is None or loads.tilt == "free":
             return None
         surface = make_surface(self._of)
-        largest = load_history_on(self._of, (surface,)).largest
+        largest = load_history_on(self._of, (surface,), surface.area).largest
         return suggested_fine(surface, largest, tilt=loads.tilt)
 
 

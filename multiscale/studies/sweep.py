@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.figures import by_matplotlib
-from multiscale.results.history import COLUMNS, data_frame
+from multiscale.results.data_frames import data_frame
+from multiscale.results.history import COLUMNS
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases

@@ -27,7 +27,7 @@ asked = st.tuples(
 def ended(dice, configuration, comm, seconds):
     """Return how a configuration may end: well, early or badly, with odd numbers."""
     status, load_history = dice.choice(STATUSES), configuration.scene.loading
-    whole = len(load_history.targets)
+    whole = load_history.count
     steps = np.arange(1.0, 1.0 + (whole if status == "done" else dice.randrange(whole)))
     patches = configuration.scene.patches.grid
     numbers = {

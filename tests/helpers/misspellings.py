@@ -52,7 +52,8 @@ def key_was_offered(drawn):
         told = str(error)
         if "unknown key" not in told:  # what else is wrong with sections of which this is all
             assert any(
-                part in ("supports", "materials", "tractions", "regions") for part in sections
+                part in ("supports", "materials", "tractions", "pretension", "regions", "stage")
+                for part in sections
             )
             return "refused otherwise"
         offered = re.search(r"did you mean '([^']+)'", told)

@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 from macro import compat
 from macro.mesh.from_file import read_mesh
-from macro.mesh.tagged import planar_face
+from macro.mesh.tagged import planar_face, surface_area
 from multiscale import Scene, run
 
 BODIES = Path(__file__).parents[2] / "demos" / "bodies"
@@ -47,6 +47,7 @@ CASES = {  # edges; contact face; volumes; areas
             "raised face": ring(27.5, 51.0),
             "washers": 4.0 * ring(9.0, 15.0),
             "pipe end": ring(27.5, 35.5),
+            "bore": 2.0 * math.pi * 27.5 * 60.0,
         },
     ),
     "seal_ring": (
@@ -79,14 +80,17 @@ def test_bodies_have_their_dimensions(body, tmp_path):
         # chords instead of arcs
         assert sum(map(_volume, of_volume)) == pytest.approx(volume, rel=0.02)
     for name, area in areas.items():
-        found = planar_face(tagged, tagged.facet_tag(name), name=name)
-        assert found.area == pytest.approx(area, rel=0.02)
+        tag = tagged.facet_tag(name)
+        assert surface_area(tagged, tag) == pytest.approx(area, rel=0.02)
+        if name != "bore":
+            found = planar_face(tagged, tag, name=name)
+            assert found.area == pytest.approx(area, rel=0.02)
         if name == face:
             assert found.frame.normal.tolist() == [0.0, 0.0, 1.0]
 
 
 SMALL = ("body.element=linear", "surface.grid=[32, 32]", "surface.spectrum.waves=[2, 8]")
-FORCES = {"brake_pad": 8e3, "flange": 120e3, "seal_ring": 45.0}
+FORCES = {"brake_pad": 8e3, "flange": 120e3 - 9.5e3, "seal_ring": 45.0}
 
 
 @pytest.mark.long

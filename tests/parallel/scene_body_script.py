@@ -31,6 +31,18 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
+    stages = [
+        {
+            "force": "12 N",
+            "steps": 2,
+            "body": {"pretension": [{"surface": "right", "pull": "6 N"}]},
+        },
+        {"force": "10 N", "steps": 1, "body": {"tractions": [{"surface": "back", "pressure": 3}]}},
+        {"hold": "approach", "steps": 2, "body": {"temperature": "20 K"}},
+    ]
+    warm = {**body, "thermal_expansion": "20 ppm/K"}
+    parts = {"load": {"stage": stages, "tilt": "free"}}
+    yield "stages", {**sample, **parts, "body": warm, "output": QUIET}
     measured = QUIET | {"check": "last"}
     above["element"] = "quadratic"
     yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": measured}

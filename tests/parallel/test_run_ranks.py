@@ -1,6 +1,7 @@
 """The whole chain on 1, 2 and 3 ranks: same numbers, same refusals, no hang."""
 
 import csv
+import re
 from functools import cache
 
 import h5py
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from helpers.on_ranks import RANKS
 
+from multiscale import read_contact
 from multiscale.cli import main
 from multiscale.results.contact_record import SPOT_COLUMNS
 
@@ -138,6 +140,31 @@ def test_same_numbers_on_any_number_of_ranks(waiting_ranks, alone, tmp_path, sce
     for one, more in zip(alone(scene), numbers(tmp_path), strict=True):
         # residuals are driven to 1e-9 of the load; closures and pressures follow linearly
         assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_contacts_read_back_and_their_pictures_are_those_of_one(waiting_ranks, tmp_path, ranks):
+    scene = [
+        "surface.grid=[32, 32]", "surface.spectrum.waves=[2, 6]", "coupling.kind=analytic",
+        "micro.model=half-space", "micro.hardness=300 MPa", "load.approach=['8 um', '0 um']",
+        "load.steps=2", "output.contact=all", "output.check=none",
+    ]  # fmt: skip
+    found, pictures = [], []
+    for count in (1, ranks):
+        out = tmp_path / str(count)
+        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *scene)
+        done = waiting_ranks(count, *words)
+        assert done.returncode == 0, done.stderr
+        found.append(read_contact(out))
+        report = (out / "report.html").read_text()
+        pictures.append(re.findall(r'alt="Load step (\d.*?)" src="(.*?)"', report))
+    one, more = found
+    assert one.unloading.tolist() == more.unloading.tolist() == [False, False, True, True]
+    for name in ("pressure_MPa", "gap_mm", "plastic_depth_mm"):
+        values = getattr(one, name)
+        np.testing.assert_allclose(getattr(more, name), values, rtol=0, atol=1e-8 * values.max())
+    assert [caption for caption, _ in pictures[0]] == [caption for caption, _ in pictures[1]]
+    assert len(pictures[0]) == 4
 
 
 @pytest.mark.long

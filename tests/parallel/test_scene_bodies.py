@@ -14,7 +14,7 @@ def test_bodies_of_scenes_on_one_to_four_ranks(waiting_ranks, root, tmp_path):
     write_box(tmp_path / "cube.msh", (x, y, z))
     write_box(tmp_path / "above.msh", (x[::2], y, -z[::-1]))
     found = []
-    for ranks in (1, 2, 4):
+    for ranks in (1, 2, 3, 4):
         words = (root / "tests/parallel/scene_body_script.py", tmp_path)
         ended = waiting_ranks(ranks, *words, timeout=900)
         assert ended.returncode == 0, ended.stderr

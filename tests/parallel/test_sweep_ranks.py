@@ -61,3 +61,24 @@ def test_a_killed_sweep_goes_on_with_other_ranks(waiting_ranks, tmp_path, words)
     assert tables(out) == tables(one)
     kept = [mark for path in journals(out) for _, mark in unsealed(path.read_bytes())]
     assert len(kept) - len(journals(out)) == 7  # a head each, and no case is run twice
+
+
+def test_ranks_compare_two_runs_and_refuse_together(waiting_ranks, tmp_path):
+    """Rank 0 reads and writes; the others learn what it found, or why nothing was."""
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SMALL_SCENE)
+    for name, modulus in (("soft", "4 GPa"), ("stiff", "8 GPa")):
+        words = ["run", str(scene), "--out", str(tmp_path / name), *CHEAP]
+        assert main([*words, f"block.young_modulus={modulus}"]) == 0
+    both = ["diff", str(tmp_path / "soft"), str(tmp_path / "stiff")]
+    assert main([*both, "--out", str(tmp_path / "one")]) == 0
+    done = waiting_ranks(2, "-m", "multiscale", *both, "--out", str(tmp_path / "two"))
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("stiff / soft") == 1
+    for name in ("diff.csv", "diff.html"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes()
+    (tmp_path / "stiff" / "history.csv").unlink()
+    done = waiting_ranks(2, "-m", "multiscale", *both, "--out", str(tmp_path / "three"))
+    assert done.returncode == 2
+    assert done.stderr.count("stiff: holds no run: there is no history.csv in it") == 1
+    assert not (tmp_path / "three").exists()

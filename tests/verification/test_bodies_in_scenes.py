@@ -35,6 +35,10 @@ TURN = (Rotation.from_euler("x", -2.0) * Rotation.from_euler("y", 0.7)).as_matri
 """Turns the face out of its plane, but not in it: its first axis stays that nearest to x."""
 
 
+ASKEW = Rotation.from_euler("z", 0.6).as_matrix()
+"""Turns the face in its plane."""
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """Folder with the cube, turned and shifted, and its mirror image above it."""
@@ -42,6 +46,7 @@ def folder(tmp_path_factory):
     x, y, z = TICKS
     write_box(place / "cube.msh", TICKS)
     write_box(place / "turned.msh", TICKS, turn=TURN, shift=(30.0, -20.0, 10.0))
+    write_box(place / "askew.msh", TICKS, turn=ASKEW, shift=(3.0, 4.0, 5.0))
     write_box(place / "above.msh", (x, y, -z[::-1]))
     write_box(place / "halves.msh", TICKS, halves=True)
     return place
@@ -75,6 +80,9 @@ def test_a_cube_from_a_file_is_the_block(folder, name):
     found = done(**PATCHES, **coupling, body=body(folder, "turned"), table=table)
     assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
     np.testing.assert_allclose(found.coupling.body.lengths, [1, 1], rtol=1e-12)
+    axis = [float(part) for part in 3.0 * ASKEW[:, 0] + [0.0, 0.0, 7.0]]
+    found = done(**PATCHES, **coupling, body=body(folder, "askew", first_axis=axis), table=table)
+    assert forces(found) == pytest.approx(forces(expected), rel=1e-9)
 
 
 def test_laws_of_samples_do_not_depend_on_where_the_body_lies(folder):

@@ -10,6 +10,7 @@ from geometry import Control, PatchGrid, RefinedShape, Surface
 from geometry.meshes.block import BlockShape
 from macro import (
     Block,
+    FieldStep,
     LoadedFace,
     Material,
     UnilateralContactProblem,
@@ -71,7 +72,9 @@ def test_all_fields_of_a_load_step_are_on_one_grid(tmp_path):
     """ParaView shows stresses on the deformed block, step by step."""
     block = flat_block()
     interface = LoadedFace.of_block(block, PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
-    given = [(number, np.full(block.owned_dofs, 1.0 * number), np.ones(1)) for number in (2, 5)]
+    given = [
+        FieldStep(number, np.full(block.owned_dofs, 1.0 * number), np.ones(1)) for number in (2, 5)
+    ]
     write_fields(tmp_path / "fields.xdmf", interface, iter(given))
     domain = ElementTree.parse(tmp_path / "fields.xdmf").getroot()[0]
     mesh, fields = domain.findall("Grid")

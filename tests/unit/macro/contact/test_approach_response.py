@@ -6,8 +6,9 @@ from helpers.body_meshes import HIGH, box, hanging, standing
 
 from geometry import Material, PatchGrid
 from geometry.rigid_plane import Control
-from macro import FacePair, LawContactProblem, Traction
+from macro import FacePair, LawContactProblem
 from macro.contact.other_elements import face_on, quadratic_dofs, start_from_elements
+from macro.mesh.supports import Loads, Traction
 
 SOFT = Material(young_modulus=431.0, poisson_ratio=0.27)
 PATCHES = PatchGrid(grid=(2, 1), lengths=(1.3, 0.9))
@@ -50,7 +51,7 @@ def test_the_response_is_what_solutions_change(make, tilt):
     face, at, step = make(), 9.3e-3, 1e-5
     one = problem(face)
     state = one.solve(Control(approach=at, tilt=tilt))
-    response = one.approach_response(turns=tilt is None)
+    response = one.approach_response()
     forces = [force_at(face, at + d, tilt) for d in (-step, step)]
     # central differences of a smooth function
     assert response.stiffness == pytest.approx((forces[1] - forces[0]) / (2 * step), rel=2e-5)
@@ -100,15 +101,16 @@ def test_two_bodies_change_their_elements_together():
 
 def test_solutions_are_carried_to_other_elements_with_their_preload():
     mesh = box((0, 0, -0.7), (1.3, 0.9, 0), (4, 3, 3))
-    pulled = {"tractions": [Traction(tag=HIGH, stress=(0.7, 0.2, -1.1))]}
-    linear, quadratic = (standing(mesh, SOFT, PATCHES, order, **pulled) for order in (1, 2))
-    control = Control(approach=9.3e-3)
+    pulled = (Loads(), Loads(tractions=(Traction(tag=HIGH, stress=(1.4, 0.4, -2.2)),)))
+    linear, quadratic = (standing(mesh, SOFT, PATCHES, order, loads=pulled) for order in (1, 2))
+    control = Control(approach=9.3e-3, body_state=0.5)
     known = problem(linear).solve(control)
     finer = face_on(linear, lambda body: body.as_quadratic())
     again = problem(finer)
-    start_from_elements(again, finer, known, linear)
+    start_from_elements(again, finer, known, linear, control.body_state)
     expected = problem(face_on(quadratic, lambda body: body)).solve(control).force
     assert abs(expected / known.force - 1.0) > 1e-3
     coarse = face_on(finer, lambda body: linear.body)  # has the quadrature of the linear face
     assert problem(coarse).solve(control).force == pytest.approx(known.force, rel=1e-9)
-    assert again.solve(control).force == pytest.approx(expected, rel=1e-4)  # at points of other degrees
+    # quadrature of another degree
+    assert again.solve(control).force == pytest.approx(expected, rel=1e-4)

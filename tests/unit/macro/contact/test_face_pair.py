@@ -8,7 +8,7 @@ from helpers.body_meshes import HIGH, box, hanging, standing
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, Material, MeshedBody, Support, Traction
+from macro import LawContactProblem, Loads, Material, MeshedBody, Support, Traction
 from macro.contact.face_pair import FacePair
 from support.errors import InputError
 
@@ -115,7 +115,8 @@ def test_force_on_both_with_a_free_tilt():
 def test_tractions_and_moved_supports_close_the_gap():
     """A column pulled by σ at its upper face, and lifted by a moved support, meets the plane."""
     mesh = box((0, 0, -0.5), (1, 1, 0), (3, 3, 2))
-    pulled = standing(mesh, SLIDING, WHOLE, tractions=[Traction(tag=HIGH, stress=(0, 0, 6.0))])
+    upward = Loads(tractions=(Traction(tag=HIGH, stress=(0, 0, 6.0)),))
+    pulled = standing(mesh, SLIDING, WHOLE, loads=[upward])
     state = LawContactProblem(pulled, [Spring(2e4)]).solve(Control(approach=0.0))
     assert state.force == pytest.approx(1e-3 / (1 / 2e4 + 0.5 / 3000.0), rel=1e-8)
     supports = [Support(tag=1, displacement=(0.0, 0.0, 1e-3))]

@@ -12,7 +12,16 @@ from petsc4py import PETSc
 from geometry.meshes.block import BlockShape
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
-from macro import Block, LawContactProblem, LoadedFace, Material, block_mesh, compat, write_fields
+from macro import (
+    Block,
+    FieldStep,
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    block_mesh,
+    compat,
+    write_fields,
+)
 from macro.contact.initial_guess import DisplacementBasis
 from support.errors import InputError, NotConverged
 
@@ -158,7 +167,7 @@ def test_fields_are_written_for_paraview(element, tmp_path):
     )
     interface = LoadedFace.of_block(block, PatchGrid(grid=(2, 1), lengths=(1.0, 1.0)))
     state = LawContactProblem(interface, [Spring(), Spring(k=5e3)]).solve(Control(approach=1e-3))
-    step = (0, state.displacement, state.patch_pressure)
+    step = FieldStep(0, state.displacement, state.patch_pressure)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "fields.h5") as file:
@@ -185,7 +194,7 @@ def test_fields_share_cells_that_borders_cut(element, tmp_path):
     )
     interface = LoadedFace.of_block(block, PatchGrid(grid=(3, 1), lengths=(1.0, 1.0)))
     given = np.array([3.0, 5.0, 8.0])
-    step = (0, np.zeros(block.owned_dofs), given)
+    step = FieldStep(0, np.zeros(block.owned_dofs), given)
     write_fields(tmp_path / "fields.xdmf", interface, [step])
     with h5py.File(tmp_path / "fields.h5") as file:
         found = file["Function/pressure/0"][...].ravel()

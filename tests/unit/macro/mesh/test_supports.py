@@ -9,7 +9,7 @@ from mpi4py import MPI
 from scipy.sparse import csr_array
 
 from macro import compat
-from macro.mesh.supports import check_supports, free_motions
+from macro.mesh.supports import Traction, check_loads, check_supports, free_motions
 from support.errors import InputError
 
 COMM = MPI.COMM_SELF
@@ -97,7 +97,7 @@ def test_supports_are_checked():
         r"body\.supports: the supports leave the body free to move: translation along x \(allowed"
     )
     with pytest.raises(InputError, match=match):
-        check_supports(box, held(below="yz", left="z"), SIDES["above"], key="body")
+        check_supports(box, held(below="yz", left="z"), SIDES["above"], key="body.supports")
     with pytest.raises(InputError, match="the surface 'below' is the contact face and cannot be"):
         check_supports(box, held(below="xyz"), SIDES["below"])
     twice = [*held(below="xyz"), SimpleNamespace(tag=5, displacement=(None, 0.1, None))]
@@ -127,13 +127,16 @@ def test_tractions_are_loads():
     contact = SIDES["above"]
 
     def refused(side, stress, match):
-        load = [SimpleNamespace(tag=SIDES.get(side, 9), stress=stress)]
+        load = [Traction(tag=SIDES.get(side, 9), stress=stress)]
         with pytest.raises(InputError, match=match):
-            check_supports(box, supports, contact, load, key="body")
+            check_loads(box, supports, load, contact, key="body.tractions")
 
     refused("above", (0, 0, 1), r"body\.tractions: .*'above' is the contact face and cannot be lo")
     refused("below", (0, 0, 1), "'below' is held along z, where a traction of 1 MPa does nothing")
     refused("left", (2, 1, 1), "'left' is held along x")
     refused("nowhere", (1, 0, 0), "'9' has no facets")
-    fine = [SimpleNamespace(tag=SIDES[side], stress=(0, 1, 1)) for side in ("left", "right")]
-    check_supports(box, supports, contact, fine)
+    fine = [Traction(tag=SIDES[side], stress=(0, 1, 1)) for side in ("left", "right")]
+    check_loads(box, supports, fine, contact)
+    with pytest.raises(InputError, match="'below' is held, where a pressure of 2 MPa does nothing"):
+        check_loads(box, supports, [Traction(tag=SIDES["below"], pressure=2.0)], contact)
+    check_loads(box, supports, [Traction(tag=SIDES["left"], pressure=2.0)], contact)

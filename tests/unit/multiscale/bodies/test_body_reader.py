@@ -20,12 +20,13 @@ UP = [0, 0, "1 MPa"]
 def read(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
-    def read(size=10.0, law=None, **body):
+    def read(size=10.0, law=None, stage=None, **body):
         ticks = [np.linspace(0.0, size, count) for count in (4, 4, 3)]
         write_box("part.msh", ticks, halves=True)
         whole = {"mesh": "part.msh", "contact": "top", "supports": [{"surface": "bottom"}]}
         laws = {"kind": "representative", **(law or {})}
-        data = {"surface": SAMPLE, "load": {"force": "1 N"}, "law": laws}
+        load = {"force": "1 N"} if stage is None else {"stage": [{"force": "1 N", "body": stage}]}
+        data = {"surface": SAMPLE, "load": load, "law": laws}
         return read_bodies(Scene.from_dict(data | {"body": whole | STEEL | body}), None)
 
     return read
@@ -55,11 +56,34 @@ def read(tmp_path, monkeypatch):
             r"body\.supports: the surfaces 'bottom' and 'left' share nodes",
         ),
         (
+            {"first_axis": [0, 0, 2]},
+            r"body\.first_axis.* the first axis of a face is along its normal, or no direction",
+        ),
+        (
+            {"first_axis": [0, 0, 0]},
+            r"body\.first_axis = \[0\.0, 0\.0, 0\.0\]: .* \(allowed: a direction across \[0",
+        ),
+        (
+            {"tractions": [{"surface": "lid", "pressure": 1}]},
+            r"body\.tractions = 'lid': the mesh has no surface of this name",
+        ),
+        (
+            {"pretension": [{"surface": "bottom", "pull": "1 N"}]},
+            r"body\.pretension: the surface 'bottom' is held along z, where a traction of 0\.01",
+        ),
+        (
+            {"stage": {"tractions": [{"surface": "top", "pressure": 1}]}},
+            r"load\.stage\.0\.body\.tractions: the surface 'top' is the contact face",
+        ),
+        (
             {"law": {"regions": [{"surface": "top", **SAMPLE}]}},
             r"law\.regions = 'top': the surface is the contact face or another region",
         ),
     ],
-    ids=["large", "small", "unit", "traction", "held", "supports", "region"],
+    ids=[
+        *("large", "small", "unit", "traction", "held", "supports", "axis along the normal"),
+        *("no axis", "no such face", "held bolts", "stage", "region"),
+    ],
 )
 def test_contradictions_are_refused(read, body, match):
     with pytest.raises(InputError, match=match):

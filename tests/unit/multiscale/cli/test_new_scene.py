@@ -10,6 +10,7 @@ from multiscale.cli.init import (
     CONTACT_AREA,
     START,
     SYNTHESISED,
+    UNUSED,
     findings,
     scene_text,
     sensible_force,
@@ -63,3 +64,25 @@ def test_findings_are_grid_sides_and_roughness():
     text = " ".join(findings(surface))
     assert "32 × 32 heights on 20 µm × 30 µm" in text
     assert "rms gradient 0.1" in text
+
+
+UNUSED_KEYS = [(section, key) for section, keys in UNUSED.items() for key in keys]
+
+
+@pytest.mark.parametrize(("section", "key"), UNUSED_KEYS, ids=str)
+def test_what_is_not_used_is_a_comment_that_can_be_used(section, key):
+    text = scene_text(DATA, [])
+    lines = text.splitlines()
+    (place,) = [number for number, line in enumerate(lines) if line.startswith(f"# {key} = ")]
+    lines[place] = lines[place].removeprefix("# ")
+    if section not in DATA:
+        lines[lines.index(f"# [{section}]")] = f"[{section}]"
+    used = tomllib.loads("\n".join(lines))
+    assert used[section][key] == UNUSED[section][key]
+    Scene.from_dict(used)
+
+
+def test_all_that_is_not_used_can_be_used_together():
+    sections = {name: DATA.get(name, {}) | UNUSED.get(name, {}) for name in DATA | UNUSED}
+    assert tomllib.loads(scene_text(sections, [])) == sections
+    Scene.from_dict(sections)

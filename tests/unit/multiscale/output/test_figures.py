@@ -9,9 +9,13 @@ from matplotlib.figure import Figure
 from geometry.asperities import Asperities, find_asperities
 from geometry.patches import PatchGrid
 from geometry.spectrum import Spectrum, synthesise
-from multiscale.figures.contact import contact_figure
+from multiscale.figures.contact import contact_figure, contact_maps
+from multiscale.figures.contact_scales import ContactScales
+from multiscale.figures.curves import history_figure
 from multiscale.figures.maps import draw_pressures
 from multiscale.figures.surface import MOST_SUMMITS, surface_figure
+from multiscale.loading.load_step import LoadStep, PatchState
+from multiscale.results.history import History
 
 
 @pytest.mark.parametrize(
@@ -45,6 +49,7 @@ def test_maps_of_contact_have_the_same_unit(side, unit, end):
     record = SimpleNamespace(
         step=1, approach_mm=1e-3, force_N=2.5e-7, spots=(), lengths_mm=(side, side),
         pressure_MPa=np.eye(4), gap_mm=1.0 - np.eye(4), area_mm2=np.array([1e-4]),
+        peak_pressure_MPa=np.ones(1), plastic_depth_mm=None, unloading=False,
     )  # fmt: skip
     figure = contact_figure(record)
     for axes in figure.axes[:2]:
@@ -96,3 +101,89 @@ def test_surface_is_shown_with_heights_spectrum_and_bearing_ratio():
             1e3 * (surface.heights - surface.mean_height) > np.interp(share, ratio, height)
         )
         assert 100 * above == pytest.approx(share, abs=0.1)
+
+
+def contact(**changes):
+    given = dict(
+        step=2, approach_mm=1e-3, force_N=2.0, spots=(1,), lengths_mm=(1.0, 1.0),
+        pressure_MPa=np.eye(4), gap_mm=1.0 - np.eye(4), area_mm2=np.array([1e-4]),
+        peak_pressure_MPa=np.ones(1), plastic_depth_mm=1e-3 * np.eye(4), unloading=True,
+    )  # fmt: skip
+    none = np.zeros((4, 4))
+    empty = dict(
+        force_N=0.0, spots=(), pressure_MPa=none, gap_mm=1.0 + none, area_mm2=np.zeros(0),
+        peak_pressure_MPa=np.zeros(0),
+    )  # fmt: skip
+    if changes.pop("empty", False):
+        given |= empty
+    return SimpleNamespace(**(given | changes))
+
+
+def titles_and_texts(figure):
+    shown = [axes.get_title() for axes in figure.axes if axes.get_title()]
+    return shown, [text.get_text() for axes in figure.axes for text in axes.texts]
+
+
+def test_plastic_depths_are_drawn_and_unloading_is_said():
+    figure = contact_figure(contact())
+    assert figure._suptitle.get_text().startswith("load step 2, unloading: approach 1 µm")
+    titles, texts = titles_and_texts(figure)
+    assert "plastic depth, at most 1 µm" in titles and texts == []
+    image = figure.axes[2].get_images()[0]
+    np.testing.assert_allclose(image.get_array().filled(0.0), np.eye(4))  # in µm
+    elastic, _ = titles_and_texts(contact_figure(contact(plastic_depth_mm=None)))
+    assert not any("plastic" in title for title in elastic)
+
+
+def test_no_force_says_so_instead_of_an_empty_map():
+    figure = contact_figure(contact(empty=True))
+    assert figure._suptitle.get_text().endswith("force 0 N, no contact")
+    titles, texts = titles_and_texts(figure)
+    assert "gap; no contact" in titles
+    assert texts == ["no contact:\nthe force at load step 2 is zero", "no spots", "none"]
+    of_spots = contact(empty=True, pressure_MPa=None, gap_mm=None, plastic_depth_mm=None)
+    assert titles_and_texts(contact_figure(of_spots))[1][0].startswith("no contact")
+    axes = Figure().add_subplot()
+    draw_pressures(axes, PatchGrid(grid=(2, 2), lengths=(1.0, 1.0)), np.zeros(4))
+    assert axes.texts[-1].get_text() == "no contact"
+
+
+def test_several_contacts_share_their_colours():
+    low, high = contact(), contact(pressure_MPa=3.0 * np.eye(4), gap_mm=5.0 * (1.0 - np.eye(4)))
+    scales = ContactScales.of([low, high, contact(empty=True)])
+    assert scales == pytest.approx((3.0, 5.0, 1e-3, 1.0))
+    ends = [
+        [axes.get_images()[0].get_clim()[1] for axes in contact_maps(one, scales).axes[:3]]
+        for one in (low, high)
+    ]
+    assert ends[0] == ends[1] == pytest.approx([3.0, 5.0e3, 1.0])  # MPa, µm, µm
+    own = contact_figure(low).axes[0].get_images()[0]
+    assert own.get_clim()[1] == pytest.approx(1.0)
+
+
+def test_unloading_is_dashed():
+    ones = np.ones(1)
+    state = PatchState(closure_mm=ones, pressure_MPa=ones, contact_area_fraction=ones)
+    loads = [(1.0, 1e-3), (2.0, 2e-3), (1.0, 1.5e-3), (0.0, 1e-3), (3.0, 3e-3)]
+    steps = tuple(
+        LoadStep(
+            step=number, approach_mm=approach, force_N=force, mean_pressure_MPa=force,
+            contact_area_fraction=0.01 * force, mean_separation_mm=0.01 - approach, contacts=1,
+            newton_iterations=1, patches=state,
+        )
+        for number, (force, approach) in enumerate(loads, 1)
+    )  # fmt: skip
+    history = History(steps=steps, patches=PatchGrid(grid=(1, 1), lengths=(1.0, 1.0)))
+    assert history.unloading.tolist() == [False, False, True, True, False]
+    force = history_figure(history, "mine").axes[0]
+    assert [line.get_linestyle() for line in force.lines] == ["-", "--", "-"]
+    assert [line.get_ydata().tolist() for line in force.lines] == [
+        [0.0, 1.0, 2.0], [2.0, 1.0, 0.0], [0.0, 3.0],
+    ]  # fmt: skip
+    assert [text.get_text() for text in force.get_legend().texts] == ["mine", "unloading"]
+    headings, rows = history.table("curve")
+    assert headings[:2] == ["step", "load"]
+    assert [row[1] for row in rows] == ["loading"] * 2 + ["unloading"] * 2 + ["loading"]
+    rising = History(steps=steps[:2], patches=history.patches)
+    assert rising.table("curve")[0][1].startswith("approach")
+    assert history_figure(rising, "mine").axes[0].get_legend() is None

@@ -1,14 +1,19 @@
 """The report: results first, the solver's work folded; it escapes, and needs no other file."""
 
+import json
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from helpers.small_scene import SMALL_SCENE
 
 from multiscale.output.provenance import provenance
-from multiscale.output.report import citations, report_html
+from multiscale.output.report import citations, report_html, shown_contacts
+from multiscale.output.results import write_results
 from multiscale.readable import percent, quantity
 from multiscale.results.html_page import filled, table_html
 from multiscale.run import Run
@@ -30,7 +35,7 @@ class Tags(HTMLParser):
 
     def handle_starttag(self, tag, attributes):
         self.seen.append((tag, dict(attributes)))
-        if tag not in ("meta", "img"):
+        if tag not in ("meta", "img", "input"):
             self.open.append(tag)
         if tag == "img":
             self.parts.append(dict(attributes)["alt"].split(",")[0].split(":")[0])
@@ -60,6 +65,7 @@ def report(text, **changes):
         seconds={text: 1.0},
         reference=None,
         contact=None,
+        contact_records=(),
         steps=[SimpleNamespace(step=2)],
     )
     step = SimpleNamespace(step=2, errors=((text, 0.25), (text, 0.5)), force_N=3.0)
@@ -68,7 +74,8 @@ def report(text, **changes):
         "title": text, "results": [(text, text, text)], "warnings": [text], "notes": [text],
         "details": [text], "inputs": [pair], "folded": [pair], "made": [pair] * 5,
         "citations": [text], "history": history, "measured": step, "reference": "",
-        "finished": True, "pictures": PICTURES, "percent": percent, "quantity": quantity,
+        "finished": True, "contacts": [], "first_contact": 0, "unloaded": "",
+        "pictures": PICTURES, "percent": percent, "quantity": quantity,
     }  # fmt: skip
     return filled("output/report.jinja", **content | changes)
 
@@ -152,3 +159,84 @@ def test_citation_is_that_of_the_file():
 
 def test_table_alone_is_escaped():
     assert "<td>a &lt; b" in table_html((["head"], [[RESERVED]]))
+
+
+def cycle(folder, *words):
+    """Return the report of a surface that yields under a load which goes back to zero."""
+    scene = folder / "scene.toml"
+    scene.write_text(SMALL_SCENE.replace('approach = "8 um"', "force = ['1.5 N', '0 N']"))
+    run = Run(
+        Scene.load(scene, ["micro.hardness=80 MPa", "output.report=true", "load.steps=3", *words])
+    )
+    list(run.load_steps())
+    run.finish()
+    write_results(folder, run, options=[])
+    return (folder / "report.html").read_text()
+
+
+def test_slider_chooses_from_all_recorded_contacts(tmp_path):
+    text = cycle(tmp_path, "output.figures=true", "output.contact=all")
+    page = parsed(text)
+    (slider,) = [found for tag, found in page.seen if tag == "input"]
+    assert (slider["type"], slider["min"], slider["max"]) == ("range", "0", "5")
+    assert slider["value"] == "2"  # the largest force, load step 3
+    captions = [found["alt"] for tag, found in page.seen if tag == "img"]
+    captions = [caption for caption in captions if caption.startswith("Load step")]
+    assert [caption.split(":")[0] for caption in captions] == [
+        *(f"Load step {step}, loading" for step in (1, 2, 3)),
+        *(f"Load step {step}, unloading" for step in (4, 5, 6)),
+    ]
+    assert captions[-1].endswith("force 0 N, no contact.")
+    said = "At load step 6 the force is zero and nothing is in contact; it was largest at load step"
+    assert f"{said} 3, 1.5 N." in page.text
+    assert {"loading", "unloading"} <= set(page.text)
+    assert "://" not in text and 'src="http' not in text
+    assert not list(tmp_path.glob("contact_of_step_*"))
+
+
+def test_single_contact_has_no_slider(tmp_path):
+    page = parsed(cycle(tmp_path, "output.figures=true"))
+    assert "input" not in {tag for tag, _ in page.seen}
+
+
+def test_slider_works_as_a_browser_runs_it(tmp_path):
+    """Without a browser: the script runs in Node on elements that have what it uses."""
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("no Node")
+    text = cycle(tmp_path, "output.figures=true", "output.contact=all")
+    script = text.partition("<script>")[2].partition("</script>")[0]
+    before = """
+    const slider = { value: "2", listeners: {}, attributes: {},
+      addEventListener(name, call) { this.listeners[name] = call; },
+      setAttribute(name, value) { this.attributes[name] = value; } };
+    const bar = { hidden: true };
+    const figures = [0, 1, 2, 3, 4, 5].map(index => ({ hidden: false,
+      querySelector: () => ({ textContent: `caption ${index}` }) }));
+    const part = { querySelectorAll: () => figures,
+      querySelector: what => what === "input" ? slider : bar };
+    const document = { querySelectorAll: () => [part] };
+    const shown = () => [figures.map(one => !one.hidden), slider.attributes, bar.hidden];
+    """
+    after = """
+    const first = JSON.stringify(shown());
+    slider.value = "5";
+    slider.listeners.input();
+    console.log(JSON.stringify([JSON.parse(first), shown()]));
+    """
+    (tmp_path / "run.js").write_text(before + script + after)
+    done = subprocess.run([node, tmp_path / "run.js"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for index, (visible, attributes, hidden) in zip((2, 5), json.loads(done.stdout), strict=True):
+        assert visible == [number == index for number in range(6)]
+        assert attributes == {"aria-valuetext": f"caption {index}"}
+        assert hidden is False
+
+
+def test_of_many_contacts_some_are_shown():
+    records = [SimpleNamespace(force_N=float(index == 777), step=index) for index in range(1000)]
+    steps = [record.step for record in shown_contacts(records)]
+    assert len(steps) == 40 and steps == sorted(steps)
+    assert {0, 777, 999} <= set(steps)
+    assert shown_contacts(records[:1]) == []
+    assert shown_contacts(records[:40]) == records[:40]

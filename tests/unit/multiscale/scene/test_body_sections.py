@@ -51,7 +51,92 @@ def without(data, *keys):
     return {key: value for key, value in data.items() if key not in keys}
 
 
-REFUSED = {
+HOT = {"temperature": "50 K"}
+BOLTED = {**BODY, "pretension": [{"surface": 1, "pull": "3 N"}]}
+EXPANDS = {"steel": {**STEEL, "thermal_expansion": "12 ppm/K"}}
+
+
+def staged(**stage):
+    return {"load": {"stage": [stage]}}
+
+
+REFUSED_LOADS = {
+    "heat that does nothing": (
+        {"body": {**BODY, **HOT}, **REPRESENTATIVE},
+        "body.temperature = '50 K': changes nothing, which does not expand (allowed: with therm",
+    ),
+    "heat of another volume": (
+        {
+            "body": {**without(BODY, *STEEL), "materials": EXPANDS, "temperature": {"oak": 9}},
+            **REPRESENTATIVE,
+        },
+        "body.temperature = {'oak': 9}: changes nothing in 'oak', which does not expand",
+    ),
+    "degrees of a scale": (
+        {"body": {**BODY, "thermal_expansion": "12e-6 1/K", "temperature": "50 degC"}},
+        "body.temperature = '50 degC': cannot be read as a quantity (allowed: a quantity in units",
+    ),
+    "expansion twice": (
+        {"body": {**without(BODY, *STEEL), "materials": EXPANDS, "thermal_expansion": 1e-5}},
+        "body.thermal_expansion = 1e-05: is that of the whole body, which has materials by volume",
+    ),
+    "face without a load": (
+        {"body": {**BODY, "tractions": [{"surface": 1}]}},
+        "body.tractions.0: a loaded face needs exactly one load (allowed: either 'stress' or 'pre",
+    ),
+    "bolts that push": (
+        {"body": {**BODY, "pretension": [{"surface": 1, "pull": "-3 N"}]}},
+        "body.pretension.0.pull = '-3 N': must be greater than or equal to 0",
+    ),
+    "bolts on the other side": (
+        {"counter_body": BOLTED},
+        "counter_body.pretension: bolts pull the body towards the counter-body",
+    ),
+    "bolts without laws": (
+        {"body": BOLTED, "coupling": {"kind": "concurrent"}},
+        "coupling.kind: is 'concurrent', but loads of the body besides the contact need laws on it",
+    ),
+    "moved supports without laws": (
+        {"body": BODY, "coupling": {"kind": "concurrent"}},
+        "coupling.kind: is 'concurrent', but loads of the body besides the contact need laws on it",
+    ),
+    "bolts without the mesh": (
+        {"body": BOLTED, "coupling": {"newton": "condensed"}},
+        "coupling.newton: is 'condensed', but loads of the body besides the contact need laws",
+    ),
+    "bolts and spots": (
+        {"body": BOLTED, "output": {"contact": "last"}},
+        "output.contact: the contact problem behind laws does not know of loads of the body",
+    ),
+    "isolated laws and bolts": (
+        {"body": BOLTED, "counter_body": STEEL, "coupling": {"kind": "isolated"}},
+        "body: does not go with isolated laws against a half-space",
+    ),
+    "two loads of the plane": (
+        {"load": {"approach": 1, "pressure": 2}},
+        "load: needs exactly one load (allowed: 'approach', 'force', 'pressure' or 'stage')",
+    ),
+    "two loads of a stage": (
+        staged(approach=1, hold="force"),
+        "load.stage.0: a stage states approach and hold of the plane (allowed: at most one of",
+    ),
+    "body of a block": (
+        staged(approach=1, body=HOT),
+        "load.stage.0.body: loads a mesh, and there is no [body] of one",
+    ),
+    "stage that heats nothing": (
+        {**staged(approach=1, body=HOT), "body": BODY, **REPRESENTATIVE},
+        "load.stage.0.body.temperature = 50.0: changes nothing, which does not expand",
+    ),
+    "cycles of all stages": (
+        {"load": {"stage": [{"approach": 1}], "cycles": 2}},
+        "load: cycles = 2 needs two turning points (allowed: a list of loads, or cycles = 1; of a",
+    ),
+    "key of a stage": (staged(aproach=1), "load.stage.0.aproach: unknown key; did you mean 'appr"),
+}
+"""Loads of the plane and of bodies: sections, and what is said of them."""
+
+REFUSED = REFUSED_LOADS | {
     "two bodies": ({"body": BODY, "block": STEEL}, "body: is a second body below the surface"),
     "no body": ({"block": None}, "block: is required and missing (allowed: [block]; or [body]"),
     "mesh key of a block": ({"body": {**BODY, "cells": [4, 4, 4]}}, "body.cells: unknown key"),

@@ -196,7 +196,7 @@ def test_no_budget(text, problem):
 
 def chosen(folder, **choice):
     words = {"scene": PAPER, "set": TINY, "out": folder}
-    return Namespace(**words | {"against": None, "budget": None} | choice)
+    return Namespace(**words | {"against": None, "budget": None, "open": False} | choice)
 
 
 @pytest.fixture

@@ -1,0 +1,375 @@
+"""Writes the page on what works with what, from what the code itself refuses.
+
+    .venv/bin/python docs/what_works.py
+
+Small scenes of every coupling on a block and on a mesh are planned, each with one more choice, and
+with two. What is refused stands on the page in the words of the refusal. A new choice is a line of
+`CHOICES`.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Mapping
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NamedTuple
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from multiscale.scene.scene import Scene
+from multiscale.setup import make_setup
+from support.errors import InputError, NotConverged
+
+PAGE = Path(__file__).with_suffix(".md")
+
+Changes = Mapping[str, Any]
+
+AS_SURFACE = "as the surface"
+"""Value of a section that is a copy of ``[surface]``."""
+
+COUPLINGS: dict[str, Changes] = {
+    "`analytic`": {"coupling.kind": "analytic"},
+    "`concurrent`": {"coupling.kind": "concurrent"},
+    "`consistent`": {"coupling.kind": "consistent"},
+    "`isolated`": {"coupling.kind": "isolated"},
+    "laws of samples": {"law.kind": "representative"},
+    "`reference`": {"coupling.kind": "reference"},
+}
+"""Columns: the couplings, and laws of periodic samples (``law.kind = "representative"``)."""
+
+BODIES: dict[str, tuple[str, dict[str, Changes]]] = {
+    "block": (
+        "On a block, `[block]`",
+        {
+            "laws of samples": {"block.lengths": [2.0, 2.0]},
+            "`reference`": {"reference.cells": [8, 8, 4]},
+        },
+    ),
+    "body": ("On a mesh, `[body]`", {}),
+}
+"""Tables: their headings, and what single couplings need there."""
+
+CHOICES: dict[str, dict[str, Changes]] = {
+    "Contact": {
+        '`micro.model = "elliptic"` (asperities)': {"micro.model": "elliptic"},
+        "`micro.finite_slopes = true`": {"micro.finite_slopes": True},
+        "`micro.hardness`": {"micro.hardness": 600.0},
+        "`[counter_surface]` (two rough sides)": {"counter_surface": AS_SURFACE},
+        "`surface.periodic = true`": {"surface.periodic": True},
+    },
+    "Bodies": {
+        "`[counter_body]` (a half-space)": {
+            "counter_body": {"young_modulus": 4000.0, "poisson_ratio": 0.3}
+        },
+        "`counter_body.mesh`": {"counter_body": "a mesh"},
+        '`block.sides = "roller"`': {"block.sides": "roller"},
+        "`block.margin`": {"block.margin": 0.5},
+        "`body.tractions`": {"body.tractions": [{"surface": "side", "stress": [0.0, 0.0, 1.0]}]},
+    },
+    "Laws": {
+        '`coupling.interface = "pointwise"`': {"coupling.interface": "pointwise"},
+        '`coupling.newton = "full"`': {"coupling.newton": "full"},
+        '`coupling.compliance = "finite-element"`': {"coupling.compliance": "finite-element"},
+        "`law.seeds` (scatter of samples)": {"law.seeds": [1, 2]},
+        "`law.crown`": {"law.crown": [100.0, "inf"]},
+    },
+    "Load": {
+        "`load.force`": {"load.approach": None, "load.force": 1.0},
+        "`load.tilt = [tx, ty]`": {"load.tilt": [1e-3, 0.0]},
+        '`load.tilt = "free"`': {"load.tilt": "free"},
+        "`load.approach = [up, down]`": {"load.approach": [8e-3, 2e-3]},
+        '`load.zero = "mean plane"`': {
+            "load.zero": "mean plane",
+            "load.approach": -0.01,
+        },
+        "`accuracy`": {"accuracy": 0.05},
+    },
+    "Results": {
+        '`output.contact = "all"` (spots, maps)': {"output.contact": "all"},
+        "`output.fields`": {"output.fields": True},
+        "`[conductance]`": {"conductance": {"conductivity": [50.0]}},
+    },
+}
+"""Rows: the choices by topic, each with the keys that make it; None takes a key away."""
+
+OF_LAWS, OF_BODIES = ("coupling.",), ("block.", "body.", "output.fields")
+"""Beginnings of keys that a plan states where they matter, and of those that matter with a body."""
+
+ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)"
+"""Rows that are read off the plan itself."""
+
+INTRO = """# What works with what
+
+`docs/what_works.py` wrote this page from what the code itself refuses: it plans small scenes of
+every coupling on a block and on a mesh, each with one of the choices below. ● works, ○ is accepted
+and changes nothing there, and a number is that of the reason in the list [below](#reasons). Where a
+scene states nothing else, a rigid, smooth plane is pressed to an approach, and contacts are those
+of a half-space where the coupling has any.
+
+A column names `coupling.kind`; laws of samples are `law.kind = "representative"`. How accurate and
+how fast each way is stands on the page on [choosing](choosing.md).
+"""
+PAIRS = """## Two choices together
+
+Two choices that each work with a coupling but not together, on a block or on a mesh:
+"""
+
+
+class Reason(NamedTuple):
+    """Why something does not work.
+
+    Attributes:
+        key: Key of the scene that the code names; empty for none.
+        problem: What is wrong.
+        allowed: What would do.
+    """
+
+    key: str
+    problem: str
+    allowed: str
+
+    @property
+    def text(self) -> str:
+        """The reason as the page shows it."""
+        said = f"`{self.key}`: {self.problem}" if self.key else self.problem
+        return f"{said} (instead: {self.allowed})" if self.allowed else said
+
+
+class Planner:
+    """Plans scenes of couplings and bodies with further choices.
+
+    Args:
+        folder: Where meshes are written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        write_mesh(folder / "below.msh", 0.0, 1.0, contact_above=True)
+        write_mesh(folder / "above.msh", 1.0, 2.0, contact_above=False)
+
+    def scene(self, coupling: str, body: str, *choices: Changes) -> Scene:
+        """Return a scene.
+
+        Args:
+            coupling: A name of `COUPLINGS`.
+            body: A name of `BODIES`.
+            *choices: What is changed of it.
+
+        Raises:
+            InputError: When the scene is refused.
+        """
+        material = {"young_modulus": 4000.0, "poisson_ratio": 0.3}
+        data: dict[str, Any] = {
+            "surface": {
+                "spectrum": {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.2, "seed": 1},
+                "grid": [16, 16],
+                "lengths": [1.0, 1.0],
+            },
+            "load": {"approach": 8e-3, "steps": 1},
+            "block": {"height": 1.0, **material},
+        }
+        if body == "body":
+            del data["block"]
+            supports = [{"surface": "far", "displacement": [0.0, 0.0, 0.0]}]
+            data["body"] = {
+                "mesh": str(self._folder / "below.msh"), "contact": "near",
+                "supports": supports, **material,
+            }  # fmt: skip
+        changes = [COUPLINGS[coupling], BODIES[body][1].get(coupling, {}), *choices]
+        pairs = [pair for one in changes for pair in one.items()]
+        for key, value in sorted(pairs, key=lambda pair: pair[1] == AS_SURFACE):
+            self._put(data, key, value)
+        return Scene.from_dict(data)
+
+    def _put(self, data: dict[str, Any], key: str, value: Any) -> None:
+        """Set a key of a scene, or take it away."""
+        *sections, name = key.split(".")
+        for section in sections:
+            data = data.setdefault(section, {})
+        if value is None:
+            data.pop(name, None)
+        elif value == AS_SURFACE:
+            data[name] = {**data["surface"]}
+        elif value == "a mesh":
+            supports = [{"surface": "far", "displacement": [0.0, 0.0, 0.0]}]
+            data[name] = {
+                "mesh": str(self._folder / "above.msh"), "contact": "near", "supports": supports,
+                "young_modulus": 4000.0, "poisson_ratio": 0.3,
+            }  # fmt: skip
+        else:
+            data[name] = value
+
+    def planned(self, coupling: str, body: str, *choices: Changes) -> Any:
+        """Return the coupling that a scene makes, or why there is none.
+
+        Args:
+            coupling: A name of `COUPLINGS`.
+            body: A name of `BODIES`.
+            *choices: What is changed of the scene.
+        """
+        try:
+            scene = self.scene(coupling, body, *choices)
+            load_finite_elements(scene, None)
+            return make_setup(scene)
+        except InputError as error:
+            return Reason(error.key or "", error.problem, error.allowed or "")
+        except NotConverged as error:
+            return Reason("", str(error), "")
+
+    def error(self, coupling: str, body: str) -> Reason | None:
+        """Return why a coupling measures no error; None where it does."""
+        made = self.planned(coupling, body)
+        if isinstance(made, Reason):
+            return made
+        why = made.unmeasured()
+        return Reason("", f"no error is measured: {why}", "") if why else None
+
+    def laws(self, coupling: str, body: str) -> Reason | None:
+        """Return why a coupling has no laws; None where it has."""
+        scene = self.scene(coupling, body)
+        try:
+            coupling_class(scene).check_has_laws(scene)
+        except InputError as error:
+            return Reason(error.key or "", error.problem, error.allowed or "")
+        return None
+
+
+def write_mesh(path: Path, low: float, high: float, *, contact_above: bool) -> None:
+    """Write a cube of tetrahedra with named faces: near and far from the contact, one side.
+
+    Args:
+        path: The file.
+        low: Lowest z [mm].
+        high: Highest z [mm].
+        contact_above: Whether the upper face is the near one.
+    """
+    ends = {"near": high if contact_above else low, "far": low if contact_above else high}
+    corners = [(x, y, z) for z in (low, high) for y in (0.0, 1.0) for x in (0.0, 1.0)]
+    squares = {name: [k + 1 for k, corner in enumerate(corners) if corner[2] == z]
+               for name, z in ends.items()}  # fmt: skip
+    squares["side"] = [k + 1 for k, corner in enumerate(corners) if corner[0] == 0.0]
+    triangles = [(tag, (a, b, c)) for tag, (a, b, d, c) in enumerate(squares.values(), 1)
+                 for a, b, c in ((a, b, c), (a, c, d))]  # fmt: skip
+    # six tetrahedra about the diagonal from the first corner to the last
+    ways = ((2, 4), (4, 3), (3, 7), (7, 5), (5, 6), (6, 2))
+    cells = [(9, (1, second, third, 8)) for second, third in ways]
+    lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat", "$PhysicalNames", "4"]
+    lines += [f'2 {tag} "{name}"' for tag, name in enumerate(squares, 1)]
+    lines += ['3 9 "cube"', "$EndPhysicalNames", "$Nodes", "8"]
+    lines += [f"{k + 1} {x:g} {y:g} {z:g}" for k, (x, y, z) in enumerate(corners)]
+    lines += ["$EndNodes", "$Elements", str(len(triangles) + len(cells))]
+    for number, (tag, nodes) in enumerate([*triangles, *cells], 1):
+        kind = {3: 2, 4: 4}[len(nodes)]
+        lines.append(f"{number} {kind} 2 {tag} {tag} {' '.join(map(str, nodes))}")
+    path.write_text("\n".join([*lines, "$EndElements", ""]), encoding="utf-8")
+
+
+class Reasons(dict[Reason, int]):
+    """Numbers of reasons, from 1, in the order in which they are first met."""
+
+    def cell(self, reason: Reason | None) -> str:
+        """Return what stands in a cell of the tables."""
+        if reason is None:
+            return "●"
+        return str(self.setdefault(reason, len(self) + 1))
+
+
+def page(*, pairs: bool = True) -> str:
+    """Return the page.
+
+    Args:
+        pairs: Whether it has what does not go together, which takes a minute.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        planner, reasons = Planner(Path(folder)), Reasons()
+        works: dict[tuple[str, str], list[str]] = {}
+        parts = [INTRO]
+        for body, (heading, _) in BODIES.items():
+            parts.append(f"## {heading}\n")
+            parts.append(_table(planner, reasons, body, works))
+        if pairs:
+            parts += [PAIRS, _pairs(planner, reasons, works)]
+    listed = "".join(f"{number}. {reason.text}\n" for reason, number in reasons.items())
+    return "\n".join([*parts, "## Reasons\n", listed])
+
+
+def _table(
+    planner: Planner, reasons: Reasons, body: str, works: dict[tuple[str, str], list[str]]
+) -> str:
+    """Return the table of a body by topic, and note which choices work."""
+    lines = [f"| | {' | '.join(COUPLINGS)} |\n|---|{':-:|' * len(COUPLINGS)}\n"]
+    bare = {coupling: planner.planned(coupling, body) for coupling in COUPLINGS}
+    for topic, choices in CHOICES.items():
+        lines.append(f"| **{topic}** |{' |' * len(COUPLINGS)}\n")
+        if topic == "Contact":
+            lines.append(_row("nothing else", [_reason(made) for made in bare.values()], reasons))
+        if topic == "Results":
+            lines.append(_row(ERROR, [planner.error(one, body) for one in COUPLINGS], reasons))
+            lines.append(_row(LAWS, [_laws(planner, one, body) for one in COUPLINGS], reasons))
+        for name, changes in choices.items():
+            if name.startswith(("`block.", "`body.")) and not name.startswith(f"`{body}."):
+                continue
+            cells = []
+            for coupling in COUPLINGS:
+                made = bare[coupling]
+                if not isinstance(made, Reason):
+                    made = planner.planned(coupling, body, changes)
+                cell = reasons.cell(_reason(made))
+                if not isinstance(made, Reason):
+                    works.setdefault((coupling, body), []).append(name)
+                    if _changes_nothing(changes, made, bare[coupling]):
+                        cell = "○"
+                cells.append(cell)
+            lines.append(f"| {name} | {' | '.join(cells)} |\n")
+    return "".join(lines)
+
+
+def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
+    try:
+        return planner.laws(coupling, body)
+    except InputError as error:
+        return Reason(error.key or "", error.problem, error.allowed or "")
+
+
+def _reason(made: Any) -> Reason | None:
+    return made if isinstance(made, Reason) else None
+
+
+def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
+    """Tell whether a choice that is accepted changes nothing: a default, or not looked at."""
+    if all(key.startswith(OF_BODIES) for key in changes):
+        return not made.has_body
+    if all(key.startswith(OF_LAWS) for key in changes):
+        return list(made.statements()) == list(bare.statements())
+    return False
+
+
+def _row(name: str, found: list[Reason | None], reasons: Reasons) -> str:
+    return f"| {name} | {' | '.join(reasons.cell(reason) for reason in found)} |\n"
+
+
+def _pairs(planner: Planner, reasons: Reasons, works: Mapping[tuple[str, str], list[str]]) -> str:
+    """Return the table of pairs of choices that work alone but not together."""
+    changes = {name: one for choices in CHOICES.values() for name, one in choices.items()}
+    found: dict[tuple[str, str, Reason], list[str]] = {}
+    for (coupling, body), names in works.items():
+        for first, second in combinations(names, 2):
+            if set(changes[first]) & set(changes[second]):
+                continue  # one would replace the other
+            made = planner.planned(coupling, body, changes[first], changes[second])
+            if isinstance(made, Reason):
+                where = found.setdefault((first, second, made), [])
+                if coupling not in where:
+                    where.append(coupling)
+    lines = ["| choice | with | in | reason |\n|---|---|---|:-:|\n"]
+    for (first, second, reason), where in found.items():
+        couplings = "all" if len(where) == len(COUPLINGS) else ", ".join(where)
+        lines.append(f"| {first} | {second} | {couplings} | {reasons.cell(reason)} |\n")
+    return "".join(lines)
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

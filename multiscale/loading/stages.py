@@ -1,0 +1,137 @@
+"""Stages of a load history: parts with loads of their own, which are reached evenly.
+
+A stage is gone through in legs: one to its loads or, where it is cyclic, there and back as often as
+it says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, NamedTuple
+
+from multiscale.loading.body_loads import BodyLoads
+from support.errors import InputError
+from support.fields import Length, Limits, Pressure, Unit, check_limits
+
+Quantity = Literal["approach", "force"]
+Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
+_OF_PLANE = ("approach", "force", "pressure", "hold")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stage:
+    """A part of the load history, whose loads are reached evenly from those before it.
+
+    Of the plane it states at most one of ``approach``, ``force``, ``pressure`` and ``hold``;
+    without any, what was prescribed before stays as it is, at first a force of zero.
+
+    Args:
+        name: What it is called in results; its number when not given.
+        approach: Approach of the rigid plane at the end of the stage, counted from ``load.zero``.
+        force: Force on the rigid plane at the end of the stage, beside the pull of bolts. It may be
+            negative where bolts bear it.
+        pressure: The same as a mean pressure on the contact face.
+        hold: Whether the plane stays where it is (``approach``), or under the force that it bears
+            (``force``), while loads of the body change.
+        steps: Load steps to the loads of the stage, and back; ``load.steps`` when not given.
+        cycles: How often the loads go to those of the stage and back to those before it; they go
+            there and stay when not given.
+        body: Loads of the body at the end of the stage; what is not stated, and loads of other
+            faces, stay as they are.
+        counter_body: The same of the counter-body.
+    """
+
+    name: str | None = None
+    approach: Length | None = None
+    force: Annotated[float, Unit("N")] | None = None
+    pressure: Pressure | None = None
+    hold: Quantity | None = None
+    steps: Repeats | None = None
+    cycles: Repeats | None = None
+    body: BodyLoads | None = None
+    counter_body: BodyLoads | None = None
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+        stated = [key for key in _OF_PLANE if getattr(self, key) is not None]
+        if len(stated) > 1:
+            raise InputError(
+                f"a stage states {' and '.join(stated)} of the plane",
+                allowed=f"at most one of {', '.join(_OF_PLANE)}",
+            )
+
+    @property
+    def loads_bodies(self) -> bool:
+        """Whether it changes loads of the bodies."""
+        return any(one not in (None, BodyLoads()) for one in (self.body, self.counter_body))
+
+
+class Leg(NamedTuple):
+    """A straight way of all loads from one state to another.
+
+    Attributes:
+        stage: Index of its stage; 0 of a history without stages.
+        quantity: What is prescribed of the plane.
+        start: Its value at the start [mm or N]; None stands for that under which the plane was when
+            the stage began.
+        end: Its value at the end; None likewise.
+        steps: Number of load steps.
+        there: Whether the loads go to those of the stage; False where they go back.
+    """
+
+    stage: int
+    quantity: Quantity
+    start: float | None
+    end: float | None
+    steps: int
+    there: bool = True
+
+
+def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:
+    """Yield the legs of stages.
+
+    Args:
+        stages: The stages, without pressures.
+        steps: Load steps of a stage that states none.
+    """
+    quantity: Quantity = "force"
+    value: float | None = 0.0  # of the quantity, where it is known beforehand
+    for index, stage in enumerate(stages):
+        before = quantity
+        start, end = value, value
+        if stage.hold is not None:
+            quantity = stage.hold
+        elif stage.approach is not None or stage.force is not None:
+            quantity = "force" if stage.approach is None else "approach"
+            end = stage.force if stage.approach is None else stage.approach
+        if quantity != before:
+            start = 0.0 if index == 0 else None
+            end = start if stage.hold is not None else end
+        there = Leg(index, quantity, start, end, stage.steps or steps)
+        for _ in range(stage.cycles or 1):
+            yield there
+            if stage.cycles:
+                yield there._replace(start=end, end=start, there=False)
+        value = start if stage.cycles else end
+
+
+def states_of(
+    base: BodyLoads, stages: Sequence[BodyLoads | None], lasting: Sequence[bool]
+) -> list[BodyLoads]:
+    """Return the states of a body's loads: for every stage that before it, and that at its end.
+
+    Args:
+        base: The loads before the first stage.
+        stages: What each stage states of the body.
+        lasting: Whether the loads stay at those of the stage.
+
+    Returns:
+        The states, two for every stage; the base alone without stages.
+    """
+    states, now = [], base
+    for stage, stays in zip(stages, lasting, strict=True):
+        reached = now.followed_by(stage)
+        states += [now, reached]
+        now = reached if stays else now
+    return states or [base]

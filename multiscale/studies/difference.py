@@ -1,0 +1,395 @@
+"""Sets the results of two runs beside each other: ratios at equal loads, with both errors.
+
+Only the first rise of the load is compared, up to where it first falls. Both runs are read at the
+loads that both have or, without any, at all loads of either that lie within the range of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from geometry.zero import FIRST_TOUCH
+from multiscale.figures import by_matplotlib
+from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
+from multiscale.results.data_frames import data_frame
+from multiscale.results.history import History
+from multiscale.results.html_page import Table, table_html
+from multiscale.results.reading import read_history, result_of_a_run
+from multiscale.studies import AT
+from multiscale.studies.run_curves import (
+    APPROACH,
+    OTHERS,
+    PRESSURE,
+    SAME,
+    Curves,
+    Quantity,
+    common_loads,
+    nominal_area,
+)
+from support.arrays import Array
+from support.errors import InputError
+
+_MOST_CHANGES = 40
+"""Keys of the scenes that are listed at most."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Ratio:
+    """A quantity of both runs at n equal loads; what is not known is NaN.
+
+    Attributes:
+        name: Name of the quantity, which ends in its unit.
+        text: Its name in words.
+        unit: Its unit.
+        values: Values of the first and of the second run, shape (2, n).
+        errors: Their errors, those of interpolation included, shape (2, n).
+    """
+
+    name: str
+    text: str
+    unit: str
+    values: Array
+    errors: Array
+
+    @property
+    def ratio(self) -> Array:
+        """Second over first, shape (n,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.values[0] != 0.0, self.values[1] / self.values[0], np.nan)
+
+    @property
+    def error(self) -> Array:
+        """Error of the ratio, the sum of both relative errors times the ratio, shape (n,)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.abs(self.ratio) * np.abs(self.errors / self.values).sum(axis=0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Difference:
+    """Two runs beside each other.
+
+    Attributes:
+        names: Names of the first and of the second run.
+        histories: Their load steps.
+        at: What they have in common: ``"pressure"``, the mean pressure, or ``"approach"``.
+        loads: Where they are compared, rising, shape (n,) [MPa or mm].
+        ratios: Every quantity that both know; that which the load does not prescribe first.
+        changes: Keys of the scenes that differ, with both values; empty where not known.
+        notes: What a reader should know.
+    """
+
+    names: tuple[str, str]
+    histories: tuple[History, History]
+    at: str
+    loads: Array
+    ratios: tuple[Ratio, ...]
+    changes: tuple[tuple[str, str, str], ...] = ()
+    notes: tuple[str, ...] = ()
+
+    def of(self, name: str) -> Ratio:
+        """Return a quantity of both runs.
+
+        Args:
+            name: Its name, such as ``"approach_mm"``.
+
+        Raises:
+            InputError: When one of the runs does not know it.
+        """
+        for ratio in self.ratios:
+            if ratio.name == name:
+                return ratio
+        known = ", ".join(ratio.name for ratio in self.ratios)
+        raise InputError("is not known of both runs", key="name", value=name, allowed=known)
+
+    def load_text(self, index: int = -1) -> str:
+        """Return a load as people say it.
+
+        Args:
+            index: Which of the loads; the largest by default.
+        """
+        name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
+        shown, size = usual_unit([float(self.loads[index])], unit)
+        return f"{name} {number(self.loads[index] / size)} {shown}"
+
+    def records(self) -> Iterator[dict[str, Any]]:
+        """Yield the rows of ``diff.csv``: every quantity at every load, as a dictionary."""
+        load = PRESSURE.name if self.at == AT[0] else APPROACH.name
+        for index, value in enumerate(self.loads.tolist()):
+            for one in self.ratios:
+                yield {
+                    f"at_{load}": value,
+                    "quantity": one.name,
+                    "first": float(one.values[0, index]),
+                    "first_error": float(one.errors[0, index]),
+                    "second": float(one.values[1, index]),
+                    "second_error": float(one.errors[1, index]),
+                    "ratio": float(one.ratio[index]),
+                    "ratio_error": float(one.error[index]),
+                }
+
+    def to_dataframe(self) -> Any:
+        """Return the rows of ``diff.csv`` as a pandas data frame.
+
+        Raises:
+            ImportError: When pandas, which patchlaw does not require, is not installed.
+        """
+        return data_frame(list(self.records()))
+
+    def table(self, index: int = -1) -> Table:
+        """Return headings and rows: every quantity of both runs, and their ratio, at one load.
+
+        Args:
+            index: Which of the loads; the largest by default.
+        """
+        first, second = self.names
+        rows = []
+        for one in self.ratios:
+            name, size = one.unit, 0.01 if one.unit == "%" else 1.0
+            if one.unit in SCALED_UNITS:
+                name, size = usual_unit(one.values[:, index].tolist(), one.unit)
+            both = [
+                with_error(value / size, _known(error / size))
+                for value, error in zip(one.values[:, index], one.errors[:, index], strict=True)
+            ]
+            ratio = with_error(float(one.ratio[index]), _known(one.error[index]), 4)
+            rows.append((f"{one.text} [{name}]", *both, ratio))
+        return ("at " + self.load_text(index), first, second, f"{second} / {first}"), rows
+
+    def load_table(self, most: int = 40) -> Table:
+        """Return headings and rows: the ratios of all quantities at all loads.
+
+        Args:
+            most: Loads that are shown; of more as many at equal distances.
+        """
+        name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
+        count = len(self.loads)
+        chosen = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
+        shown, size = usual_unit(self.loads.tolist(), unit)
+        rows = [
+            (
+                number(self.loads[index] / size),
+                *(with_error(float(one.ratio[index]), _known(one.error[index]), 4)
+                  for one in self.ratios),
+            )
+            for index in chosen
+        ]  # fmt: skip
+        return (f"{name} [{shown}]", *(one.text for one in self.ratios)), rows
+
+    def plot(self) -> Any:
+        """Draw the curves of both runs over each other, and the ratios.
+
+        Returns:
+            A matplotlib figure; a notebook shows it.
+        """
+        return by_matplotlib("studies.difference_figure.difference_figure", self)
+
+    def _repr_html_(self) -> str:
+        """Return the table as HTML, which notebooks show."""
+        return table_html(self.table())
+
+
+def difference(
+    first: History | str | Path,
+    second: History | str | Path,
+    *,
+    names: Sequence[str] | None = None,
+    at: str | None = None,
+) -> Difference:
+    """Set two runs beside each other: every quantity of the second over that of the first.
+
+    Quantities do not grow with the face: pressures instead of forces, stiffness and conductance per
+    nominal area. Errors are those that the runs measured, and of what is interpolated.
+
+    Args:
+        first: A history, or the folder that ``patchlaw run`` wrote.
+        second: The other one.
+        names: What to call them; by default their folders' names.
+        at: What is to be equal where they are compared, ``"pressure"`` or ``"approach"``; by
+            default the approach where both runs prescribe it, and else the mean pressure.
+
+    Raises:
+        InputError: When a folder holds no run, or the runs have no load in common.
+    """
+    if at not in (*AT, None):
+        raise InputError("is nothing to compare at", key="at", value=at, allowed=", ".join(AT))
+    runs = [_Run.of(one) for one in (first, second)]
+    chosen = tuple(names or _names((first, second)))
+    whole = (runs[0].history, runs[1].history)
+    risen = [_first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
+    risen, zero_notes, has_approach = _from_one_zero(runs, risen)
+    if at is None:
+        prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
+        at = AT[1] if all(prescribed) and has_approach else AT[0]
+    if at == AT[1] and not has_approach:
+        problem = "approaches count from the mean of a periodic surface in one run alone"
+        raise InputError(problem, key="at", value=at, allowed=AT[0])
+    load, response = (PRESSURE, APPROACH) if at == AT[0] else (APPROACH, PRESSURE)
+    curves = [Curves(history, load) for history in risen]
+    loads = common_loads(curves, chosen, load)
+    wanted = (*([response] if has_approach else []), *OTHERS)
+    ratios = [_ratio(quantity, curves, loads) for quantity in wanted]
+    known = [one for one in ratios if np.isfinite(one.values).any() and one.values.any()]
+    return Difference(
+        names=(chosen[0], chosen[1]),
+        histories=whole,
+        at=at,
+        loads=loads,
+        ratios=tuple(known),
+        changes=tuple(_changes(runs)),
+        notes=(*zero_notes, *_notes(whole, risen, chosen, curves)),
+    )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Run:
+    """A run and, where it was read from its folder, the scene behind it."""
+
+    history: History
+    scene: Mapping[str, Any] | None = None
+    heights: str = ""
+
+    @classmethod
+    def of(cls, given: History | str | Path) -> _Run:
+        if isinstance(given, History):
+            return cls(history=given)
+        folder = Path(given)
+        if not (folder / "history.csv").is_file():
+            problem = "holds no run: there is no history.csv in it"
+            allowed = "a folder that patchlaw run wrote"
+            raise InputError(problem, file=str(folder), allowed=allowed)
+        history, path = read_history(folder), folder / "provenance.json"
+        with result_of_a_run(path) as facts:
+            if facts["units"] != "mm, N, MPa":
+                problem, units = "has other units", facts["units"]
+                raise InputError(problem, key="units", value=units, allowed="mm, N, MPa")
+            heights = facts["surface"]["heights_sha256"]
+            return cls(history=history, scene=facts["scene_given"], heights=heights)
+
+    @property
+    def zero(self) -> str | None:
+        """Name of the height that the approach counts from; None where it is not known."""
+        return None if self.scene is None else self.scene["load"].get("zero", FIRST_TOUCH)
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the approach counts from the mean of a surface that continues periodically."""
+        return self.scene is not None and bool(self.scene["surface"].get("periodic"))
+
+
+def _names(given: Sequence[History | str | Path]) -> tuple[str, str]:
+    """Return names of two runs: of folders as much of their paths as tells them apart."""
+    if any(isinstance(one, History) for one in given):
+        return "first", "second"
+    parts = [Path(str(one)).resolve().parts for one in given]
+    for count in range(1, max(map(len, parts)) + 1):
+        first, second = ("/".join(one[-count:]) for one in parts)
+        if first != second:
+            return first, second
+    return f"{first} (1)", f"{second} (2)"
+
+
+def _first_rise(history: History, name: str) -> History:
+    """Return the load steps up to where the load first falls, those without a force left out."""
+    falls = np.flatnonzero(history.unloading)
+    end = int(falls[0]) if falls.size else len(history)
+    steps = tuple(step for step in history.steps[:end] if step.force_N > 0.0)
+    if not steps:
+        raise InputError("has no load step with a force", key=name)
+    return History(steps=steps, patches=history.patches)
+
+
+def _from_one_zero(
+    runs: Sequence[_Run], risen: Sequence[History]
+) -> tuple[list[History], list[str], bool]:
+    """Return histories whose approaches count from one height, notes, and whether they can."""
+    if runs[0].is_periodic != runs[1].is_periodic:
+        note = "approaches are not compared: one surface is periodic, and counts from its mean"
+        return list(risen), [note], False
+    depths = {bool(history.steps[0].zero_mm) for history in risen}
+    zeros = {run.zero for run in runs} - {None}
+    if len(zeros) < 2 and len(depths) == 1:
+        return list(risen), [], True
+    touched = [
+        History(
+            steps=tuple(step.counted_from(-step.zero_mm) for step in history.steps),
+            patches=history.patches,
+        )
+        for history in risen
+    ]
+    return touched, ["the runs have different load.zero: approaches count from first touch"], True
+
+
+def _ratio(quantity: Quantity, curves: Sequence[Curves], loads: Array) -> Ratio:
+    (first, first_error), (second, second_error) = (curve.at(quantity, loads) for curve in curves)
+    return Ratio(
+        name=quantity.name,
+        text=quantity.text,
+        unit=quantity.unit,
+        values=np.array([first, second]),
+        errors=np.array([first_error, second_error]),
+    )
+
+
+def _known(error: float) -> float | None:
+    return float(error) if np.isfinite(error) else None
+
+
+def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
+    """Yield keys of the scenes that differ, with both values; heights last."""
+    scenes = [run.scene for run in runs]
+    if scenes[0] is None or scenes[1] is None:
+        return
+    first, second = (dict(_flat(scene)) for scene in scenes if scene is not None)
+    keys = [key for key in (first | second) if not key.startswith("output.")]
+    differing = [key for key in keys if first.get(key) != second.get(key)]
+    for key in differing[:_MOST_CHANGES]:
+        yield key, _said(first.get(key)), _said(second.get(key))
+    if len(differing) > _MOST_CHANGES:
+        yield "…", f"{len(differing) - _MOST_CHANGES} more", ""
+    if runs[0].heights != runs[1].heights:
+        yield "heights, SHA-256", runs[0].heights[:12] + "…", runs[1].heights[:12] + "…"
+
+
+def _flat(section: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a scene with dots, and their values."""
+    for name, value in section.items():
+        key = f"{above}{name}"
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{key}.")
+        else:
+            yield key, value
+
+
+def _said(value: Any) -> str:
+    """Return a value as a cell shows it."""
+    text = "–" if value is None else str(value)
+    return text if len(text) <= 60 else f"{text[:59]}…"
+
+
+def _notes(
+    whole: Sequence[History],
+    risen: Sequence[History],
+    names: Sequence[str],
+    curves: Sequence[Curves],
+) -> Iterator[str]:
+    """Yield what a reader of the ratios should know."""
+    areas = [nominal_area(history) for history in whole]
+    if abs(areas[1] - areas[0]) > SAME * areas[0]:
+        yield (
+            f"nominal areas differ: {number(areas[0])} and {number(areas[1])} mm²; forces do by "
+            f"{percent(areas[1] / areas[0] - 1.0, 3)} at equal mean pressures"
+        )
+    for history, rise, name in zip(whole, risen, names, strict=True):
+        if left := len(history) - len(rise):
+            yield f"{name}: {left} load steps without a force or after the first rise are left out"
+    for curve, name in zip(curves, names, strict=True):
+        if np.isnan(curve.load_error).all() and np.isnan(curve.history.approach_error_mm).all():
+            yield f"{name} measured no error in its first rise; its values have none here"
+    ends = [curve.load[-1] for curve in curves]
+    if abs(ends[1] - ends[0]) > SAME * ends[0]:
+        yield "the runs end at different loads; errors that one measured at its end may lie beyond"
