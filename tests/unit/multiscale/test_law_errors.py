@@ -176,3 +176,21 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     closure = law.rows.closure[[1, -1]]
     found = interpolation_errors(known, closure)
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
+
+
+def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
+    stages = [
+        {"force": "5 N", "steps": 2, "body": {"pretension": [{"surface": "right", "pull": "2 N"}]}},
+        {"hold": "approach", "steps": 1, "body": {"temperature": "7 K"}},
+    ]
+    warm = {**body(mesh), "thermal_expansion": "20 ppm/K"}
+    law = {"kind": "representative"}
+    load, output = {"stage": stages, "tilt": "free"}, {"check": "all"}
+    steps = run(scene(mesh, body=warm, law=law, load=load, output=output)).steps
+    assert len(steps) == 3
+    for step in steps:
+        errors = dict(step.errors)
+        # under other loads of the body the force would be another altogether
+        assert errors["quadrature"] < 1e-4 * step.force_N
+        assert 0.0 < errors["mesh"] < 0.1 * step.force_N
+    assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
