@@ -233,6 +233,12 @@ class ContactState:
         return self.pressure
 
     @property
+    def open_gap(self) -> Array:
+        """Gaps beside the contact and 0 within, of a model that knows the points, (nx, ny) [mm]."""
+        assert self.gap is not None
+        return np.where(self.in_contact, 0.0, np.maximum(self.gap, 0.0))
+
+    @property
     def guess(self) -> Start:
         """What any other load may start from, on the surface as it was made."""
         own = self.indentation

@@ -32,6 +32,7 @@ from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.notes import energy_notes, verdict, yielding_notes
 from multiscale.scene.identity import identity
+from multiscale.scene.leak import LeakSection
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
 from support.checked_store import fingerprint
@@ -86,7 +87,20 @@ class Run:
             from multiscale.observers.conductance import ConductanceObserver  # others do without
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
+        if self.scene.leak is not None:
+            self._observers.append(self._leak_observer(self.scene.leak))
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
+
+    def _leak_observer(self, section: LeakSection) -> StepObserver:
+        """Return what adds the leak to load steps: through gaps of cells, or over a face."""
+        if section.between_edges:
+            from multiscale.observers.face_leak import FaceLeakObserver
+
+            coupling: Any = self.coupling
+            return FaceLeakObserver(coupling, section)
+        from multiscale.observers.leak import LeakObserver
+
+        return LeakObserver(self.coupling, section, self._has_unloaded)
 
     def phase(self, name: str) -> AbstractContextManager[None]:
         """Measure the wall time of a phase, without that of phases within it.

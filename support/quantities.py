@@ -20,12 +20,15 @@ class _Unit(NamedTuple):
 
 _UNITS = {
     "mm": _Unit('"8 um"', (1e-15, 1e15), {"m": 1e3, "mm": 1.0, "um": 1e-3, "µm": 1e-3}),
-    "MPa": _Unit('"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3}),
+    "MPa": _Unit(
+        '"4 GPa"', (1e-15, 1e15), {"Pa": 1e-6, "kPa": 1e-3, "MPa": 1.0, "GPa": 1e3, "bar": 0.1}
+    ),
     "mm**4": _Unit('"1e-9 mm^4"', (1e-60, 1e60)),
     "": _Unit('"5 um/mm"', (1e-15, 1e6), {"um/mm": 1e-3}),
     "N": _Unit('"5 N"', (1e-30, 1e30), {"N": 1.0, "mN": 1e-3, "kN": 1e3, "MN": 1e6}),
     "W/m/K": _Unit('"50 W/m/K"', (1e-9, 1e9), {"W/m/K": 1.0}),
     "ohm*m": _Unit('"1.7e-8 ohm m"', (1e-15, 1e25), {"ohm m": 1.0}),
+    "Pa*s": _Unit('"1 mPa s"', (1e-9, 1e9), {"Pa s": 1.0, "mPa s": 1e-3}),
     "K": _Unit('"300 K"', (1e-9, 1e9), {"K": 1.0}),
     "1/K": _Unit('"12e-6 1/K"', (1e-12, 1.0), {"ppm/K": 1e-6, "um/m/K": 1e-6}),
     "deg": _Unit('"90 deg"', (1e-9, 1e6), {"deg": 1.0}),

@@ -12,7 +12,8 @@ Dimensions in mm, close to a DN 50 flange of PN 40. The axis is z, and the raise
 
 Run it as `.venv/bin/python demos/bodies/flange.py`; `--size` is the length of edges at the outer
 rim of the raised face [mm], where it will touch, `--out` the file. It writes physical names:
-volume `flange`, surfaces `raised face`, `washers`, `bore` and `pipe end`.
+volume `flange`, surfaces `raised face`, `bore`, `rim` (the outer wall of the raised face),
+`washers` and `pipe end`.
 """
 
 from math import cos, pi, sin
@@ -61,6 +62,8 @@ def build(size: float) -> None:
     name(2, [tag for ring in pieces[1:] for _, tag in ring], "washers")
     name(2, in_plane(-NECK, PIPE + 1), "pipe end")
     name(2, around_axis(BORE), "bore")
+    inner = around_axis(PIPE)
+    name(2, [tag for tag in around_axis(FACE) if tag not in inner], "rim")
 
     away = f"(({TOP} - z)^2 + ({FACE} - (x^2 + y^2)^0.5)^2)^0.5"
     set_size(f"{size} * (1 + 0.15 * {away})")  # coarser with the distance from the face's rim

@@ -10,8 +10,8 @@ Dimensions in mm. The axis is z, and the narrow sealing face looks up:
 A quarter is meshed: `plane x` and `plane y` are the planes of symmetry x = 0 and y = 0.
 
 Run it as `.venv/bin/python demos/bodies/seal_ring.py`; `--size` is the length of edges [mm] in the
-section, `--out` the file. It writes physical names: volume `ring`, surfaces `sealing face`,
-`shoulder`, `seat`, `plane x` and `plane y`.
+section, `--out` the file. It writes physical names: volume `ring`, surfaces `sealing face`, `bore`
+and `rim` (the walls of the nose inside and outside), `shoulder`, `seat`, `plane x` and `plane y`.
 """
 
 from math import ceil, pi
@@ -53,6 +53,17 @@ def between(z: float, inner: float, outer: float) -> list[int]:
     return [tag for tag in in_box((0, 0, z), (outer, outer, z)) if tag not in inside]
 
 
+def nose_wall(radius: float) -> list[int]:
+    """Return the cylindrical surfaces of the nose at a radius."""
+    within = in_box((0, 0, RING), (radius, radius, TOP))
+    boxes = {tag: gmsh.model.getBoundingBox(2, tag) for tag in within}
+    return [
+        tag
+        for tag, (x, y, z, right, back, top) in boxes.items()
+        if top - z > 0.9 * NOSE and min(right - x, back - y) > 0.9 * radius
+    ]
+
+
 def build(size: float) -> None:
     """Make the geometry, name its parts and set the length of edges [mm]."""
     layers = ceil(0.5 * pi * RADII[1] / (SLOWER * size))
@@ -63,6 +74,8 @@ def build(size: float) -> None:
     name(2, between(TOP, RADII[1], RADII[2]), "sealing face")
     name(2, between(RING, RADII[2], RADII[3]), "shoulder")
     name(2, between(0.0, RADII[0], RADII[1]), "seat")
+    name(2, nose_wall(RADII[1]), "bore")
+    name(2, nose_wall(RADII[2]), "rim")
     name(2, in_box((0, 0, 0), (0, RADII[3], TOP)), "plane x")
     name(2, in_box((0, 0, 0), (RADII[3], 0, TOP)), "plane y")
 

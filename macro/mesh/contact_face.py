@@ -69,7 +69,7 @@ class ContactFacets:
     @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
-        triangles, facet = _triangles(self.corners)
+        triangles, facet = facet_triangles(self.corners)
         areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
         return np.asarray(areas, dtype=np.float64)
 
@@ -137,7 +137,7 @@ def facet_quadrature(
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
-    triangles, facet = _triangles(facets.corners)
+    triangles, facet = facet_triangles(facets.corners)
     if isinstance(parts, PatchGrid):
         triangles, facet = _cut_into_patches(triangles, facet, parts)
         patch = parts.index_of(*triangles.mean(axis=1).T)
@@ -205,8 +205,12 @@ def top_facets(block: BlockMesh) -> ContactFacets:
     return contact_facets(block.mesh, block.facet_tags.find(TOP), UPWARD)
 
 
-def _triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,)."""
+def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,).
+
+    Args:
+        corners: Corners of the facets, shape (m, 3 or 4, 2) [mm].
+    """
     facet = np.arange(len(corners))
     if corners.shape[1] == 3:
         return corners, facet

@@ -141,9 +141,7 @@ class ContactSolver(StepSolver):
     def gaps(self) -> Array | None:
         """Gaps of all cells at the latest load step; see `StepSolver.gaps`."""
         state = self.latest
-        if state is None or state.gap is None:
-            return None
-        return np.where(state.in_contact, 0.0, np.maximum(state.gap, 0.0))
+        return None if state is None or state.gap is None else state.open_gap
 
     def _solved(self) -> ContactState:
         if self.latest is None:

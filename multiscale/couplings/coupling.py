@@ -465,6 +465,23 @@ class Coupling(SceneParts, ABC):
         """
         return step
 
+    def coarser_gap(self, step: LoadStep) -> Array | None:
+        """Return the gaps under the load of a step on half as many cells a side; see `open_gap`.
+
+        Args:
+            step: The load step.
+
+        Returns:
+            Shape (nx // 2, ny // 2) [mm]; None without cells.
+
+        Raises:
+            NotConverged: When the contact problem cannot be solved.
+
+        Note:
+            Collective.
+        """
+        return None
+
     def with_mesh_errors(
         self, steps: Sequence[LoadStep]
     ) -> tuple[tuple[LoadStep, ...], ReferenceRecord | None]:

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, InputError, MaterialPair, PatchGrid, Surface
+from geometry import Asperities, Control, InputError, MaterialPair, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
@@ -31,6 +31,8 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
+from support.arrays import Array
+from support.collective import on_root_alone
 
 
 @dataclass(kw_only=True, eq=False)
@@ -139,6 +141,21 @@ class MicroCoupling(PressedSurface):
         known = None if self.has_laws else self.solver.latest
         start = None if known is None else known.guess
         return checked(step, self.error_probe(), self.load_history, self.comm, start=start)
+
+    def coarser_gap(self, step: LoadStep) -> Array | None:
+        """Return the gaps under the load of a step on half as many cells a side."""
+        if self.cells is None:
+            return None
+        nx, ny = self.cells
+        probe, control = self.error_probe(), Control(approach=step.approach_mm, tilt=step.tilt)
+        if self.load_history.quantity_in(step.stage) == "force":
+            control = Control(force=step.force_N, tilt=step.tilt)
+
+        def solve() -> Array:
+            model = probe.model.resampled((nx // 2, ny // 2))
+            return probe.on_body(model, probe.order).press(control).open_gap
+
+        return on_root_alone(self.comm, solve)
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""

@@ -230,6 +230,11 @@ class RepresentativeCoupling(LawCoupling):
         )
         return before if before is not None and made.rows == before.rows else made
 
+    @property
+    def periodic_models(self) -> list[list[HalfSpaceModel]]:
+        """The periodic models of all samples of every region."""
+        return [[self._model_of(region, one) for one in region.surfaces] for region in self.samples]
+
     def _model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
         """Return the periodic model of a sample, with the slopes of its body where they count."""
         pair = region.materials

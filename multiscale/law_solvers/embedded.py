@@ -83,6 +83,12 @@ class EmbeddedLaws(LawSolver):
         whole[face.on_both] = pressure
         return whole
 
+    @property
+    def point_separations(self) -> Array:
+        """Mean gaps of the laws at this rank's points at the latest load step, (n,) [mm]."""
+        patch = self.face.sampling("pointwise").patch
+        return self._laws.at(patch, self._known.sample_closure, extend=True).separation
+
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `StepSolver`."""
         first: Any = getattr(self.face, "first", self.face)

@@ -16,6 +16,7 @@ from multiscale.readable import Caution, Detail, measured, number, percent, quan
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.html_page import filled
+from multiscale.results.leak_notes import WAYS, known_leaks, leak_text
 from multiscale.run import Run
 
 PAPER = (
@@ -160,6 +161,9 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
+    for way, where in WAYS.items():
+        if known_leaks([last], way):
+            yield f"leak {where}", leak_text(last, way), ""
     for name, (text, unit) in _MORE.items():
         if value := getattr(last, name):
             yield text, quantity(value, unit), ""

@@ -35,7 +35,9 @@ from support.whole_files import remove, write_bytes, write_csv, write_text, writ
 _MOST_PROCESSES = 3
 """Processes that draw; a run has five to eight figures."""
 
-_FIGURES = ("overview", "surface", "curves", "pressures", "contact", "laws", "block", "face")
+_FIGURES = (
+    "overview", "surface", "curves", "pressures", "contact", "laws", "block", "face", "leak",
+)  # fmt: skip
 
 FILES = (
     "history.csv", "patches.csv", "reference.csv", "laws.h5", "provenance.json", "report.html",
@@ -274,6 +276,10 @@ class RunFigures:
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
+        if run.scene.leak is not None:
+            gaps = run.contacts[-1] if run.contacts else None
+            about = history, gaps, run.scene.leak, run.scene.surface.periodic
+            figures["leak"] = "leak.leak_figure", about
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
         if run.scene.output.report:

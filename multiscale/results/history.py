@@ -190,6 +190,48 @@ class History:
         "Approach counted from first touch, where approach_mm counts from another height", "mm",
         heading="from first touch", table="more",
     )  # fmt: skip
+    leak_x_mm3_per_s = Column(
+        "Flow rate of the leak along x, 0 where the gap is closed", "mm³/s",
+        heading="leak along x", table="more", error="leak_error_x_mm3_per_s",
+    )  # fmt: skip
+    leak_error_x_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
+    transmissivity_x_mm3 = Column("Transmissivity T of the gap along x", "mm³")
+    hydraulic_gap_x_mm = Column(
+        "Hydraulic gap along x, T^(1/3)", "mm", heading="hydraulic gap along x", table="more"
+    )
+    flow_factor_x = Column(
+        "Flow factor along x, T over the cube of the mean separation",
+        heading="flow factor along x", table="more",
+    )  # fmt: skip
+    constriction_x_fraction = Column(
+        "Part of the leak along x through the channel of the narrowest constriction",
+        heading="narrowest channel along x", table="more",
+    )  # fmt: skip
+    percolates_x = Column("1 where an open path leads along x, 0 where the gap is closed")
+    leak_y_mm3_per_s = Column(
+        "Flow rate of the leak along y, 0 where the gap is closed", "mm³/s",
+        heading="leak along y", table="more", error="leak_error_y_mm3_per_s",
+    )  # fmt: skip
+    leak_error_y_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
+    transmissivity_y_mm3 = Column("Transmissivity T of the gap along y", "mm³")
+    hydraulic_gap_y_mm = Column(
+        "Hydraulic gap along y, T^(1/3)", "mm", heading="hydraulic gap along y", table="more"
+    )
+    flow_factor_y = Column(
+        "Flow factor along y, T over the cube of the mean separation",
+        heading="flow factor along y", table="more",
+    )  # fmt: skip
+    constriction_y_fraction = Column(
+        "Part of the leak along y through the channel of the narrowest constriction",
+        heading="narrowest channel along y", table="more",
+    )  # fmt: skip
+    percolates_y = Column("1 where an open path leads along y, 0 where the gap is closed")
+
+    leak_mm3_per_s = Column(
+        "Flow rate of the leak over the contact face, 0 where the gap is closed", "mm³/s",
+        heading="leak", table="more", error="leak_error_mm3_per_s",
+    )  # fmt: skip
+    leak_error_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
 
     stage = Column(
         "Number of the stage, where the load history has stages", heading="stage", table="more"

@@ -14,6 +14,7 @@ from multiscale.scene.bodies import (
     ConductanceSection,
     CounterBodySection,
 )
+from multiscale.scene.leak import LeakSection
 from multiscale.scene.sections import (
     CouplingSection,
     LawSection,
@@ -28,6 +29,10 @@ from support.fields import KEY, Limits
 
 Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
+
+
+_WITHOUT_CELLS = {"isolated", "consistent", "reference", "auto"}
+"""Couplings that know no gaps of the surface's cells."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,6 +64,7 @@ class SceneSections:
         loading: The motion of the rigid plane, or the force on it.
         conductance: Thermal and electrical conductance of the interface, which are not found
             without it.
+        leak: Flow of a fluid through the gaps, which is not found without it.
         output: What is written beside the tables of results.
     """
 
@@ -75,6 +81,7 @@ class SceneSections:
     reference: ReferenceSection = field(default_factory=ReferenceSection)
     loading: LoadHistory = field(metadata={KEY: "load"})
     conductance: ConductanceSection | None = None
+    leak: LeakSection | None = None
     output: OutputSection = field(default_factory=OutputSection)
 
     @property
@@ -116,7 +123,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         InputError: With the first reason.
     """
     problems = chain(
-        *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings)),
+        *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings, _leak)),
         _representative_laws(scene, of_coupling),
         _micro_models(scene),
     )
@@ -213,6 +220,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
 def _couplings(scene: SceneSections) -> Iterator[Problem]:
     """Yield what a coupling has no use for, and what it leaves out."""
     block = "which meshes a block under a rigid, smooth plane"
+    mapped = "which knows no gaps of cells"
     apart = "whose meshes do not tell the stiffness of the interface from that of the block"
     for key, value, kinds, reason in (
         ("body", scene.body, {"reference"}, block),
@@ -220,6 +228,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         ("counter_surface", scene.counter_surface, {"reference"}, block),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
+        ("leak", scene.leak, _WITHOUT_CELLS, mapped),
     ):
         if value is not None and scene.kind in kinds:
             others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))
@@ -242,6 +251,21 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
             "leave it out, and state them; law.kind = 'representative' says whether it is kept",
         )
+
+
+def _leak(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what does not fit of the flow over a face, between its edges."""
+    leak, second = scene.leak, scene.counter_body
+    if leak is None:
+        return
+    over_face = "law.kind = 'representative' on a [body]"
+    if leak.between_edges and (scene.body is None or not scene.law.representative):
+        yield "leak.inlet", f"needs {over_face}, whose face has edges", "leave out both edges"
+    if scene.law.representative and not leak.between_edges:
+        problem = "is required with law.kind = 'representative': the fluid flows over the face"
+        yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
+    if scene.law.representative and second is not None and second.mesh is not None:
+        yield "leak", "does not go with a counter-body on a mesh", "a rigid side or a half-space"
 
 
 def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:
@@ -291,6 +315,9 @@ def _micro_models(scene: SceneSections) -> Iterator[Problem]:
             "stiffness is that of contacts that yield, which conduct all the same",
             concurrent,
         )
+    if scene.leak is not None and model != "half-space":
+        problem = f"does not go with micro.model = '{model}', which knows no gaps beside summits"
+        yield "leak", problem, cells
     if conducts and model != "half-space" and not by_laws:
         problem = f"does not go with micro.model = '{model}' without laws"
         yield "conductance", problem, f"{cells}; or coupling.kind = 'consistent' or 'isolated'"

@@ -10,6 +10,7 @@ import pytest
 from mpi4py import MPI
 
 from macro import compat
+from macro.mesh.facets import facet_nodes
 from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face, surface_area
 from multiscale import Scene, run
@@ -64,6 +65,9 @@ CASES = {  # edges; contact face; volumes; areas
     ),
 }
 
+WALLS = {"seal_ring": {"bore": 22.0, "rim": 24.5}, "flange": {"bore": 27.5, "rim": 51.0}}
+"""Radii of cylindrical faces about z."""
+
 
 @pytest.mark.parametrize("body", CASES)
 def test_bodies_have_their_dimensions(body, tmp_path):
@@ -73,7 +77,14 @@ def test_bodies_have_their_dimensions(body, tmp_path):
     subprocess.run(words, check=True, capture_output=True)
     tagged = read_mesh(path, MPI.COMM_SELF)
     assert set(tagged.cell_names) == set(volumes)
-    assert set(tagged.facet_names) == set(areas)
+    walls = WALLS.get(body, {})
+    assert set(tagged.facet_names) == set(areas) | set(walls)
+    for name, radius in walls.items():
+        facets = tagged.facet_tags.find(tagged.facet_tag(name))
+        nodes = facet_nodes(tagged.mesh, facets).corners
+        assert len(nodes) > 20
+        x, y, _ = tagged.mesh.geometry.x[nodes.ravel()].T
+        np.testing.assert_allclose(np.hypot(x, y), radius, rtol=1e-9)
     corners = tagged.mesh.geometry.x[compat.cell_vertices(tagged.mesh)]
     for name, volume in volumes.items():
         of_volume = corners[tagged.cell_tags.values == tagged.cell_names[name]]

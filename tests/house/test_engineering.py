@@ -1,7 +1,9 @@
 """The page on what engineers read off is true: its scene gives the numbers it prints."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from multiscale import Scene, run
@@ -36,3 +38,28 @@ def test_numbers_of_the_page():
         assert f"({1e3 * step.approach_mm:.3f})" in PAGE.replace("elastic ", ""), k
     conducted = elastic.thermal_conductance_W_per_K[-1]
     assert f"Elastic contacts would conduct {conducted:.4f} W/K" in PAGE
+
+
+@pytest.mark.long
+def test_the_leak_on_the_page_is_that_of_its_scene():
+    history = run(Scene.load(ROOT / "demos" / "scenes" / "leak.toml", ["output.figures=false"]))
+    rows = re.findall(r"^\| (\d+) N \| (.*) % \| (.*?) \| (.*?) \|(.*)\|$", PAGE, re.MULTILINE)
+    assert len(rows) == 5
+    for force, area, *leaks, shares in rows:
+        index = int(np.argmin(np.abs(history.force_N - float(force))))
+        step = history.steps[index]
+        assert 100.0 * step.contact_area_fraction == pytest.approx(float(area), abs=0.05)
+        if leaks[0] == "closed":
+            assert (step.percolates_x, step.percolates_y) == (0, 0)
+            continue
+        for direction, text in zip("xy", leaks, strict=True):
+            value, error = (float(one) for one in re.findall(r"\d+\.\d+", text))
+            power = float("1" + (re.findall(r"e-\d", text) or ["e0"])[0])
+            leak, off = (
+                getattr(step, f"{name}_{direction}_mm3_per_s") for name in ("leak", "leak_error")
+            )
+            assert leak == pytest.approx(value * power, rel=0.02)
+            assert off == pytest.approx(error * power, rel=0.1)
+        found = (step.constriction_x_fraction, step.constriction_y_fraction)
+        said = [float(one) for one in re.findall(r"\d+", shares)]
+        np.testing.assert_allclose(100.0 * np.array(found), said, atol=0.6)

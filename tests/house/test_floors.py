@@ -34,7 +34,7 @@ FLOORS = {
         "asperities contact_state meshes plane_equilibrium",
     ],
     "micro": [
-        "closed_forms conductance",
+        "closed_forms conductance flow",
         "boundary_elements model",
         "asperities complementarity",
         "half_space",
@@ -51,7 +51,7 @@ FLOORS = {
         "compliance fields",
     ],
     "multiscale": [
-        "readable removed",
+        "gap_flows readable removed",
         "figures machine",
         "laws loading",
         "exports results scene",

@@ -31,6 +31,9 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
+    leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
+    edges = {"inlet": "left", "outlet": "right"}
+    yield "leak", {**sample, **load, "body": body, "leak": leak | edges, "output": QUIET}
     stages = [
         {
             "force": "12 N",
@@ -57,10 +60,10 @@ def main(folder):
     for name, content in sections(folder):
         run = Run(Scene.from_dict(content), comm)
         list(run.load_steps())
-        step = run.steps[-1]
+        last = run.steps[-1]
         # errors are differences of forces
-        errors = [step.force_N + error for _, error in step.errors]
-        found[name] = step.force_N, step.approach_mm, *errors
+        errors = [last.force_N + error for _, error in last.errors]
+        found[name] = last.force_N, last.approach_mm, last.leak_mm3_per_s or 0.0, *errors
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))

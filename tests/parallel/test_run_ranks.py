@@ -52,6 +52,11 @@ SCENES = {
         "coupling.kind=concurrent", "micro.model=half-space", "micro.hardness='300 MPa'",
         "load.approach=['8 um', '4 um']", "conductance.conductivity=['50 W/m/K']",
     ],
+    "leaking": [
+        "coupling.kind=analytic", "micro.model=half-space", "leak.viscosity='1 mPa s'",
+        "leak.pressures=['2 bar', '1 bar']",
+        "output.check=all",
+    ],
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],
@@ -80,6 +85,9 @@ NUMBERS = (
     "approach_error_mm",
     "peak_pressure_MPa",
     "stiffness_N_per_mm",
+    "leak_x_mm3_per_s",
+    "leak_error_y_mm3_per_s",
+    "constriction_y_fraction",
 )
 
 

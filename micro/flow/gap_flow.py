@@ -1,0 +1,200 @@
+"""Reynolds' equation in the gaps of a contact: ∇·(g³/(12 η) ∇P) = 0 between two opposite sides.
+
+Finite volumes on the cells of a map of gaps. Between neighbours lies the harmonic mean of their g³,
+as half of the way between their centres leads through each. Cells in contact are closed.
+
+Theory: docs/theory.md, section 15.
+
+Source:
+    Patir & Cheng 1978, doi 10.1115/1.3453103 (flow factors); Dapp, Lücke, Persson & Müser 2012,
+    doi 10.1103/PhysRevLett.108.244301 (leak and percolation).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from micro.flow.constriction import Constriction, critical_constriction
+from micro.flow.network import Network
+from micro.flow.potential_flow import NetworkFlow, Preconditioner, factorised, network_flow
+from support.arrays import Array
+from support.errors import InputError
+
+_LEAST_GAP = 1e-7
+"""Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
+ones, and the flow through it is 1e-21 of that through the largest."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GapFlow:
+    """The flow through a map of gaps from the side x = 0 to the opposite one, or along y.
+
+    Args:
+        gap: Gaps of the cells, 0 where closed, shape (nx, ny) [mm].
+        lengths: Sides of the map [mm].
+        axis: 0 for a flow along x, 1 along y.
+        network: The network of the cells, those of a map with its axes swapped for a flow along y.
+        solution: The flow through it.
+    """
+
+    gap: Array
+    lengths: tuple[float, float]
+    axis: int
+    network: Network
+    solution: NetworkFlow
+
+    @property
+    def percolates(self) -> bool:
+        """Whether an open path leads from side to side."""
+        return self.network.percolates
+
+    @property
+    def transmissivity(self) -> float:
+        """T = 12 η Q L/(W ΔP) of the flow Q through the width W along the length L [mm³]."""
+        along, across = self.lengths[self.axis], self.lengths[1 - self.axis]
+        return self.solution.total * along / across
+
+    @property
+    def hydraulic_gap(self) -> float:
+        """Gap between parallel plates that lets as much through, T^(1/3) [mm]."""
+        return float(np.cbrt(self.transmissivity))
+
+    @property
+    def flow_factor(self) -> float:
+        """Flow factor φ = T/ḡ³ of the mean gap ḡ; 0 without a gap.
+
+        Source: Patir & Cheng 1978, doi 10.1115/1.3453103.
+        """
+        mean = float(self.gap.mean())
+        return self.transmissivity / mean**3 if mean else 0.0
+
+    def rate(self, drop: float, viscosity: float) -> float:
+        """Return the flow rate Q [mm³/s].
+
+        Args:
+            drop: Fluid pressure at the first side less that at the other [MPa].
+            viscosity: Dynamic viscosity η [MPa s].
+        """
+        return self.solution.total * drop / (12.0 * viscosity)
+
+    @property
+    def pressure(self) -> Array:
+        """Fluid pressure, 1 at the first side and 0 at the other, shape (nx, ny).
+
+        NaN in contact and where no path from a side leads.
+        """
+        return self._oriented(self.solution.potential[: self.network.count])
+
+    @property
+    def flux(self) -> tuple[Array, Array]:
+        """Flow per width along x and y at the centres of cells, shapes (nx, ny).
+
+        1 is that between parallel plates at the mean gap.
+        """
+        network, flow, size = self.network, self.solution.flow, self.network.count + 2
+        row = self.gap.shape[1 - self.axis]
+        across = network.tail // row == network.head // row
+        plates = float(self.gap.mean()) ** 3 / self.lengths[self.axis]
+        parts = []
+        for links, axis in ((~across, self.axis), (across, 1 - self.axis)):
+            # each cell has the mean of what passes through two opposite faces
+            through = np.bincount(network.tail[links], flow[links], minlength=size)
+            through += np.bincount(network.head[links], flow[links], minlength=size)
+            width = self.lengths[1 - axis] / self.gap.shape[1 - axis]
+            parts.append(self._oriented(0.5 * through[: network.count]) / (width * plates))
+        return (parts[1], parts[0]) if self.axis else (parts[0], parts[1])
+
+    @cached_property
+    def constriction(self) -> Constriction | None:
+        """The critical constriction; None where nothing flows."""
+        if not self.percolates:
+            return None
+        gap, lengths = _turned(self.gap, self.lengths, self.axis)
+        found = critical_constriction(self.network, self.solution, gap, lengths)
+        return found.turned if self.axis else found
+
+    def _oriented(self, values: Array) -> Array:
+        """Return values of the network's nodes on the map."""
+        nx, ny = self.gap.shape
+        return values.reshape(ny, nx).T if self.axis else values.reshape(nx, ny)
+
+
+def gap_flow(
+    gap: Array,
+    lengths: tuple[float, float],
+    *,
+    axis: int = 0,
+    periodic: bool = False,
+    preconditioner: Preconditioner = factorised,
+) -> GapFlow:
+    """Solve Reynolds' equation on a map of gaps.
+
+    Args:
+        gap: Gaps of the cells, 0 in contact, shape (nx, ny) [mm].
+        lengths: Sides of the map [mm].
+        axis: 0 for a flow from x = 0 to x = Lx, 1 along y.
+        periodic: Whether the map continues over the two sides along the flow, which are walls
+            otherwise.
+        preconditioner: See `network_flow`.
+
+    Raises:
+        InputError: When the gaps are no numbers ≥ 0 of at least two cells a side.
+        NotConverged: When what enters and leaves the cells does not balance.
+    """
+    gap = np.asarray(gap, float)
+    if gap.ndim != 2 or min(gap.shape) < 2:
+        raise InputError("is no map of gaps", value=gap.shape, allowed="cells along x and y")
+    if not (np.isfinite(gap).all() and (gap >= 0.0).all()):
+        raise InputError("gaps must be finite numbers ≥ 0", allowed="0 in contact")
+    open_gap = np.where(gap > _LEAST_GAP * gap.max(), gap, 0.0)
+    turned, sides = _turned(open_gap, lengths, axis)
+    network = cell_network(turned**3, sides, periodic=periodic)
+    solution = network_flow(network, preconditioner)
+    return GapFlow(gap=open_gap, lengths=lengths, axis=axis, network=network, solution=solution)
+
+
+def cell_network(
+    conductivity: Array, lengths: tuple[float, float], *, periodic: bool = False
+) -> Network:
+    """Return the network of the cells of a map, whose inlet is at x = 0 and outlet at x = Lx.
+
+    Cell [ix, iy] is node ix ny + iy.
+
+    Args:
+        conductivity: Conductivity of the cells, 0 where closed, shape (nx, ny). That of a gap is
+            g³ [mm³].
+        lengths: Sides of the map [mm].
+        periodic: Whether the map continues over the sides y = 0 and y = Ly.
+    """
+    nx, ny = conductivity.shape
+    cells = np.arange(nx * ny).reshape(nx, ny)
+    below, above = cells, np.roll(cells, -1, axis=1)
+    if not periodic:
+        below, above = below[:, :-1], above[:, :-1]
+    inlet, outlet = np.full(ny, cells.size), np.full(ny, cells.size + 1)
+    tail = np.concatenate([inlet, cells.ravel(), below.ravel()])
+    head = np.concatenate([cells[0], cells[1:].ravel(), outlet, above.ravel()])
+    width = (lengths[1] / ny) / (lengths[0] / nx)
+    widths = np.repeat([width, 1.0 / width], [cells.size + ny, below.size])
+    # half of a link between two cells lies in each of them; those to a side end there
+    resistance = np.zeros(cells.size + 2)
+    with np.errstate(divide="ignore"):
+        resistance[: cells.size] = 0.5 / conductivity.ravel()
+    links = resistance[tail] + resistance[head]
+    is_open = np.isfinite(links)
+    return Network(
+        count=cells.size,
+        tail=tail[is_open],
+        head=head[is_open],
+        conductance=widths[is_open] / links[is_open],
+    )
+
+
+def _turned(
+    gap: Array, lengths: tuple[float, float], axis: int
+) -> tuple[Array, tuple[float, float]]:
+    """Return a map and its sides with the flow along the first axis."""
+    return (gap.T, (lengths[1], lengths[0])) if axis else (gap, lengths)

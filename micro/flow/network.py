@@ -1,0 +1,170 @@
+"""Networks of conductances between two terminals, and the widest path through them.
+
+A network has n nodes, the inlet and the outlet. Flow from a node to its neighbour is their
+conductance times the difference of their potentials, as with resistors.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from support.arrays import Array, Flags, Indices
+
+_WIDEST_STEP = 1e12
+"""Largest conductance that counts, over that of the widest path from there to a terminal. What lies
+beyond resists a factorisation in double precision. It resists flow by 1e-12 of what lies on its way
+out for every link that is narrowed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Network:
+    """Links between nodes 0 … n − 1, the inlet n and the outlet n + 1.
+
+    Args:
+        count: Number n of nodes without the terminals.
+        tail: Node where each of m links begins, shape (m,).
+        head: Node where it ends, shape (m,).
+        conductance: Conductance of each link, > 0, shape (m,).
+    """
+
+    count: int
+    tail: Indices
+    head: Indices
+    conductance: Array
+
+    @property
+    def inlet(self) -> int:
+        """Number of the inlet."""
+        return self.count
+
+    @property
+    def outlet(self) -> int:
+        """Number of the outlet."""
+        return self.count + 1
+
+    def divergence(self, flow: Array) -> Array:
+        """Return what flows out of every node, the terminals included, shape (n + 2,).
+
+        Args:
+            flow: Flow through every link from tail to head, shape (m,).
+        """
+        size = self.count + 2
+        out, into = (np.bincount(ends, flow, minlength=size) for ends in (self.tail, self.head))
+        return np.subtract(out, into, dtype=float)
+
+    def flow(self, potential: Array) -> Array:
+        """Return the flow through every link under potentials of all nodes, shape (m,).
+
+        Args:
+            potential: Shape (n + 2,).
+        """
+        return self.conductance * (potential[self.tail] - potential[self.head])
+
+    @cached_property
+    def joined(self) -> NDArray[np.integer]:
+        """A number for each node that those share which links join, shape (n + 2,)."""
+        links = self._matrix(np.ones(len(self.tail)))
+        joined: NDArray[np.integer] = csgraph.connected_components(links, directed=False)[1]
+        return joined
+
+    @property
+    def percolates(self) -> bool:
+        """Whether a path of links leads from the inlet to the outlet."""
+        return bool(self.joined[self.inlet] == self.joined[self.outlet])
+
+    def between_terminals(self) -> Network:
+        """Return the network without the links that no path from a terminal reaches."""
+        return self.only(self.joined[self.tail] == self.joined[self.inlet])
+
+    def only(self, links: Flags) -> Network:
+        """Return the network of some links.
+
+        Args:
+            links: Which, shape (m,).
+        """
+        return replace(
+            self,
+            tail=self.tail[links],
+            head=self.head[links],
+            conductance=self.conductance[links],
+        )
+
+    @cached_property
+    def widest_path(self) -> Indices:
+        """Numbers of the links on the widest path from the inlet to the outlet, in their order.
+
+        Its smallest conductance is the largest of all paths. It lies in the maximum spanning tree.
+        """
+        before = self._tree[1]
+        nodes = [self.outlet]
+        while nodes[-1] != self.inlet:
+            nodes.append(int(before[nodes[-1]]))
+        nodes.reverse()
+        return self._numbers(np.array(nodes[:-1]), np.array(nodes[1:]))
+
+    @property
+    def narrowest(self) -> int:
+        """Number of the link with the smallest conductance on the widest path."""
+        path = self.widest_path
+        return int(path[np.argmin(self.conductance[path])])
+
+    def within_reach(self) -> Network:
+        """Return the network with conductances that double precision resolves side by side.
+
+        Those beyond `_WIDEST_STEP` times what the widest path to a terminal lets through are
+        lowered to that.
+        """
+        widest = _WIDEST_STEP * self._widest_ways_out
+        limit = np.minimum(widest[self.tail], widest[self.head])
+        return replace(self, conductance=np.minimum(self.conductance, limit))
+
+    @cached_property
+    def _tree(self) -> tuple[sparse.csr_matrix, Indices]:
+        """The maximum spanning tree, and the node before each on the way from the inlet."""
+        # of the minimum spanning tree, whose weights must be positive
+        weight = np.log(self.conductance.max() / self.conductance) + 1.0
+        tree = csgraph.minimum_spanning_tree(self._matrix(weight))
+        return tree, csgraph.breadth_first_order(tree, self.inlet, directed=False)[1]
+
+    @property
+    def _widest_ways_out(self) -> Array:
+        """Smallest conductance on the widest path from each node to a terminal, shape (n + 2,)."""
+        size, tree = self.count + 2, self._tree[0].tocoo()
+        ends = {int(self.tail[self.narrowest]), int(self.head[self.narrowest])}
+        kept = ~(np.isin(tree.row, list(ends)) & np.isin(tree.col, list(ends)))
+        # the terminals are one node here
+        rows, columns = (
+            np.append(tree.row[kept], self.inlet),
+            np.append(tree.col[kept], self.outlet),
+        )
+        forest = sparse.coo_matrix((np.ones(len(rows)), (rows, columns)), (size, size)).tocsr()
+        before = csgraph.breadth_first_order(forest, self.inlet, directed=False)[1]
+        nodes = np.flatnonzero(before >= 0)
+        nodes = nodes[nodes != self.outlet]
+        width = np.full(self.count + 2, np.inf)
+        width[nodes] = self.conductance[self._numbers(before[nodes], nodes)]
+        before = np.where(before < 0, np.arange(self.count + 2), before)
+        while (before != before[before]).any():  # each pass doubles the way looked along
+            width, before = np.minimum(width, width[before]), before[before]
+        return width
+
+    def _numbers(self, first: Indices, second: Indices) -> Indices:
+        """Return the numbers of the links between pairs of nodes."""
+        size = self.count + 2
+        ends = np.minimum(self.tail, self.head) * size + np.maximum(self.tail, self.head)
+        order = np.argsort(ends)
+        wanted = np.minimum(first, second) * size + np.maximum(first, second)
+        return np.asarray(order[np.searchsorted(ends, wanted, sorter=order)])
+
+    def _matrix(self, values: Array) -> sparse.csr_matrix:
+        """Return values of links as a sparse matrix, each with an entry from tail to head."""
+        size = self.count + 2
+        return sparse.coo_matrix((values, (self.tail, self.head)), (size, size)).tocsr()

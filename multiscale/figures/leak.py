@@ -1,0 +1,155 @@
+"""The leak through the gaps: fluid pressure and flow lines at a load step, and leak over load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+
+from micro.flow.gap_flow import GapFlow
+from multiscale.figures.maps import coarsened, colour_bar, map_axes
+from multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    INK,
+    ONE_COLUMN,
+    ORANGE,
+    VERMILLION,
+    panels,
+    show_unit,
+    styled,
+)
+from multiscale.gap_flows import solved_gap_flow
+from multiscale.readable import percent, usual_unit
+
+_CONTACT = "0.5"
+"""Grey of what is in contact."""
+_FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="fluid")
+"""Colours of fluid pressures, on which flow lines are seen."""
+_COLOURS = {"x_": BLUE, "y_": ORANGE, "": BLUE}
+"""Colours of curves by what stands for the way of the flow in names of columns."""
+
+
+@styled()
+def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figure:
+    """Draw the flow at the last recorded load step, and the leak at all of them.
+
+    Args:
+        history: A `multiscale.results.history.History`.
+        record: A `multiscale.results.contact_record.ContactRecord` with gaps of cells; None draws
+            the curves alone.
+        section: A `multiscale.scene.leak.LeakSection`.
+        periodic: Whether the map continues over the sides along the flow.
+    """
+    ways = [""] if section.between_edges else [f"{one}_" for one in section.directions]
+    shown = section.directions if record is not None and any(ways) else ()
+    title = f"flow at load step {record.step}" if shown else ""
+    rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
+    columns, width = (2, FULL_WIDTH) if any(ways) else (1, ONE_COLUMN)
+    bars = range(len(shown))
+    figure, axes = panels(rows, columns, height, width=width, bars=bars, title=title)
+    for place, direction in zip(axes, shown, strict=False):
+        gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
+        flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
+        _draw_flow(place, flow, section)
+        place.set_title(f"along {direction}: {_channel_text(flow)}")
+    _draw_leak(axes[len(shown)], history, ways)
+    if len(axes) > len(shown) + 1:
+        _draw_factors(axes[-1], history, ways)
+    return figure
+
+
+def _channel_text(flow: GapFlow) -> str:
+    if flow.constriction is None:
+        return "closed"
+    return f"{percent(flow.constriction.share)} through the ring"
+
+
+def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
+    """Draw fluid pressure in blue, contact in grey, flow lines, and a ring about a constriction."""
+    scale = map_axes(axes, flow.lengths)
+    first, second = section.pressures
+    pressure = second + flow.pressure * (first - second)
+    name, unit = usual_unit([first, second], "MPa")
+    fluid = np.ma.masked_invalid(coarsened(pressure, largest=False) / unit)
+    contact = np.ma.masked_greater(coarsened(flow.gap, largest=False), 0.0)
+    extent = (0.0, scale * flow.lengths[0], 0.0, scale * flow.lengths[1])
+    look: dict[str, Any] = {"origin": "lower", "extent": extent}
+    axes.imshow(0.0 * contact.T, cmap=ListedColormap([_CONTACT]), **look)
+    norm = Normalize(min(first, second) / unit, max(first, second) / unit)
+    image = axes.imshow(fluid.T, cmap=_FLUID, norm=norm, **look)
+    colour_bar(image, axes, f"fluid pressure [{name}]")
+    if flow.constriction is None:
+        return
+    _draw_lines(axes, flow, scale, 1.0 if first > second else -1.0)
+    x, y = (scale * one for one in flow.constriction.place)
+    axes.plot(x, y, "o", ms=9.0, mfc="none", mec=VERMILLION, mew=1.6, clip_on=False, zorder=5)
+
+
+def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
+    """Draw flow lines, the thicker the more flows."""
+    steps = [-(-count // 100) for count in flow.gap.shape]
+    along, across = (sign * _means(part, steps) for part in flow.flux)
+    x, y = (
+        scale * (np.arange(count) + 0.5) * step * length / whole
+        for count, step, length, whole in zip(
+            along.shape, steps, flow.lengths, flow.gap.shape, strict=True
+        )
+    )
+    speed = np.hypot(along, across)
+    if not speed.max() > 0.0:
+        return
+    width = 0.25 + 1.2 * np.sqrt(speed / np.quantile(speed, 0.99))
+    axes.streamplot(
+        x, y, along.T, across.T, color=INK, linewidth=np.minimum(width, 1.6).T, density=1.1,
+        arrowsize=0.5,
+    )  # fmt: skip
+    map_axes(axes, flow.lengths)
+
+
+def _means(field: Any, steps: list[int]) -> Any:
+    """Return the means of blocks of cells; what is left over at the ends is left out."""
+    nx, ny = (count // step for count, step in zip(field.shape, steps, strict=True))
+    part = field[: nx * steps[0], : ny * steps[1]]
+    return part.reshape(nx, steps[0], ny, steps[1]).mean(axis=(1, 3))
+
+
+def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
+    """Draw the leak over the mean pressure, with error bars; closed load steps at the bottom."""
+    pressure = history.mean_pressure_MPa
+    for way in ways:
+        rate = np.abs(getattr(history, f"leak_{way}mm3_per_s"))
+        error = np.nan_to_num(getattr(history, f"leak_error_{way}mm3_per_s"))
+        leaks = rate > 0.0
+        look: dict[str, Any] = {"color": _COLOURS[way]}
+        low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
+        axes.errorbar(
+            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt="o-", ms=3.0, lw=1.2,
+            elinewidth=0.8, label=f"along {way[:1]}", **look,
+        )  # fmt: skip
+        closed = ~leaks & ~np.isnan(rate)
+        axes.plot(
+            pressure[closed], np.full(closed.sum(), 0.03), "v", ms=4.0, mfc="white", clip_on=False,
+            transform=axes.get_xaxis_transform(), **look,
+        )  # fmt: skip
+    axes.set(yscale="log", ylabel="leak [mm³/s]", title="leak; triangles: closed")
+    axes.set_xlim(0.0, None)
+    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+    if len(ways) > 1:
+        axes.legend()
+
+
+def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
+    """Draw the flow factors over the mean pressure."""
+    pressure = history.mean_pressure_MPa
+    for way in ways:
+        factor = getattr(history, f"flow_factor_{way[0]}")
+        leaks = factor > 0.0
+        axes.plot(pressure[leaks], factor[leaks], "o-", ms=3.0, color=_COLOURS[way])
+    axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
+    axes.set_xlim(0.0, None)
+    show_unit(axes.xaxis, "mean pressure", "MPa", pressure)

@@ -1,0 +1,129 @@
+"""Flow through maps of gaps: plates, grooves, symmetries, channels, and maps that are refused."""
+
+import numpy as np
+import pytest
+
+from micro.flow.gap_flow import gap_flow
+from support.errors import InputError
+
+LENGTHS = (1.3, 0.7)
+
+
+def rough(seed=3, shape=(24, 18), closed=0.3):
+    """Return gaps that differ by powers of ten from cell to cell, some of them closed."""
+    rng = np.random.default_rng(seed)
+    return 10.0 ** (-3.0 * rng.random(shape)) * (rng.random(shape) > closed)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_parallel_plates(axis):
+    """Q = W g³ ΔP/(12 η L)."""
+    flow = gap_flow(np.full((5, 7), 2e-3), LENGTHS, axis=axis)
+    along, across = LENGTHS[axis], LENGTHS[1 - axis]
+    expected = across * 2e-3**3 * 0.1 / (12.0 * 1e-9 * along)
+    assert flow.rate(0.1, 1e-9) == pytest.approx(expected, rel=1e-12)
+    assert flow.rate(-0.1, 1e-9) == pytest.approx(-expected, rel=1e-12)
+    assert flow.hydraulic_gap == pytest.approx(2e-3, rel=1e-12)
+    assert flow.flow_factor == pytest.approx(1.0, rel=1e-12)
+    assert flow.constriction.share == pytest.approx(1.0, rel=1e-12)
+    pressure = flow.pressure if axis == 0 else flow.pressure.T
+    x = (np.arange(len(pressure)) + 0.5) / len(pressure)
+    np.testing.assert_allclose(pressure, np.broadcast_to(1.0 - x[:, None], pressure.shape))
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_grooves_along_and_across_are_exact(axis):
+    """Side by side the mean of g³, one behind the other its harmonic mean."""
+    groove = 1e-3 * (1.2 + np.sin(np.arange(16.0)))
+    along = np.repeat(groove[None], 9, axis=0)  # grooves lie along x
+    gap = along if axis == 0 else along.T
+    assert gap_flow(gap, LENGTHS, axis=axis).transmissivity == pytest.approx(
+        np.mean(groove**3), rel=1e-12
+    )
+    assert gap_flow(gap, LENGTHS, axis=1 - axis).transmissivity == pytest.approx(
+        1.0 / np.mean(groove**-3.0), rel=1e-12
+    )
+
+
+@pytest.mark.parametrize("periodic", [False, True])
+def test_both_directions_are_the_same_problem_turned(periodic):
+    gap = rough()
+    one = gap_flow(gap, LENGTHS, axis=1, periodic=periodic)
+    other = gap_flow(gap.T, LENGTHS[::-1], axis=0, periodic=periodic)
+    assert one.transmissivity == other.transmissivity > 0.0
+    np.testing.assert_array_equal(one.pressure, other.pressure.T)
+    for first, second in zip(one.flux, other.flux[::-1], strict=True):
+        np.testing.assert_array_equal(first, second.T)
+    assert one.constriction.place == other.constriction.place[::-1]
+    assert one.constriction.share == other.constriction.share
+
+
+def test_a_periodic_map_may_be_moved_across_the_flow():
+    gap = rough()
+    first, moved = (gap_flow(np.roll(gap, by, 1), LENGTHS, periodic=True) for by in (0, 5))
+    assert moved.transmissivity == pytest.approx(first.transmissivity, rel=1e-12)
+    walled = gap_flow(gap, LENGTHS, periodic=False)
+    assert walled.transmissivity < first.transmissivity
+    np.testing.assert_allclose(moved.constriction.place[0], first.constriction.place[0], rtol=1e-12)
+    assert moved.constriction.share == pytest.approx(first.constriction.share, rel=1e-9)
+
+
+def test_transmissivity_lies_between_series_and_parallel():
+    """Bounds of Wiener: layers across, and layers along."""
+    gap = rough(closed=0.0)
+    found = gap_flow(gap, LENGTHS).transmissivity
+    assert 1.0 / np.mean(gap**-3.0) < found < np.mean(gap**3)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_mean_flux_is_the_flow(axis):
+    """Whatever the paths, the mean flow per width along is Q/W, and none passes the walls."""
+    flow = gap_flow(rough(), LENGTHS, axis=axis)
+    assert np.mean(flow.flux[axis]) == pytest.approx(flow.flow_factor, rel=1e-10)
+    assert flow.flow_factor == pytest.approx(flow.transmissivity / rough().mean() ** 3, rel=1e-12)
+
+
+def test_a_closed_line_lets_nothing_through():
+    gap = np.full((9, 6), 1e-3)
+    gap[4] = 0.0
+    flow = gap_flow(gap, LENGTHS)
+    assert not flow.percolates
+    assert (
+        flow.transmissivity == flow.hydraulic_gap == flow.flow_factor == flow.rate(1.0, 1e-9) == 0
+    )
+    assert flow.constriction is None
+    np.testing.assert_array_equal(flow.pressure[:4], 1.0)
+    np.testing.assert_array_equal(flow.pressure[5:], 0.0)
+    assert np.isnan(flow.pressure[4]).all()
+    gap[4, 2] = 1e-8  # a millionth of the others, whose flow no solution of a contact tells
+    gap[4, 3] = 1e-11
+    assert gap_flow(gap, LENGTHS).percolates
+    gap[4, 2] = 0.0
+    assert not gap_flow(gap, LENGTHS).percolates
+    assert not gap_flow(np.zeros((4, 4)), LENGTHS).percolates
+
+
+def test_flow_through_two_channels_is_shared_as_their_widths_cubed():
+    gap = np.zeros((20, 11))
+    gap[:, 2], gap[:, 7] = 1e-3, 0.5e-3
+    gap[12, 2] = 0.9e-3  # the narrowest place on the wider one
+    flow = gap_flow(gap, (2.0, 1.1))
+    found = flow.constriction
+    resistance = (19.0 / 1.0 + 1.0 / 0.9**3, 20.0 / 0.5**3)
+    assert found.share == pytest.approx(resistance[1] / sum(resistance), rel=1e-10)
+    assert found.gap == 0.9e-3
+    assert found.place == pytest.approx((1.25, 0.25), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("gap", "text"),
+    [
+        (np.zeros(5), "is no map of gaps"),
+        (np.zeros((1, 5)), "is no map of gaps"),
+        (np.full((4, 4), np.nan), "finite numbers ≥ 0"),
+        (np.full((4, 4), -1e-3), "finite numbers ≥ 0"),
+    ],
+)
+def test_bad_maps(gap, text):
+    with pytest.raises(InputError, match=text):
+        gap_flow(gap, LENGTHS)

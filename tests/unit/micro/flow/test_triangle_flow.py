@@ -1,0 +1,132 @@
+"""Flow over triangles of a face: closed forms of rings and strips, and finite elements."""
+
+import numpy as np
+import pytest
+
+from micro.flow.triangle_flow import MOST_IMBALANCE, TriangleFace
+from support.errors import InputError
+
+INNER, OUTER = 22.0, 24.5
+
+
+def triangles(x, y):
+    """Return a lattice of points, shape (m, n) each, as triangles."""
+    points = np.stack([x, y], axis=-1)
+    a, b, c, d = points[:-1, :-1], points[1:, :-1], points[:-1, 1:], points[1:, 1:]
+    both = [np.stack([a, b, d], axis=2), np.stack([a, d, c], axis=2)]
+    return np.concatenate([one.reshape(-1, 3, 2) for one in both])
+
+
+def quarter_ring(across, around):
+    """Return triangles of a quarter of a ring, and the nodes on its bore and its rim."""
+    radius = np.linspace(INNER, OUTER, across + 1)[:, None]
+    angle = np.linspace(0.0, 0.5 * np.pi, around + 1)
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    edges = (np.column_stack([x[k], y[k]]) for k in (0, -1))
+    return triangles(x, y), *edges
+
+
+def strip(nx=8, ny=5, length=2.0, width=0.6):
+    x, y = np.meshgrid(np.linspace(0, length, nx + 1), np.linspace(0, width, ny + 1), indexing="ij")
+    corners = triangles(x, y)
+    return corners, TriangleFace(
+        corners, np.column_stack([x[0], y[0]]), np.column_stack([x[-1], y[-1]])
+    )
+
+
+def test_ring_of_one_transmissivity():
+    """A quarter of 2π T/ln(ro/ri), with the square of the size."""
+    exact = 0.5 * np.pi * 3e-9 / np.log(OUTER / INNER)
+    errors = []
+    for across in (4, 8, 16):
+        corners, bore, rim = quarter_ring(across, 12 * across)
+        found = TriangleFace(corners, bore, rim).flow(np.full((len(corners), 2), 3e-9))
+        errors.append(abs(found.total / exact - 1.0))
+        assert found.imbalance < MOST_IMBALANCE
+    assert errors[-1] < 1e-5
+    assert np.log2(errors[0] / errors[1]) > 1.9
+
+
+def test_ring_whose_transmissivity_falls_outwards():
+    """T = T₀ (r₀/r)³ along all directions: ∫ dr/(r T) across the ring."""
+    corners, bore, rim = quarter_ring(24, 100)
+    radius = np.linalg.norm(corners.mean(axis=1), axis=1)
+    transmissivity = np.repeat(3e-9 * (INNER / radius[:, None]) ** 3, 2, axis=1)
+    found = TriangleFace(corners, bore, rim).flow(transmissivity)
+    exact = 0.5 * np.pi * 3e-9 * 3.0 / ((OUTER / INNER) ** 3 - 1.0)
+    assert found.total == pytest.approx(exact, rel=2e-4)
+    assert 0.0 < found.pressure.min() < found.pressure.max() < 1.0
+
+
+@pytest.mark.parametrize("along", [True, False])
+def test_strips_of_two_directions_and_of_layers(along):
+    corners, face = strip()
+    each = np.tile([4e-9, 1e-15], (len(corners), 1))
+    assert face.flow(each).total == pytest.approx(4e-9 * 0.6 / 2.0, rel=1e-9)
+    middle = corners.mean(axis=1)
+    part = middle[:, 1] < 0.24 if along else middle[:, 0] < 0.5
+    layered = np.where(part, 1e-9, 1e-14)[:, None] * [1.0, 1.0]
+    one, other = 1e-9 / 1e-14 * 0.4, 0.6  # shares of the width
+    expected = (one + other) * 1e-14 * 0.6 / 2.0
+    if not along:
+        expected = 0.6 / (0.5 / 1e-9 + 1.5 / 1e-14)
+    assert face.flow(layered).total == pytest.approx(expected, rel=1e-7)
+
+
+def test_a_closed_ring_lets_nothing_through():
+    corners, bore, rim = quarter_ring(6, 40)
+    face = TriangleFace(corners, bore, rim)
+    radius = np.linalg.norm(corners.mean(axis=1), axis=1)
+    closed = (radius > 23.0) & (radius < 23.7)
+    transmissivity = np.where(closed, 0.0, 1e-9)[:, None] * [1.0, 1.0]
+    found = face.flow(transmissivity)
+    assert found.total == 0.0
+    assert np.nanmin(found.pressure[radius < 22.5]) == 1.0
+    assert np.nanmax(found.pressure[radius > 24.2]) == 0.0
+    angle = np.arctan2(*corners.mean(axis=1).T)
+    transmissivity[closed & (np.abs(angle - 0.7) < 0.05)] = 1e-12  # a path through it
+    through = face.flow(transmissivity)
+    assert 0.0 < through.total < 1e-10
+    assert np.isnan(through.pressure).any()
+    assert face.flow(np.zeros_like(transmissivity)).total == 0.0
+
+
+def test_elements_of_dolfinx_on_the_same_triangles():
+    """The same discretisation: equal but for rounding."""
+    ufl = pytest.importorskip("ufl")
+    from dolfinx import fem
+    from dolfinx import mesh as dmesh
+    from mpi4py import MPI
+
+    from macro.compat import assemble_matrix, compile_form, scalar_space
+
+    mesh = dmesh.create_rectangle(MPI.COMM_SELF, [[0.0, 0.0], [2.0, 0.6]], [7, 6])
+    space, constant = scalar_space(mesh, 1), fem.VectorFunctionSpace(mesh, ("DG", 0))
+    count = mesh.topology.index_map(2).size_local
+    corners = mesh.geometry.x[mesh.geometry.dofmap.array.reshape(count, 3), :2]
+    values = 10.0 ** np.random.default_rng(2).uniform(-3.0, 0.0, (count, 2))
+    cube = fem.Function(constant)
+    cube.x.array[:] = values.ravel()
+    trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+    flow = ufl.as_vector([cube[k] * ufl.grad(trial)[k] for k in (0, 1)])
+    matrix = assemble_matrix(compile_form(ufl.inner(flow, ufl.grad(test)) * ufl.dx), [])
+    dense = matrix.getValues(range(matrix.size[0]), range(matrix.size[1]))
+    x = space.tabulate_dof_coordinates()[:, 0]
+    high, low = np.isclose(x, 0.0), np.isclose(x, 2.0)
+    free = ~(high | low)
+    pressure = high.astype(float)
+    pressure[free] = np.linalg.solve(dense[np.ix_(free, free)], -dense[free] @ pressure)
+    nodes = mesh.geometry.x[:, :2]
+    ends = (nodes[np.isclose(nodes[:, 0], at)] for at in (0.0, 2.0))
+    found = TriangleFace(corners, *ends).flow(values)
+    assert found.total == pytest.approx(float(pressure @ dense @ pressure), rel=1e-10)
+
+
+def test_edges_that_the_face_does_not_have():
+    corners, bore, rim = quarter_ring(2, 8)
+    with pytest.raises(InputError, match="the outlet has no edge in common with the contact face"):
+        TriangleFace(corners, bore, 2.0 * rim)
+    with pytest.raises(InputError, match="the inlet has no edge"):
+        TriangleFace(corners, np.zeros((0, 2)), rim)
+    with pytest.raises(InputError, match="inlet and outlet touch each other"):
+        TriangleFace(corners, bore, np.concatenate([rim, bore[:1]]))

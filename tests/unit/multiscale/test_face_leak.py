@@ -1,0 +1,139 @@
+"""The leak over a contact face between two edges, under laws of samples; and its refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.box_msh import write_box
+
+from geometry import Control
+from micro.flow.gap_flow import gap_flow
+from multiscale import Run, Scene
+from multiscale.laws.transmissivity import transmissivities
+from multiscale.output.results import write_results
+from multiscale.results.reading import read_history
+from support.errors import InputError
+
+OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}
+SUPPORTS = [
+    {"surface": "bottom", "displacement": ["free", "free", "0"]},
+    {"surface": "left", "displacement": ["0", "free", "free"]},
+    {"surface": "front", "displacement": ["free", "0", "free"]},
+]
+"""Rollers on three sides, on which a level plane presses a box evenly."""
+
+
+@pytest.fixture(scope="module")
+def box(tmp_path_factory):
+    path = tmp_path_factory.mktemp("box") / "box.msh"
+    write_box(path, [np.linspace(0, 6, 7), np.linspace(0, 4, 5), np.linspace(0, 2, 3)])
+    return path
+
+
+def scene(box, leak=OIL, **changes):
+    spectrum = {"hurst": 0.8, "waves": [2, 8], "rms_height": "1 um", "seed": 2}
+    body = {"mesh": str(box), "contact": "top", "supports": SUPPORTS}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [48, 48], "lengths": ["0.5 mm", "0.5 mm"]},
+        "body": body | {"young_modulus": "4 GPa", "poisson_ratio": 0.3},
+        "law": {"kind": "representative"},
+        "load": {"force": "600 N", "steps": 2},
+        "leak": leak,
+        "output": {"figures": True, "report": True},
+    }
+    return Scene.from_dict({**data, **changes})
+
+
+def gaps(model, separation):
+    """Return the gaps of a periodic sample at a mean separation."""
+    reference = model.reference_height - model.surface.mean_height
+    return model.press(Control(approach=reference - separation)).open_gap
+
+
+@pytest.mark.parametrize(("edges", "axis"), [(("left", "right"), 0), (("back", "front"), 1)])
+def test_an_evenly_pressed_box_leaks_as_its_sample(box, edges, axis, tmp_path):
+    leak = OIL | {"inlet": edges[0], "outlet": edges[1]}
+    done = Run(scene(box, leak))
+    steps = list(done.load_steps())
+    ((model,),) = done.coupling.periodic_models
+    along, across = ((6.0, 4.0), (4.0, 6.0))[axis]
+    for step in steps:
+        gap = gaps(model, step.mean_separation_mm)
+        flow = gap_flow(gap, (0.5, 0.5), axis=axis, periodic=True)
+        expected = flow.transmissivity * across / along * 0.4 / (12.0 * 1e-8)
+        # monotone interpolation between some twenty rows
+        assert step.leak_mm3_per_s == pytest.approx(expected, rel=0.03)
+        half = gaps(model.resampled((24, 24)), step.mean_separation_mm)
+        coarse = gap_flow(half, (0.5, 0.5), axis=axis, periodic=True).transmissivity
+        error = expected * abs(coarse / flow.transmissivity - 1.0)
+        assert step.leak_error_mm3_per_s == pytest.approx(error, abs=0.04 * expected)
+        assert step.leak_x_mm3_per_s is None
+    assert steps[0].leak_mm3_per_s > steps[1].leak_mm3_per_s > 0.0
+    write_results(tmp_path, done, options=[])
+    assert (tmp_path / "leak.png").stat().st_size > 5_000
+    assert "leak over the contact face" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    again = read_history(tmp_path)
+    for name in ("leak_mm3_per_s", "leak_error_mm3_per_s"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(done.history(), name))
+    assert any("leak over the contact face at load step 2" in note for note in done.history().notes)
+    done.close()
+
+
+def test_transmissivity_grows_as_the_separation_where_nothing_touches(box):
+    done = Run(scene(box))
+    ((model,),) = done.coupling.periodic_models
+    fine, coarse = transmissivities([model])
+    touch = fine.separation[-1]
+    np.testing.assert_allclose(
+        np.cbrt(fine.at(np.array([touch + 1.0]))) - 1.0, fine.hydraulic_gap[-1:]
+    )
+    assert (fine.at(np.array([0.0])) == 0.0).all()
+    assert (np.diff(fine.hydraulic_gap, axis=0) >= 0.0).all()
+    for table, one in ((fine, model), (coarse, model.resampled((24, 24)))):
+        # in contact, between two rows
+        separation = float(np.mean(table.separation[-8:-6]))
+        gap = gaps(one, separation)
+        expected = [
+            gap_flow(gap, (0.5, 0.5), axis=axis, periodic=True).transmissivity for axis in (0, 1)
+        ]
+        np.testing.assert_allclose(table.at(np.array([separation]))[0], expected, rtol=0.02)
+    # twice the same sample is one
+    np.testing.assert_allclose(
+        transmissivities([model, replace(model)])[0].hydraulic_gap, fine.hydraulic_gap, rtol=1e-12
+    )
+    done.close()
+
+
+@pytest.mark.parametrize(
+    ("leak", "text"),
+    [
+        (OIL | {"inlet": "lefd"}, r"leak\.inlet = 'lefd'.*did you mean 'left'"),
+        (OIL | {"outlet": "bottom"}, "leak: the outlet has no edge in common with the contact"),
+        (OIL | {"outlet": "front"}, "leak: inlet and outlet touch each other"),
+        (OIL | {"outlet": "left"}, r"leak\.outlet = 'left': is the inlet"),
+        (OIL | {"direction": "x"}, "leak: 'direction' does not go with edges"),
+        (
+            {key: OIL[key] for key in ("viscosity", "pressures", "inlet")},
+            r"leak\.outlet: is missing",
+        ),
+        (
+            {key: OIL[key] for key in ("viscosity", "pressures")},
+            r"leak\.inlet: is required with law",
+        ),
+    ],
+)
+def test_bad_edges(box, leak, text):
+    with pytest.raises(InputError, match=text):
+        Run(scene(box, leak))
+
+
+def test_edges_need_a_body_and_a_sample(box):
+    block = {"young_modulus": "4 GPa", "poisson_ratio": 0.3}
+    surface = {"spectrum": {"hurst": 0.8, "waves": [2, 8], "rms_slope": 0.1}, "grid": [48, 48]}
+    data = {"surface": surface | {"lengths": [1.0, 1.0]}, "block": block, "leak": OIL}
+    data |= {"coupling": {"kind": "concurrent"}, "load": {"force": 1.0}}
+    with pytest.raises(InputError, match=r"leak\.inlet: needs law\.kind = 'representative' on a"):
+        Scene.from_dict(data)
+    counter = {"mesh": str(box), "contact": "bottom", "supports": [{"surface": "top"}], **block}
+    with pytest.raises(InputError, match="leak: does not go with a counter-body on a mesh"):
+        scene(box, counter_body=counter)

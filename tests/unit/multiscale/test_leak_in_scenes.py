@@ -1,0 +1,208 @@
+"""Scenes that ask what leaks through their gaps: columns, errors, notes, files, refusals."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from micro.flow.gap_flow import gap_flow
+from multiscale import Run, Scene, gap_flows, make_setup, run
+from multiscale.observers import leak as observer
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.results.leak_notes import leak_text
+from multiscale.results.reading import read_history
+from support.errors import InputError
+
+WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
+NAMES = [
+    f"{name}_{direction}{unit}"
+    for direction in "xy"
+    for name, unit in [
+        ("leak", "_mm3_per_s"), ("leak_error", "_mm3_per_s"), ("transmissivity", "_mm3"),
+        ("hydraulic_gap", "_mm"), ("flow_factor", ""), ("constriction", "_fraction"),
+        ("percolates", ""),
+    ]
+]  # fmt: skip
+
+
+def scene(leak=WATER, kind="analytic", **sections):
+    spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_slope": 0.1, "seed": 1}
+    surface = {"spectrum": spectrum, "grid": [32, 48], "lengths": [1.0, 1.5]}
+    data = {
+        "surface": surface | {"periodic": kind == "analytic"},
+        "block": {"young_modulus": 1000.0, "poisson_ratio": 0.3},
+        "patches": {"grid": [2, 2]},
+        "coupling": {"kind": kind},
+        "load": {"force": 36.0, "steps": 4},
+        "output": {"check": "last", "figures": False, "report": False, "contact": "all"},
+    }
+    merged = {name: data.get(name, {}) | section for name, section in sections.items()}
+    return Scene.from_dict(data | ({} if leak is None else {"leak": leak}) | merged)
+
+
+@cache
+def ran():
+    return run(scene())
+
+
+def test_every_load_step_has_the_flow_through_its_gaps():
+    history = ran()
+    for step, record in zip(history, history.contact_records, strict=True):
+        gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
+        for axis, direction in enumerate("xy"):
+            flow = gap_flow(gap, (1.0, 1.5), axis=axis, periodic=True)
+            along, across = (1.0, 1.5) if axis == 0 else (1.5, 1.0)
+            cubed = getattr(step, f"transmissivity_{direction}_mm3")
+            assert cubed == pytest.approx(flow.transmissivity, rel=1e-9)
+            # 1 bar is 0.1 MPa, 1 mPa s is 1e-9 MPa s
+            rate = getattr(step, f"leak_{direction}_mm3_per_s")
+            assert rate == pytest.approx(cubed * across / along * 0.1 / 12e-9, rel=1e-12)
+            gap_there = getattr(step, f"hydraulic_gap_{direction}_mm")
+            assert gap_there**3 == pytest.approx(cubed, rel=1e-12)
+            factor = getattr(step, f"flow_factor_{direction}")
+            assert factor == pytest.approx(flow.flow_factor, rel=1e-6)
+            assert getattr(step, f"percolates_{direction}") == flow.percolates == (rate > 0.0)
+            share = getattr(step, f"constriction_{direction}_fraction")
+            if flow.percolates:
+                assert share == pytest.approx(flow.constriction.share, rel=1e-6)
+            else:
+                assert share is None
+    assert (np.diff(history.leak_x_mm3_per_s) <= 0.0).all()
+
+
+def test_the_error_is_that_of_half_the_cells_under_the_same_force():
+    """A scene of the surface on half the cells finds its own contact, under the same forces."""
+    surface = make_setup(scene()).surface.on_grid((16, 24))
+    heights = {"heights": surface.heights, "lengths": [1.0, 1.5], "periodic": True}
+    asked = scene().written | {"surface": heights}
+    history, coarse = ran(), run(Scene.from_dict(asked))
+    for direction in "xy":
+        name = f"leak_{direction}_mm3_per_s"
+        apart = np.abs(getattr(history, name) - getattr(coarse, name))
+        error = getattr(history, name.replace("leak", "leak_error"))
+        np.testing.assert_allclose(error, apart, rtol=1e-4)
+        assert (error > 0.0).any()
+
+
+def test_closed_gaps_leak_nothing_and_are_called_closed():
+    history = run(scene(load={"force": 90.0, "steps": 6}))
+    assert history.percolates_x[0] == 1 and history.percolates_x[-1] == 0
+    assert history.leak_x_mm3_per_s[-1] == 0.0 == history.hydraulic_gap_x_mm[-1]
+    assert np.isnan(history.constriction_x_fraction[-1])
+    notes = " ".join(history.notes)
+    assert "leak along x at load step 6: closed, nothing leaks: the surfaces touch" in notes
+    assert "the gap is closed along x at" in notes
+    step = history.steps[0]
+    assert leak_text(replace(step, leak_error_x_mm3_per_s=None), "x_").endswith("mm³/s")
+    unsure = replace(step, leak_x_mm3_per_s=0.0, leak_error_x_mm3_per_s=2.0)
+    assert leak_text(unsure, "x_") == "closed, nothing leaks (or 2 mm³/s)"
+
+
+def test_coarse_grids_are_warned_of():
+    assert any("the leak along y depends on the grid" in note for note in ran().notes)
+
+
+def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
+    directions = []
+    solved = observer.solved_gap_flow
+
+    def counted(gap, lengths, direction, **options):
+        directions.append(direction)
+        return solved(gap, lengths, direction, **options)
+
+    monkeypatch.setattr(observer, "solved_gap_flow", counted)
+    history = run(scene(WATER | {"direction": "y"}, output={"check": "none"}))
+    assert directions == ["y"] * 4
+    assert (
+        np.isnan(history.leak_x_mm3_per_s).all() and np.isnan(history.leak_error_y_mm3_per_s).all()
+    )
+    np.testing.assert_array_equal(history.leak_y_mm3_per_s, ran().leak_y_mm3_per_s)
+
+
+def test_multigrid_solves_large_maps(monkeypatch):
+    monkeypatch.setattr(gap_flows, "MOST_FACTORISED", 100)
+    history = run(scene(output={"check": "none"}))
+    for name in ("leak_x_mm3_per_s", "leak_y_mm3_per_s", "constriction_x_fraction"):
+        np.testing.assert_allclose(getattr(history, name), getattr(ran(), name), rtol=1e-9)
+
+
+def test_flow_turns_with_the_pressures_and_is_slower_in_oil():
+    oil = {"viscosity": "0.1 Pa s", "pressures": ["0 bar", "4 bar"]}
+    history = run(scene(oil, output={"check": "none"}))
+    np.testing.assert_allclose(history.leak_x_mm3_per_s, -0.04 * ran().leak_x_mm3_per_s, rtol=1e-12)
+
+
+def test_a_block_has_walls_and_gaps_of_its_own():
+    """On its body the contact is another, and no flow passes the sides along it."""
+    done = Run(scene(kind="concurrent", micro={"finite_slopes": False}))
+    for step in done.load_steps():
+        gap = done.coupling.solver.gaps
+        flow = gap_flow(gap, (1.0, 1.5), periodic=False)
+        assert step.transmissivity_x_mm3 == pytest.approx(flow.transmissivity, rel=1e-12)
+        assert step.leak_error_x_mm3_per_s > 0.0
+    done.close()
+
+
+def test_after_unloading_cells_that_yielded_leak_more_and_have_no_error():
+    load = {"force": [36.0, 9.0], "steps": 2}
+    history = run(scene(micro={"hardness": 60.0}, load=load))
+    assert list(np.isnan(history.leak_error_x_mm3_per_s)) == [False, False, True, True]
+    assert any("error of the leak after unloading is not measured" in one for one in history.notes)
+
+
+def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
+    done = Run(scene(output={"figures": True, "report": True}))
+    for step in done.load_steps():
+        if step.step == 2:
+            write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(done, done.state()))
+    kept = read_checkpoint(tmp_path / "checkpoint.state")
+    resumed = Run(scene(output={"figures": True, "report": True}))
+    resumed.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    assert len(list(resumed.load_steps())) == 2
+    write_results(tmp_path, done, options=[])
+    assert (tmp_path / "leak.png").stat().st_size > 10_000
+    report = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "leak along x" in report and "a ring marks the narrowest place" in report
+    again, before = read_history(tmp_path), done.history()
+    for name in NAMES:
+        np.testing.assert_array_equal(getattr(again, name), getattr(before, name))
+        np.testing.assert_allclose(
+            getattr(resumed.history(), name), getattr(before, name), rtol=1e-6
+        )
+
+
+def test_scenes_that_do_not_ask_have_no_leak():
+    history = run(scene(None))
+    assert all(np.isnan(getattr(history, name)).all() for name in NAMES)
+    assert not any("leak" in note for note in history.notes)
+
+
+@pytest.mark.parametrize(
+    ("given", "text"),
+    [
+        ({"pressures": [1.0, 2.0]}, "leak.viscosity.* is required and missing"),
+        ({"viscosity": 1.0}, "leak.pressures.* is required and missing"),
+        (WATER | {"viscosity": "0 Pa s"}, "leak.viscosity.* must be greater than 0"),
+        (WATER | {"viscosity": "1 mm^2/s"}, r"leak.viscosity.*wrong unit.*in units of Pa\*s"),
+        (WATER | {"viscosity": "1 MPa s"}, "leak.viscosity.* did you mean '1 mPa s'"),
+        (WATER | {"pressures": ["1 bar"]}, "leak.pressures"),
+        (WATER | {"pressures": ["1 bar", "1 N"]}, "leak.pressures.1.* wrong unit"),
+        (WATER | {"pressures": ["1 bar", "0.1 MPa"]}, "leak.pressures.* drives no flow.* two diff"),
+        (WATER | {"direction": "z"}, "leak.direction.* must be 'x', 'y' or 'both'"),
+        (WATER | {"density": 1.0}, "unknown key.*allowed: viscosity, pressures, direction"),
+    ],
+)
+def test_bad_input(given, text):
+    with pytest.raises(InputError, match=text):
+        scene(given)
+
+
+@pytest.mark.parametrize("kind", ["isolated", "consistent", "reference"])
+def test_couplings_without_gaps_of_cells_are_refused(kind):
+    text = rf"^leak: does not go with coupling.kind = '{kind}', which knows no gaps of cells"
+    with pytest.raises(InputError, match=text):
+        scene(kind=kind)
+    with pytest.raises(InputError, match=r"leak: .*'elliptic', which knows no gaps beside summits"):
+        scene(kind="concurrent", micro={"model": "elliptic"})
