@@ -25,6 +25,8 @@ from geometry.preparation import Filter as Filter
 from geometry.preparation import Preparation as Preparation
 from geometry.rigid_plane import Control as Control
 from geometry.rigid_plane import RigidPlane as RigidPlane
+from geometry.shear_state import ShearControl as ShearControl
+from geometry.shear_state import ShearState as ShearState
 from geometry.spectrum import Spectrum as Spectrum
 from geometry.spectrum import synthesise as synthesise
 from geometry.statistics import PowerSpectrum as PowerSpectrum

@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
+from geometry.shear_state import ShearState
 from support.arrays import Array, Counts, Flags, Indices
 from support.errors import InputError
 
 _LARGE = (
-    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation by_slopes"
+    "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
+    "by_slopes shear"
 ).split()
 
 
@@ -145,6 +147,7 @@ class ContactState:
         elastic_energy: Energy ½ ∫ p u dA of the elastic deformation [N mm].
         plastic_work: Work of the hardness on the plastic depth of all loads so far [N mm].
         indentation: Indentations of the asperities, shape (n,) [mm].
+        shear: Tractions and slip along the surface; None without friction.
         by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None: nothing.
     """
 
@@ -179,6 +182,7 @@ class ContactState:
     elastic_energy: float = np.nan
     plastic_work: float = np.nan
     indentation: Array | None = None
+    shear: ShearState | None = None
     by_slopes: Array | None = None
 
     @property

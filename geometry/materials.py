@@ -83,6 +83,32 @@ class MaterialPair:
             compliance += self.second.surface_compliance
         return 1.0 / compliance
 
+    @property
+    def tangential_poisson_ratio(self) -> float:
+        """Poisson's ratio of one body whose tangential compliance is that of the pair.
+
+        Against a rigid plane this body has the contact modulus E* of the pair, too. It is the mean
+        of both ratios, weighted by the compliances 1/G.
+        """
+        bodies = [body for body in (self.first, self.second) if body is not None]
+        weights = [1.0 / body.shear_modulus for body in bodies]
+        return float(np.average([body.poisson_ratio for body in bodies], weights=weights))
+
+    @property
+    def dundurs_beta(self) -> float:
+        """Dundurs' β: pressures displace the two surfaces by different amounts along each other.
+
+        It is 0 for like bodies and (1 − 2ν)/(2 (1 − ν)) against a rigid plane.
+
+        Source:
+            Johnson, Contact Mechanics (1985), eq. 5.3.
+        """
+        own, other = self.first, self.second
+        along = (1.0 - 2.0 * own.poisson_ratio) / own.shear_modulus
+        if other is not None:
+            along -= (1.0 - 2.0 * other.poisson_ratio) / other.shear_modulus
+        return 0.25 * along * self.contact_modulus
+
 
 def von_mises(stress: Array) -> Array:
     """Return von Mises' equivalent of stresses, shape (..., 3, 3) [MPa]."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.patches import PatchGrid
+from geometry.shear_state import ShearControl
 from support.arrays import Array, Flags
 from support.errors import InputError, NotConverged
 
@@ -42,6 +43,7 @@ class Control:
             prescribe them [N mm]; laws on a mesh alone follow them.
         body_state: Position among the states of what else loads the bodies, which none of them
             changes by itself: 0.25 is a quarter of the way from the first state to the second.
+        shear: Shift of the plane along the surface, or shear force on it; None without friction.
 
     Raises:
         InputError: When not exactly one of approach and force is given, or a number is not finite
@@ -53,6 +55,7 @@ class Control:
     tilt: tuple[float, float] | None = (0.0, 0.0)
     moment: tuple[float, float] = (0.0, 0.0)
     body_state: float = 0.0
+    shear: ShearControl | None = None
 
     def __post_init__(self) -> None:
         if (self.approach is None) == (self.force is None):
@@ -70,9 +73,10 @@ class Control:
 
     def __str__(self) -> str:
         """Say what presses, as in "force 2 N"."""
+        along = "" if self.shear is None else f", {self.shear}"
         if self.force is not None:
-            return f"force {self.force:.6g} N"
-        return f"approach {self.approach:.6g} mm"
+            return f"force {self.force:.6g} N{along}"
+        return f"approach {self.approach:.6g} mm{along}"
 
     @property
     def loads(self) -> Array:

@@ -7,6 +7,7 @@ them by name.
 
     closed_forms                                      Hertz, Love
     compliance → contact → half_space                 the contact problem on cells
+    friction                                          tractions, stick and slip on the cells
     asperities                                        summits that interact pair by pair
 """
 

@@ -89,6 +89,10 @@ class Run:
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
         if self.scene.leak is not None:
             self._observers.append(self._leak_observer(self.scene.leak))
+        if self.scene.friction is not None:
+            from multiscale.observers.friction import FrictionObserver  # others do without
+
+            self._observers.append(FrictionObserver(self.coupling))
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def _leak_observer(self, section: LeakSection) -> StepObserver:

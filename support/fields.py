@@ -25,10 +25,12 @@ class Unit:
     Args:
         name: The unit in pint's notation; empty for a ratio.
         several: Whether the field holds a tuple, for which users may write one number or a list.
+        pairs: Whether it holds a tuple of pairs along x and y, for which users may write one pair.
     """
 
     name: str
     several: bool = False
+    pairs: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

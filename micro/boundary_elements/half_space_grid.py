@@ -226,7 +226,7 @@ class HalfSpaceGrid:
             spectrum = periodic_spectrum(grid, spacing)
             waves = spectrum
         else:
-            fast = _good(grid)
+            fast = fast_counts(grid)
             padded = 2 * fast[0], 2 * fast[1]
             spectrum = padded_spectrum(padded, spacing)
             period = _apart(grid) if many(grid) else fast
@@ -267,7 +267,7 @@ def _apart(grid: tuple[int, int]) -> tuple[int, int]:
     return x, y
 
 
-def _good(counts: Iterable[int]) -> tuple[int, int]:
+def fast_counts(counts: Iterable[int]) -> tuple[int, int]:
     """Return the next numbers of cells with a fast transform."""
     x, y = (int(fft.next_fast_len(count, real=True)) for count in counts)
     return x, y

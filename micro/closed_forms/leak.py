@@ -1,6 +1,6 @@
 """Closed forms of the flow through thin gaps.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

@@ -122,8 +122,19 @@ def corner_integral(u: ArrayLike, v: ArrayLike) -> Array:
         u: Distance along x from the point to the corner [mm].
         v: Distance along y [mm].
     """
+    along_x, along_y = corner_parts(u, v)
+    return along_y + along_x
+
+
+def corner_parts(u: ArrayLike, v: ArrayLike) -> tuple[Array, Array]:
+    """Return v asinh(u/|v|) and u asinh(v/|u|), with mixed derivatives u²/ρ³ and v²/ρ³.
+
+    Args:
+        u: Distance along x from the point to the corner [mm].
+        v: Distance along y [mm].
+    """
     u, v = np.asarray(u, float), np.asarray(v, float)
-    return u * _asinh_ratio(v, u) + v * _asinh_ratio(u, v)
+    return v * _asinh_ratio(u, v), u * _asinh_ratio(v, u)
 
 
 def fourfold_integral(u: Array, v: Array) -> Array:

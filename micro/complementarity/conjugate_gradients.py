@@ -9,26 +9,37 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from micro.boundary_elements.grid_compliance import GridCompliance
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.inverse import ContactInverse
 from support.arrays import Array
+
+
+class LinearCompliance(Protocol):
+    """A symmetric compliance of n unknowns on some cells, and its approximate inverse."""
+
+    def apply_compliance(self, cells: Cells, pressure: Array, /) -> Array:
+        """Return the displacements by loads on the cells, shape (n,) [mm]."""
+        ...
+
+    def inverse_on(self, cells: Cells, /) -> ContactInverse:
+        """Return an approximate inverse of the compliance of the cells."""
+        ...
 
 
 class ContactCells:
     """Cells in contact, loaded by a rigid body of which k motions are free.
 
     Args:
-        compliance: The elastic body.
+        compliance: The elastic body; pressures on the cells, or tractions (`micro.friction`).
         cells: The n cells in contact.
         modes: How much nearer each of k ≥ 0 free motions brings them, shape (k, n).
     """
 
-    def __init__(
-        self, compliance: GridCompliance | ComplianceMatrix, cells: Cells, modes: Array
-    ) -> None:
+    def __init__(self, compliance: LinearCompliance, cells: Cells, modes: Array) -> None:
         self.compliance, self.cells, self.modes = compliance, cells, modes
         self._inverse = compliance.inverse_on(cells)
         # pressures by each free motion, roughly, and the inverse of their loads

@@ -3,7 +3,7 @@
 Near percolation nearly all of the fluid pressure falls there, and what passes through it is the
 leak (Dapp, Lücke, Persson & Müser 2012, doi 10.1103/PhysRevLett.108.244301).
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 Finite volumes on the cells of a map of gaps. Between neighbours lies the harmonic mean of their g³,
 as half of the way between their centres leads through each. Cells in contact are closed.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 
 Source:
     Patir & Cheng 1978, doi 10.1115/1.3453103 (flow factors); Dapp, Lücke, Persson & Müser 2012,

@@ -3,7 +3,7 @@
 A network has n nodes, the inlet and the outlet. Flow from a node to its neighbour is their
 conductance times the difference of their potentials, as with resistors.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

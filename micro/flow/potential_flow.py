@@ -4,7 +4,7 @@ Where conductances differ by many powers of ten, potentials in double precision 
 flow: between two wide neighbours they differ by less than rounding. The flows themselves are
 therefore what the iteration improves, and their balance at every node is checked.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

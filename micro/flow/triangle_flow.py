@@ -3,7 +3,7 @@
 Linear elements on triangles with a transmissivity each, along x and along y. They let too much
 through, and converge with the square of the size of the triangles.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

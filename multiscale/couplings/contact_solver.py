@@ -5,6 +5,7 @@ Theory: docs/theory.md, sections 3 and 7.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,10 @@ import numpy as np
 from geometry import Control, InputError, PatchGrid, RigidPlane, Surface, overlaps
 from geometry.contact_state import ContactState, Start
 from geometry.patches import patch_means
+from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel, Stiffness
+from micro.friction.friction_model import FrictionModel
+from micro.friction.goodman import NeglectedCoupling
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, load_steps
@@ -28,28 +32,40 @@ class ContactSolver(StepSolver):
         patches: Partition that the results are summed over; it does not change the solution.
         mean_heights: Mean height of each patch, shape (N,) [mm].
         comm: MPI communicator (mpi4py) or None.
+        friction: Friction of the surface; none when not given.
 
     Attributes:
         latest: The contact at the latest load step; on rank 0 alone.
     """
 
     def __init__(
-        self, model: MicroModel, patches: PatchGrid, mean_heights: Array, comm: Any = None
+        self,
+        model: MicroModel,
+        patches: PatchGrid,
+        mean_heights: Array,
+        comm: Any = None,
+        friction: FrictionModel | None = None,
     ) -> None:
         self._model, self._patches, self._mean_heights = model, patches, mean_heights
-        self._comm = comm
+        self._comm, self._friction = comm, friction
         self._start: Start | None = None
         self._turns = False
+        self._shear: ShearState | None = None
+        self._last: Control | None = None  # without its shear
+        self._stiffness: tuple[Array | None, Stiffness] | None = None  # under which pressures
         self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `StepSolver.press`."""
 
         def solve() -> LoadStep:
-            state = self._model.press(
-                control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
-            )
+            state = self._pressed(control)
+            shear, products = self._shear, 0
+            if self._friction is not None and control.shear is not None:
+                shear = self._friction.advance(shear, state.pressures, control.shear)
+                state, products = replace(state, shear=shear), shear.products
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
+            self._shear, self._last = shear, replace(control, shear=None)
             return LoadStep.of_patches(
                 self._patches,
                 plane=(state.approach, *state.tilt),
@@ -59,13 +75,22 @@ class ContactSolver(StepSolver):
                 area_fraction=state.patch_area / self._patches.area,
                 separation=state.mean_separation,
                 contacts=state.contacts,
-                newton_iterations=state.iterations,
+                newton_iterations=state.iterations + products,
                 warnings=(state.warning,) if state.warning else (),
                 peak_pressure_MPa=state.peak_pressure,
                 **self._of_cells(),
             )
 
         return on_root_alone(self._comm, solve)
+
+    def _pressed(self, control: Control) -> ContactState:
+        """Solve the normal contact, unless shear alone changes."""
+        if control.shear is not None and self.latest is not None:
+            if self._last == replace(control, shear=None):
+                return replace(self.latest, iterations=0)
+        return self._model.press(
+            control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
+        )
 
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""
@@ -79,16 +104,45 @@ class ContactSolver(StepSolver):
         if state.plastic_depth is not None and state.yielding is not None:
             columns["yielding_area_fraction"] = float(np.mean(state.yielding))
             columns["plastic_depth_mm"] = float(state.plastic_depth.max())
+        if state.shear is not None:
+            columns |= _of_shear(state.shear)
         return columns
+
+    def tangential_stiffness(self) -> Stiffness:
+        """Return the derivative of the shear force along the shift at the latest load step."""
+
+        def stiffness() -> Stiffness:
+            shear = self._solved().shear
+            if self._friction is None or shear is None:
+                return Stiffness(None, 0)
+            value, used = self._friction.stiffness(shear)
+            return Stiffness(value if np.isfinite(value) else None, used)
+
+        return on_root_alone(self._comm, stiffness)
+
+    def neglected_coupling(self) -> NeglectedCoupling | None:
+        """Return what Goodman's assumption leaves out at the latest load step."""
+
+        def neglected() -> NeglectedCoupling | None:
+            state = self._solved().shear
+            if self._friction is None or state is None:
+                return None
+            return self._friction.neglected(state)
+
+        return on_root_alone(self._comm, neglected)
 
     @property
     def past(self) -> Any:
-        """What the next load step starts from; under a hardness it depends on it."""
-        return self._start, self.latest
+        """What the next load step starts from; None begins anew.
+
+        Under a hardness, and with friction, the next load step depends on it.
+        """
+        return self._start, self.latest, self._shear
 
     @past.setter
     def past(self, value: Any) -> None:
-        self._start, self.latest = value
+        self._start, self.latest, self._shear = value or (None, None, None)
+        self._last = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -119,9 +173,16 @@ class ContactSolver(StepSolver):
 
     def stiffness(self) -> Stiffness:
         """Return dF/dδ at the latest load step."""
-        return on_root_alone(
-            self._comm, lambda: self._model.stiffness(self._solved(), turns=self._turns)
-        )
+
+        def stiffness() -> Stiffness:
+            state = self._solved()
+            if self._stiffness is None or self._stiffness[0] is not state.pressure:
+                found = self._model.stiffness(state, turns=self._turns)
+                self._stiffness = state.pressure, found
+                return found
+            return self._stiffness[1]._replace(iterations=0)  # shear alone has changed
+
+        return on_root_alone(self._comm, stiffness)
 
     def interface_stiffness(self, step: LoadStep, areas: Array) -> float:
         """Return dF/dδ of the contacts at the latest load step on half-spaces alone [N/mm].
@@ -154,11 +215,26 @@ class ContactSolver(StepSolver):
 
     def state(self) -> Any:
         """Return the latest solution; it is whole on rank 0 alone."""
-        return self._start
+        return self._start if self._friction is None else [self._start, self._shear]
 
     def restore(self, state: Any) -> None:
         """Start from a solution."""
-        self._start = state
+        if self._friction is None:
+            self._start = state
+        elif state is not None:
+            self._start, self._shear = state
+
+
+def _of_shear(shear: ShearState) -> dict[str, float]:
+    """Return what a load step says of the shear."""
+    return {
+        "shear_force_x_N": shear.force[0],
+        "shear_force_y_N": shear.force[1],
+        "shear_x_mm": shear.shift[0],
+        "shear_y_mm": shear.shift[1],
+        "slip_area_fraction": float(np.mean(shear.slipping)),
+        "dissipated_mJ": shear.dissipated,
+    }
 
 
 def plane_at_largest_load(

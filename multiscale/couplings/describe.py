@@ -12,6 +12,7 @@ from multiscale.inputs.bodies import BodyFacts, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import heights_per_wave
 from multiscale.loading.body_loads import BodyLoads
+from multiscale.loading.load_history import LoadHistory
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.scene.sections import MicroSection
@@ -114,6 +115,8 @@ def load(parts: SceneParts) -> str:
     if parts.zero:
         depth = quantity(parts.zero, "mm", 4)
         text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
+    if history.shear_points:
+        text += f"; {_shear(history)}"
     if history.force_change is not None:
         text += f", halved where the force changes by more than {history.force_change:.3g}"
     if history.slopes is None:
@@ -122,6 +125,17 @@ def load(parts: SceneParts) -> str:
         tx, ty = history.slopes
         text += f", tilted by {1e3 * tx:.3g} and {1e3 * ty:.3g} µm/mm along x and y"
     return text
+
+
+def _shear(history: LoadHistory) -> str:
+    """Say the shear of a load history."""
+    unit, what = ("N", "a shear force") if history.shear_force else ("mm", "a shift")
+    pairs = (", ".join(quantity(one, unit, 6) for one in pair) for pair in history.shear_points)
+    way = ", ".join(f"({pair})" for pair in pairs)
+    again = f", {history.shear_cycles} times" * (history.shear_cycles > 1)
+    if history.shear_path == "along":
+        return f"along with it {what} of {way}"
+    return f"then in {history.shear_steps or history.steps} steps each to {what} of {way}{again}"
 
 
 def stages(parts: SceneParts) -> Iterator[str]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from geometry import Asperities, Control, InputError, MaterialPair, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
@@ -121,7 +122,19 @@ class MicroCoupling(PressedSurface):
 
     def contact_solver(self, model: MicroModel) -> ContactSolver:
         """Return what solves the contact problem of a model of the surface."""
-        return ContactSolver(model, self.patches, self.mean_heights, self.comm)
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm, self.friction_model)
+
+    @property
+    def friction_model(self) -> FrictionModel | None:
+        """Friction of the surface; None where the scene has none."""
+        if self.scene.friction is None:
+            return None
+        return FrictionModel(
+            materials=self.materials,
+            coefficient=self.scene.friction.coefficient,
+            spacing=self.surface.spacing,
+            periodic=self.scene.surface.periodic,
+        )
 
     # --- errors
 

@@ -3,7 +3,7 @@
 What a separation lets through along x and along y is found from the gaps of the samples under a
 plane there, on their cells and on half as many a side, whose difference is the error.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

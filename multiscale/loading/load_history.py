@@ -11,12 +11,14 @@ from typing import Annotated, Literal
 import numpy as np
 
 from geometry import Control, InputError
+from geometry.shear_state import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
 from multiscale.loading.stages import Leg, Quantity, Repeats, Stage, legs_of
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
+Pairs = tuple[tuple[float, float], ...]
 Plane = tuple[float, float]
 """Approach of the plane [mm], and force of the contact [N]."""
 
@@ -43,6 +45,17 @@ class LoadHistory:
             the plane turn until the pressures have no moment beside that of bolts.
         force_change: Largest change of the force in one step, relative to the largest force so far;
             a step that exceeds it is halved. When not given no step is halved.
+        shear: Shift of the plane along x and y from where it first touched, or a list of turning
+            points [mm]. Exactly one of ``shear`` and ``shear_force`` may be given, with a
+            coefficient of friction.
+        shear_force: Shear force on the plane along x and y, or a list of turning points [N].
+        shear_path: Whether the plane goes through the points of the shear ``after`` the load has
+            come to its end, which then stays, or ``along`` with the load: each of them is then
+            reached together with one of the load's turning points.
+        shear_steps: Load steps to every point of a shear that follows the load; ``steps`` when not
+            given.
+        shear_cycles: How often the plane goes through the points of a shear that follows the load,
+            of which it needs two at least.
         depth: How far the zero lies below the highest point of the surface. On a surface, where
             it is known, approaches count from first touch, which this is added for [mm].
         pulls: Pull of bolts before every stage and at its end, in turn, where the bodies are known;
@@ -61,6 +74,11 @@ class LoadHistory:
     cycles: Repeats = 1
     tilt: Tilt = (0.0, 0.0)
     force_change: Annotated[float, Limits(ge=1e-3, lt=1)] | None = None
+    shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
+    shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
+    shear_path: Literal["after", "along"] = "after"
+    shear_steps: Repeats | None = None
+    shear_cycles: Repeats = 1
     depth: float = field(default=0.0, metadata={KEY: None})
     pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
 
@@ -85,6 +103,37 @@ class LoadHistory:
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
             )
+        self._check_shear()
+
+    def _check_shear(self) -> None:
+        """Refuse two shear loads, what belongs to none, and paths that make no sense."""
+        key, points = "shear" if self.shear_force is None else "shear_force", self.shear_points
+        if self.shear is not None and self.shear_force is not None:
+            problem, allowed = "is a second shear load", "either 'shear' or 'shear_force'"
+            raise InputError(problem, key=key, value=points, allowed=allowed)
+        if points and self.stage:
+            problem, allowed = "does not go with stages", "turning points: 'force' or 'approach'"
+            raise InputError(problem, key=key, value=points, allowed=allowed)
+        along = self.shear_path == "along"
+        beside = {"shear_path": along, "shear_steps": self.shear_steps is not None}
+        beside["shear_cycles"] = self.shear_cycles > 1
+        for name, stated in beside.items():
+            if stated and not points:
+                raise InputError("needs 'shear' or 'shear_force'", key=name)
+            if stated and along and name != "shear_path":
+                problem = "does not go with shear_path = 'along', which has the steps of the load"
+                raise InputError(problem, key=name, allowed="leave it out")
+        if any(one == other for one, other in pairwise([(0.0, 0.0), *points])):
+            problem = "repeats a point, or starts without shear"
+            raise InputError(problem, key=key, value=points, allowed="points that differ")
+        if points and along and len(points) != len(self._stated_points):
+            problem = "has another number of points than the load that it goes along with"
+            raise InputError(
+                problem, key=key, value=points, allowed=f"{len(self._stated_points)} pairs"
+            )
+        if self.shear_cycles > 1 and len(points) < 2:
+            problem, allowed = "needs two points of the shear", "a list of pairs, or 1"
+            raise InputError(problem, key="shear_cycles", value=self.shear_cycles, allowed=allowed)
 
     @property
     def quantity(self) -> Quantity:
@@ -137,9 +186,38 @@ class LoadHistory:
         """The straight ways between turning points, or through stages."""
         if self.stage:
             return tuple(legs_of(self.stage, self.steps))
-        points = self.cycles * (self.approach or self.force or self.pressure or ())
+        points = self.cycles * self._stated_points
         ends = pairwise((0.0, *points))
-        return tuple(Leg(0, self.quantity, start, end, self.steps) for start, end in ends)
+        ways = [Leg(0, self.quantity, start, end, self.steps) for start, end in ends]
+        if self.shear_path == "after":
+            count = self.shear_cycles * len(self.shear_points)
+            steps = self.shear_steps or self.steps
+            ways += [Leg(0, self.quantity, points[-1], points[-1], steps)] * count
+        return tuple(ways)
+
+    @property
+    def _stated_points(self) -> tuple[float, ...]:
+        """Turning points as they were stated; none of stages."""
+        return self.approach or self.force or self.pressure or ()
+
+    @property
+    def shear_points(self) -> Pairs:
+        """Ends of the legs of the shear, the first of which starts at zero [mm or N]."""
+        return self.shear or self.shear_force or ()
+
+    def _shear_at(self, time: float) -> ShearControl | None:
+        """Return the shear of a load step, counted as in `control_at`; None without any."""
+        if not self.shear_points:
+            return None
+        points = (self.shear_cycles * self.cycles) * self.shear_points
+        if self.shear_path == "after":
+            points = self.shear_cycles * self.shear_points
+        begins = self._begins[-len(points) - 1 :]
+        x, y = np.array([(0.0, 0.0), *points]).T
+        pair = float(np.interp(time, begins, x)), float(np.interp(time, begins, y))
+        if self.shear_force is None:
+            return ShearControl(shift=pair)
+        return ShearControl(force=pair)
 
     @cached_property
     def _begins(self) -> list[int]:
@@ -228,10 +306,11 @@ class LoadHistory:
         now = origin[0] if leg.quantity == "approach" else origin[1] - pull_before
         start, end = (now if value is None else value for value in (leg.start, leg.end))
         value = end if done == leg.steps else start + done * ((end - start) / leg.steps)
+        shear = self._shear_at(time)
         if leg.quantity == "approach":
-            return Control(approach=value, tilt=self.slopes, body_state=state)
+            return Control(approach=value, tilt=self.slopes, body_state=state, shear=shear)
         force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand
-        return Control(force=force, tilt=self.slopes, body_state=state)
+        return Control(force=force, tilt=self.slopes, body_state=state, shear=shear)
 
     def _leg_at(self, time: float) -> int:
         """Return the index of the leg that a load step is on."""

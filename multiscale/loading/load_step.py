@@ -86,6 +86,15 @@ class LoadStep:
         gap_conductance_W_per_K: Part of it through gas and radiation [W/K].
         electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
             none.
+        shear_force_x_N: Shear force on the plane along x [N]; None without friction, as all up to
+            the dissipated energy.
+        shear_force_y_N: Shear force along y [N].
+        shear_x_mm: Shift of the plane along x from where it first touched [mm].
+        shear_y_mm: Shift along y [mm].
+        slip_area_fraction: Area that bears the traction μ p over nominal contact area.
+        tangential_stiffness_N_per_mm: Derivative of the shear force along the shift, in the
+            direction of its last change [N/mm]; None where it was not found.
+        dissipated_mJ: Energy lost to friction since the start [mJ].
         leak_x_mm3_per_s: Flow rate from the side x = 0 to the opposite one; 0 where the gap is
             closed, None where the scene asks for none [mm³/s].
         leak_error_x_mm3_per_s: What it differs by on half as many cells a side; None where that was
@@ -138,6 +147,13 @@ class LoadStep:
     thermal_conductance_W_per_K: float | None = None
     gap_conductance_W_per_K: float | None = None
     electrical_conductance_S: float | None = None
+    shear_force_x_N: float | None = None
+    shear_force_y_N: float | None = None
+    shear_x_mm: float | None = None
+    shear_y_mm: float | None = None
+    slip_area_fraction: float | None = None
+    tangential_stiffness_N_per_mm: float | None = None
+    dissipated_mJ: float | None = None
     leak_x_mm3_per_s: float | None = None
     leak_error_x_mm3_per_s: float | None = None
     transmissivity_x_mm3: float | None = None

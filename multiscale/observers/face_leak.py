@@ -3,7 +3,7 @@
 At every point of the face the law of the samples tells the mean separation, and their gaps under a
 plane at that separation the transmissivity. The flow over the face is a problem of two dimensions.
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

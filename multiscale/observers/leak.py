@@ -9,7 +9,7 @@ area in contact, the error was no less than the true one on 93 and 92 % of 144 f
 half of it on 97 and 98 %, and 1.6 to 2.9 times as large in the median
 (`tests/benchmarks/leak_error.py`).
 
-Theory: docs/theory.md, section 15.
+Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations

@@ -239,7 +239,7 @@ class FieldRecorder(StepObserver):
         past = solver.past
         if past is not None and self._coupling.scene.micro.hardness is not None:
             # what earlier load steps left behind depends on all of them, from the first
-            solver.past = (None, None)
+            solver.past = None
             again = [step for step in steps if step.step <= max(missing)]
         for step in again:
             solver.press(step.under_its_plane)

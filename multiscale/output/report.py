@@ -30,6 +30,12 @@ _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "
 """Topics of the plan that say what was computed; the others say how, and are folded."""
 
 _MORE = {
+    "shear_force_x_N": ("shear force along x", "N"),
+    "shear_force_y_N": ("shear force along y", "N"),
+    "shear_x_mm": ("shift along x", "mm"),
+    "shear_y_mm": ("shift along y", "mm"),
+    "tangential_stiffness_N_per_mm": ("tangential stiffness", "N/mm"),
+    "dissipated_mJ": ("lost to friction", "mJ"),
     "stiffness_N_per_mm": ("interfacial stiffness", "N/mm"),
     "plastic_depth_mm": ("plastic depth", "mm"),
     "thermal_conductance_W_per_K": ("thermal conductance", "W/K"),
@@ -174,6 +180,8 @@ def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
     yield "material", describe.materials(coupling)
     yield "dimensions", describe.dimensions(coupling)
     yield "surface", describe.surface(coupling)
+    if coupling.scene.friction is not None:
+        yield "coefficient of friction", number(coupling.scene.friction.coefficient)
     if coupling.scene.micro.hardness is not None:
         yield "hardness", quantity(coupling.scene.micro.hardness, "MPa")
 

@@ -33,10 +33,11 @@ from support.cores import cores
 from support.whole_files import remove, write_bytes, write_csv, write_text, written
 
 _MOST_PROCESSES = 3
-"""Processes that draw; a run has five to eight figures."""
+"""Processes that draw; a run has five to nine figures."""
 
 _FIGURES = (
-    "overview", "surface", "curves", "pressures", "contact", "laws", "block", "face", "leak",
+    "overview", "surface", "curves", "pressures", "contact", "shear", "laws", "block", "face",
+    "leak",
 )  # fmt: skip
 
 FILES = (
@@ -272,6 +273,8 @@ class RunFigures:
         if run.contacts:
             contact = run.contacts[-1]
             figures["contact"] = "contact.contact_figure", (contact,)
+            if contact.slipping is not None:
+                figures["shear"] = "shear.shear_figure", (history, contact)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio

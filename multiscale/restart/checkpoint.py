@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from geometry.shear_state import ShearState
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
@@ -72,6 +73,7 @@ _KINDS = (
     DenseState,
     LawPoint,
     RigidPlane,
+    ShearState,
     Start,
 )
 """What a checkpoint may consist of: its own records, and those of the states of couplings."""

@@ -244,7 +244,7 @@ def _spots(path: Path, counts: dict[int, int]) -> dict[int, Array]:
     return {step: np.array(found).reshape(-1, len(SPOT_COLUMNS)) for step, found in rows.items()}
 
 
-def _maps(path: Path, counts: dict[int, int]) -> dict[int, dict[str, Array]]:
+def _maps(path: Path, counts: dict[int, int]) -> dict[int, dict[str, Any]]:
     """Return the maps of every load step by name; none of a run that wrote none."""
     if not path.is_file():
         return {}

@@ -18,8 +18,12 @@ Array = NDArray[np.float64]
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""
 
-FIELDS = ("x_mm", "y_mm", "pressure_MPa", "gap_mm", "plastic_depth_mm")
-"""Datasets of a load step in ``contact.h5``; the last one under a hardness alone."""
+FIELDS = (
+    "x_mm", "y_mm", "pressure_MPa", "gap_mm", "plastic_depth_mm",
+    "traction_MPa", "slip_mm", "slipping",
+)  # fmt: skip
+"""Datasets of a load step in ``contact.h5``; plastic depth under a hardness alone, what follows it
+with friction."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -41,6 +45,10 @@ class ContactRecord:
         gap_mm: Gaps between the plane and the deformed surface, shape (nx, ny) or (n,) [mm].
         plastic_depth_mm: Plastic depth that the loads so far left, by which the heights are lower,
             shape (nx, ny) [mm]; None without a hardness.
+        traction_MPa: Tractions along x and y, shape (2, nx, ny) [MPa]; None without friction, as
+            the next two.
+        slip_mm: Slip of the cells in contact since they touched, shape (2, nx, ny) [mm].
+        slipping: Which cells in contact bear the traction μ p, shape (nx, ny).
     """
 
     step: int
@@ -53,6 +61,9 @@ class ContactRecord:
     pressure_MPa: Array | None = None
     gap_mm: Array | None = None
     plastic_depth_mm: Array | None = None
+    traction_MPa: Array | None = None
+    slip_mm: Array | None = None
+    slipping: NDArray[np.bool_] | None = None
     unloading: bool = False
 
     @classmethod
@@ -73,6 +84,7 @@ class ContactRecord:
             unloading: Whether the load fell to it.
         """
         assert state.spots is not None
+        shear = state.shear
         columns = (
             state.spots.place.T,
             (
@@ -94,6 +106,9 @@ class ContactRecord:
             pressure_MPa=state.pressure,
             gap_mm=state.gap,
             plastic_depth_mm=state.plastic_depth,
+            traction_MPa=None if shear is None else shear.traction,
+            slip_mm=None if shear is None else shear.slip,
+            slipping=None if shear is None else shear.slipping,
             unloading=unloading,
         )
 

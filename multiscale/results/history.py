@@ -190,6 +190,31 @@ class History:
         "Approach counted from first touch, where approach_mm counts from another height", "mm",
         heading="from first touch", table="more",
     )  # fmt: skip
+    shear_force_x_N = Column(
+        "Shear force on the plane along x", "N", heading="shear force x", table="more"
+    )
+    shear_force_y_N = Column(
+        "Shear force on the plane along y", "N", heading="shear force y", table="more"
+    )
+    shear_x_mm = Column(
+        "Shift of the plane along x from where it first touched", "mm",
+        heading="shift x", table="more",
+    )  # fmt: skip
+    shear_y_mm = Column(
+        "Shift of the plane along y from where it first touched", "mm",
+        heading="shift y", table="more",
+    )  # fmt: skip
+    slip_area_fraction = Column(
+        "Area that bears the traction μ p over nominal contact area",
+        heading="slip area", table="more",
+    )  # fmt: skip
+    tangential_stiffness_N_per_mm = Column(
+        "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
+        heading="tangential stiffness", table="more",
+    )  # fmt: skip
+    dissipated_mJ = Column(
+        "Energy lost to friction", "mJ", heading="lost to friction", table="more"
+    )
     leak_x_mm3_per_s = Column(
         "Flow rate of the leak along x, 0 where the gap is closed", "mm³/s",
         heading="leak along x", table="more", error="leak_error_x_mm3_per_s",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, field
 from itertools import chain
+from math import hypot
 from typing import Annotated
 
 from multiscale.loading.load_history import LoadHistory
@@ -17,6 +18,7 @@ from multiscale.scene.bodies import (
 from multiscale.scene.leak import LeakSection
 from multiscale.scene.sections import (
     CouplingSection,
+    FrictionSection,
     LawSection,
     MicroSection,
     OutputSection,
@@ -59,6 +61,7 @@ class SceneSections:
         law: What the laws of the interface are made from.
         patches: The partition of the interface.
         micro: How contacts are solved.
+        friction: Friction of the interface, which has none without this section.
         coupling: How contacts and block are put together.
         reference: The meshes of ``coupling.kind = "reference"``.
         loading: The motion of the rigid plane, or the force on it.
@@ -77,6 +80,7 @@ class SceneSections:
     law: LawSection = field(default_factory=LawSection)
     patches: PatchesSection = field(default_factory=PatchesSection)
     micro: MicroSection = field(default_factory=MicroSection)
+    friction: FrictionSection | None = None
     coupling: CouplingSection = field(default_factory=CouplingSection)
     reference: ReferenceSection = field(default_factory=ReferenceSection)
     loading: LoadHistory = field(metadata={KEY: "load"})
@@ -126,6 +130,7 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
         *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings, _leak)),
         _representative_laws(scene, of_coupling),
         _micro_models(scene),
+        _friction(scene),
     )
     for key, problem, allowed in problems:
         raise InputError(problem, key=key, allowed=allowed or None)
@@ -321,3 +326,42 @@ def _micro_models(scene: SceneSections) -> Iterator[Problem]:
     if conducts and model != "half-space" and not by_laws:
         problem = f"does not go with micro.model = '{model}' without laws"
         yield "conductance", problem, f"{cells}; or coupling.kind = 'consistent' or 'isolated'"
+
+
+def _friction(scene: SceneSections) -> Iterator[Problem]:
+    """Yield friction without shear, shear without friction, and what has no friction."""
+    loading, given = scene.loading, scene.friction is not None
+    key = "shear" if loading.shear_force is None else "shear_force"
+    if loading.shear_points and not given:
+        yield f"load.{key}", "needs friction", "friction.coefficient, as in 0.3"
+    if not given:
+        return
+    if scene.kind not in ("concurrent", "analytic"):
+        kind = f"coupling.kind = '{scene.coupling.kind}'"
+        if scene.law.representative:
+            kind = "law.kind = 'representative'"
+        problem = f"does not go with {kind}, which has no tangential tractions"
+        yield "friction", problem, "coupling.kind = 'concurrent' or 'analytic'"
+    if scene.micro.model != "half-space":
+        problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
+        yield "friction", problem, "micro.model = 'half-space'"
+    if not loading.shear_points:
+        yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
+    yield from _sliding(scene)
+
+
+def _sliding(scene: SceneSections) -> Iterator[Problem]:
+    """Yield shear forces that friction does not transmit under the prescribed forces."""
+    loading, friction = scene.loading, scene.friction
+    if friction is None or loading.shear_force is None or loading.force is None:
+        return
+    along = loading.shear_path == "along"
+    forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
+    for pair, force in zip(loading.shear_force, forces, strict=True):
+        most = friction.coefficient * force
+        if hypot(*pair) >= most:
+            yield (
+                "load.shear_force",
+                f"slides: friction transmits less than {most:.6g} N under {force:.6g} N",
+                f"pairs shorter than {most:.6g} N; or load.shear",
+            )

@@ -150,11 +150,24 @@ def _checks(mark: Any) -> Iterator[Any]:
         yield mark
 
 
-def _parsed(value: Any, unit: Unit) -> float | tuple[float, ...]:
+def _parsed(value: Any, unit: Unit) -> Any:
+    if unit.pairs:
+        return _pairs(value, unit)
     if not unit.several:
         return parse_quantity(value, unit.name)
     listed = value if isinstance(value, list | tuple) else [value]
     return tuple(parse_quantity(one, unit.name) for one in listed)
+
+
+def _pairs(value: Any, unit: Unit) -> tuple[tuple[float, ...], ...]:
+    """Read one pair of quantities along x and y, or a list of pairs."""
+    listed = value if isinstance(value, list | tuple) else [value]
+    pairs = listed if listed and isinstance(listed[0], list | tuple) else [listed]
+    if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
+        shown = example(unit.name)
+        allowed = f"[{shown}, {shown}], or a list of such pairs"
+        raise InputError("is no pair of quantities along x and y", allowed=allowed)
+    return tuple(tuple(parse_quantity(one, unit.name) for one in pair) for pair in pairs)
 
 
 def _schema(unit: Unit) -> WithJsonSchema:
@@ -166,7 +179,9 @@ def _schema(unit: Unit) -> WithJsonSchema:
         "examples": [example(unit.name).strip('"')],
     }
     listed = {"anyOf": [one, {"type": "array", "items": one, "minItems": 1}]}
-    return WithJsonSchema(listed if unit.several else one)
+    pair = {"type": "array", "items": one, "minItems": 2, "maxItems": 2}
+    pairs = {"anyOf": [pair, {"type": "array", "items": pair, "minItems": 1}]}
+    return WithJsonSchema(pairs if unit.pairs else listed if unit.several else one)
 
 
 def _first_problem(error: pydantic.ValidationError, unknown: Complain) -> InputError:

@@ -60,6 +60,20 @@ class MicroSection:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionSection:
+    """Coulomb friction of the interface; without this section it is frictionless.
+
+    It needs half-space contacts that load steps solve themselves: the couplings ``concurrent`` and
+    ``analytic``. What shears the interface are ``load.shear`` or ``load.shear_force``.
+
+    Args:
+        coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
+    """
+
+    coefficient: Annotated[float, Limits(gt=0, le=10)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class CouplingSection:
     """How micro and macro model are put together.
 

@@ -28,7 +28,7 @@ FLOORS = {
         "interpolant legendre_modes materials",
         "face_frame filters surface",
         "patches spectrum statistics summits zero",
-        "plausibility",
+        "plausibility shear_state",
         "facing preparation rigid_plane",
         "files",
         "asperities contact_state meshes plane_equilibrium",
@@ -37,7 +37,7 @@ FLOORS = {
         "closed_forms conductance flow",
         "boundary_elements model",
         "asperities complementarity",
-        "half_space",
+        "friction half_space",
         "by_name",
     ],
     "macro": [

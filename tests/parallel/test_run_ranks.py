@@ -57,6 +57,10 @@ SCENES = {
         "leak.pressures=['2 bar', '1 bar']",
         "output.check=all",
     ],
+    "concurrent, sheared there and back": [
+        "coupling.kind=concurrent", "micro.model=half-space", "friction.coefficient=0.3",
+        "load.shear=[['1 um', '0 um'], ['-1 um', '0.5 um']]", "load.shear_steps=2",
+    ],
     "laws that conduct": [
         "block.cells=[8, 8, 5]", "patches.grid=[4, 2]", "conductance.conductivity='50 W/m/K'",
     ],
@@ -88,6 +92,10 @@ NUMBERS = (
     "leak_x_mm3_per_s",
     "leak_error_y_mm3_per_s",
     "constriction_y_fraction",
+    "shear_force_x_N",
+    "shear_force_y_N",
+    "tangential_stiffness_N_per_mm",
+    "dissipated_mJ",
 )
 
 
@@ -123,6 +131,7 @@ LONG = {
     "cells for an accuracy",
     "cube, patchwise",  # as the wide block
     "concurrent, asperities",
+    "concurrent, sheared there and back",
     "condensed, up and down",
     "consistent, decomposed, free to turn",
     "free to turn, on the mesh",

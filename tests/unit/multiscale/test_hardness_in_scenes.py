@@ -118,7 +118,7 @@ def test_fields_of_a_resumed_run_are_those_of_the_whole_path():
     steps = list(whole.load_steps())
     coupling, kept = whole.coupling, whole.fields.kept
     again = FieldRecorder(coupling)
-    start, latest = coupling.solver.past
+    start, latest, _ = coupling.solver.past
     again._complete(steps)
     assert coupling.solver.past[0] is start
     assert coupling.solver.past[1] is latest

@@ -122,7 +122,8 @@ def test_help_on_a_section_has_its_keys_and_no_others(capsys):
     words = {word.rstrip(";") for word in shown.split() if word.startswith("load.")}
     assert words == {
         "load.approach", "load.force", "load.pressure", "load.stage", "load.steps", "load.tilt",
-        "load.force_change", "load.cycles", "load.zero",
+        "load.force_change", "load.cycles", "load.zero", "load.shear", "load.shear_force",
+        "load.shear_path", "load.shear_steps", "load.shear_cycles",
     }  # fmt: skip
 
 

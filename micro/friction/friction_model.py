@@ -1,0 +1,330 @@
+"""Friction of a rough surface on a half-space: shear step by step, under given pressures.
+
+Pressures come from the normal contact, which shear leaves as it is: exactly so for like bodies, and
+by Goodman's assumption for others (`micro.friction.goodman`). A load step follows the slip of the
+one before. Cells that touch anew begin without traction: before they touched, they followed the
+body that they are on.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from geometry.materials import MaterialPair
+from geometry.shear_state import ShearControl, ShearState
+from micro.boundary_elements.half_space_grid import Cells
+from micro.complementarity.rigid_motions import Box
+from micro.complementarity.solver import box_around
+from micro.friction.goodman import CrossCompliance, NeglectedCoupling, variation
+from micro.friction.stick_slip import FreeTractions, solve_tractions
+from micro.friction.tangential_grid import TangentialGrid, tangential_grid
+from micro.friction.traction_problem import TractionProblem
+from support.arrays import Array, Flags
+from support.cores import blas_threads
+from support.errors import InputError
+
+_RESIDUAL, _FORCING = 3e-4, 1e-2
+"""Largest error of displacements in the stiffness, relative to the shift, and part of the present
+one that a solution leaves; the error of the stiffness is the square."""
+_MOST_PASSES, _MOST_ITERATIONS = 12, 100
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrictionModel:
+    """Coulomb friction between a rough surface and a plane that shifts along it, cell by cell.
+
+    `FrictionModel(materials=pair, coefficient=0.3, spacing=surface.spacing)` and then
+    `model.advance(None, pressures, ShearControl(shift=(1e-3, 0.0)))`, whose result is the first
+    argument of the next load step.
+
+    Args:
+        materials: The two bodies, the other one rigid where it has no material.
+        coefficient: Coefficient of friction μ.
+        spacing: Sides (dx, dy) of a cell [mm].
+        periodic: Whether tractions continue periodically. The mean displacement of a periodic
+            half-space is not determined: shifts count from the mean of the displaced surface.
+        tolerance: Largest residual of a solution: it is exact for a shift that varies from cell to
+            cell by no more than this part.
+
+    Raises:
+        InputError: When coefficient or tolerance are not positive.
+    """
+
+    materials: MaterialPair
+    coefficient: float
+    spacing: tuple[float, float]
+    periodic: bool = False
+    tolerance: float = 1e-6
+
+    def __post_init__(self) -> None:
+        for what in ("coefficient", "tolerance"):
+            value = getattr(self, what)
+            if not (np.isfinite(value) and value > 0.0):
+                raise InputError(f"the {what} must be positive", value=value, allowed="> 0")
+
+    def advance(
+        self, before: ShearState | None, pressure: Array, control: ShearControl
+    ) -> ShearState:
+        """Return the shear at the next load step.
+
+        Args:
+            before: The shear at the load step before; None where nothing has touched yet.
+            pressure: Contact pressures at this load step, shape (nx, ny) [MPa].
+            control: What it prescribes of the plane.
+
+        Raises:
+            InputError: When the pressures are not of the cells of the state before.
+            NotConverged: When the tractions are not found, or the contact slides under a prescribed
+                force.
+        """
+        before = ShearState.none(pressure.shape) if before is None else before  # type: ignore[arg-type]
+        if before.bound.shape != pressure.shape:
+            problem, allowed = "the state before has other cells", f"{pressure.shape}"
+            raise InputError(problem, value=before.bound.shape, allowed=allowed)
+        step = _Step(self, before, self.coefficient * pressure)
+        with blas_threads(1):  # all cores are taken by threads of ours
+            return step.solved(control)
+
+    def stiffness(self, state: ShearState) -> tuple[float, int]:
+        """Return the derivative of the shear force along the shift, and what it took.
+
+        The shift changes on in the direction of its last change. Cells that stick follow it, those
+        that slip keep their tractions, and pressures stay as they are.
+
+        Args:
+            state: A state of this model.
+
+        Returns:
+            The derivative [N/mm], NaN where the iteration does not converge, and the products of
+            the tangential compliance.
+        """
+        stuck = state.sticking
+        if not stuck.any():
+            return 0.0, 0
+        box = self.box(stuck)
+        grid, cells = self.grid(box), _cells_in(stuck, box)
+        problem = TractionProblem(
+            grid=grid,
+            cells=cells,
+            bound=np.ones(len(cells.flat)),
+            shift=np.zeros((2, len(cells.flat))),
+            force=None,
+            tolerance=self.tolerance,
+        )
+        ahead = np.repeat(np.array(state.direction)[:, None], len(cells.flat), axis=1)
+        rate, left, used = np.zeros_like(ahead), ahead, grid.products
+        free = FreeTractions(problem, np.zeros_like(ahead), np.zeros(len(cells.flat)))
+        with blas_threads(1):
+            for _ in range(_MOST_PASSES):
+                stop = max(_FORCING * float(np.abs(left).max()), 0.25 * _RESIDUAL)
+                rate = rate + free.solution(left, stop=stop, limit=_MOST_ITERATIONS)
+                left = ahead - grid.displacement_of(cells, rate)
+                if float(np.abs(left).max()) <= _RESIDUAL:
+                    value = float(np.vdot(rate, ahead + left)) * self._unit
+                    return value, grid.products - used
+        return np.nan, grid.products - used
+
+    def neglected(self, state: ShearState) -> NeglectedCoupling:
+        """Return what Goodman's assumption leaves out at a state.
+
+        Its effect on the shear force is that on a first loading under the pressures of the state:
+        the plane presses without shear force, then shifts at once as far as in the state.
+
+        Raises:
+            NotConverged: When the tractions of that are not found.
+        """
+        beta, closed = self.materials.dundurs_beta, state.closed
+        if beta == 0.0 or not closed.any():
+            return NeglectedCoupling(beta)
+        grid = closed.shape[0], closed.shape[1]
+        cross = CrossCompliance(grid, self.spacing, self.materials, periodic=self.periodic)
+        sideways = cross.sideways(state.bound / self.coefficient)[:, closed]
+        forces = (
+            self._first_loading(state, np.zeros_like(sideways)),
+            (self._first_loading(state, sideways)),
+        )
+        return NeglectedCoupling(
+            beta,
+            float(np.hypot(*variation(sideways)).max()),
+            float(variation(cross.across(state.traction)[closed]).max()),
+            float(np.hypot(*forces[0])),
+            float(np.hypot(*(forces[1] - forces[0]))),
+        )
+
+    def _first_loading(self, state: ShearState, sideways: Array) -> Array:
+        """Return the shear force of a first loading to a shift where the surface has moved.
+
+        Args:
+            state: The shear that has the shift, and the bound of the tractions.
+            sideways: How far the cells in contact are displaced beforehand, shape (2, n) [mm].
+
+        Returns:
+            Shape (2,) [N].
+        """
+        box = self.box(state.closed)
+        cells, bound = _cells_in(state.closed, box), state.bound[state.closed] / self._modulus
+        pressed = TractionProblem(
+            grid=self.grid(box),
+            cells=cells,
+            bound=bound,
+            shift=-sideways,
+            force=np.zeros(2),
+            tolerance=self.tolerance,
+        )
+        with blas_threads(1):
+            before = solve_tractions(pressed, np.zeros_like(sideways))
+            moved = np.array(state.shift) + before.motion
+            sheared = replace(pressed, shift=moved[:, None] - sideways - before.slip, force=None)
+            after = solve_tractions(sheared, before.traction)
+        return np.asarray(after.traction.sum(axis=1)) * self._unit
+
+    def energy(self, state: ShearState) -> float:
+        """Return the elastic energy ½ ∫ q·u dA of the tractions [N mm]."""
+        box = self.box(state.closed)
+        moved = self.grid(box).displacement(state.traction[:, *box] / self._modulus)
+        return 0.5 * float(np.vdot(state.traction[:, *box], moved)) * float(np.prod(self.spacing))
+
+    def box(self, cells: Flags) -> Box:
+        """Return the box of cells that products are made on: around some, or a whole period."""
+        return box_around(cells | self.periodic | ~cells.any())
+
+    def grid(self, box: Box) -> TangentialGrid:
+        """Return the tangential compliance of the cells of a box."""
+        counts = box[0].stop - box[0].start, box[1].stop - box[1].start
+        ratio = self.materials.tangential_poisson_ratio
+        return tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+
+    @property
+    def _modulus(self) -> float:
+        """E* of the pair, which tractions are divided by [MPa]."""
+        return self.materials.contact_modulus
+
+    @property
+    def _unit(self) -> float:
+        """Force of a traction / E* of 1 on a cell [N]."""
+        return self._modulus * float(np.prod(self.spacing))
+
+
+class _Step:
+    """One load step: from the shear before it to that under new pressures.
+
+    Args:
+        model: The model.
+        before: The shear before the step.
+        bound: Bound μ p of the tractions in the step, shape (nx, ny) [MPa].
+    """
+
+    def __init__(self, model: FrictionModel, before: ShearState, bound: Array) -> None:
+        self._model, self._before, self._bound = model, before, bound
+        closed = bound > 0.0
+        self._box = model.box(closed | before.closed)
+        self._grid = model.grid(self._box)
+        self._cells, self._closed = _cells_in(closed, self._box), closed
+        self._products = self._grid.products
+
+    def solved(self, control: ShearControl) -> ShearState:
+        """Return the shear at the end of the step."""
+        model, before, scale = self._model, self._before, self._model._modulus
+        closed = self._closed
+        slip_before = self._of_cells(self._slip_before())
+        start = self._of_cells(before.traction) / scale
+        force = None if control.force is None else np.array(control.force) / model._unit
+        prescribed = np.zeros(2) if control.shift is None else np.array(control.shift)
+        solution = solve_tractions(
+            TractionProblem(
+                grid=self._grid,
+                cells=self._cells,
+                bound=self._of_cells(self._bound) / scale,
+                shift=prescribed[:, None] - slip_before,
+                force=force,
+                tolerance=model.tolerance,
+            ),
+            start,
+        )
+        shift = prescribed + solution.motion
+        traction = self._on_grid(solution.traction * scale)
+        slip = self._on_grid(slip_before + solution.slip)
+        slipping = np.zeros(self._bound.shape, bool)
+        slipping[closed] = solution.slipping
+        lost = self._dissipated(traction, self._on_grid(solution.slip), shift)
+        moved = shift - np.array(before.shift)
+        size = float(np.hypot(*moved))
+        direction = before.direction if size == 0.0 else tuple(float(one) for one in moved / size)
+        cell = float(np.prod(model.spacing))
+        return ShearState(
+            shift=(float(shift[0]), float(shift[1])),
+            force=(float(traction[0].sum()) * cell, float(traction[1].sum()) * cell),
+            traction=traction,
+            slip=slip,
+            bound=self._bound,
+            slipping=slipping,
+            direction=direction,  # type: ignore[arg-type]
+            dissipated=before.dissipated + lost,
+            dissipated_in_step=lost,
+            residual=solution.residual,
+            products=self._grid.products - self._products,
+        )
+
+    def _slip_before(self) -> Array:
+        """Return the slip before the step; cells that touch anew had none to follow, (2, nx, ny).
+
+        Those were shifted against the plane by whatever the plane and the surface had moved by
+        then, without traction.
+        """
+        before = self._before
+        anew = self._closed & ~before.closed
+        slip = before.slip
+        if anew.any() and (any(before.shift) or before.traction.any()):
+            free = np.zeros_like(slip)
+            free[:, *self._box] = np.array(before.shift)[:, None, None] - self._displacement(
+                before.traction
+            )
+            slip = np.where(anew, free, slip)
+        return slip
+
+    def _dissipated(self, traction: Array, change: Array, shift: Array) -> float:
+        """Return the energy that friction takes up in the step [N mm].
+
+        On cells that stay in contact it is the traction times the change of the slip. Where the
+        bound rises, its mean in the step counts; where it falls, the mean of both tractions. Under
+        unchanging pressures, and shear along a line, it is exact. Cells that part lose the energy
+        of their traction.
+        """
+        before, bound = self._before, self._bound
+        parted = before.closed & ~self._closed
+        if parted.any() and before.traction[:, parted].any():
+            free = np.zeros_like(change)
+            free[:, *self._box] = shift[:, None, None] - self._displacement(traction)
+            change = np.where(parted, free - before.slip, change)
+        ratio = np.divide(before.bound, bound, out=np.ones_like(bound), where=bound > before.bound)
+        own = 0.5 * (1.0 + ratio) * (traction * change).sum(axis=0)
+        falling = ((before.traction - traction) * change).sum(axis=0)
+        lost = np.maximum(own, 0.0) + 0.5 * np.maximum(falling, 0.0)
+        return float(lost.sum() * np.prod(self._model.spacing))
+
+    def _displacement(self, traction: Array) -> Array:
+        """Return the displacements by tractions [MPa] on the cells of the box [mm]."""
+        return self._grid.displacement(traction[:, *self._box] / self._model._modulus)
+
+    def _of_cells(self, field: Array) -> Array:
+        """Return the values of a field on the cells in contact, shape (…, n)."""
+        part = field[..., *self._box]
+        return np.ascontiguousarray(part.reshape(*part.shape[:-2], -1)[..., self._cells.flat])
+
+    def _on_grid(self, values: Array) -> Array:
+        """Return values on the cells in contact as a field, shape (2, nx, ny)."""
+        field = np.zeros((2, *self._bound.shape))
+        part = np.zeros((2, int(np.prod(self._grid.grid))))
+        part[:, self._cells.flat] = values
+        field[:, *self._box] = part.reshape(2, *self._grid.grid)
+        return field
+
+
+def _cells_in(flags: Flags, box: Box) -> Cells:
+    """Return some cells within a box."""
+    part = flags[box]
+    return Cells.of(np.flatnonzero(part), part.shape)

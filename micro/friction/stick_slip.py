@@ -1,0 +1,293 @@
+"""Search for the cells that stick and the directions in which the others slip.
+
+It is the search of `micro.complementarity.active_set` for tractions in two directions. A step takes
+the cells at the bound that slip outwards as slipping. Their tractions may only turn; those of all
+others are free. The linear problem of these cells is solved roughly by conjugate gradients, the
+same as those of the normal contact, and tractions beyond their bounds are brought back to them.
+Where that gains little, some projected steps along the gradient of the energy come between.
+Turning a traction g by an angle shortens it along the slip s, which adds the stiffness |s|/g to the
+direction across (Newton's method for the bound).
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from micro.boundary_elements.half_space_grid import Cells
+from micro.complementarity.conjugate_gradients import ContactCells
+from micro.friction.traction_problem import TractionProblem, Tractions
+from support.arrays import Array
+from support.errors import NotConverged
+
+_MOST_STEPS, _MOST_ITERATIONS, _MOST_HALVINGS = 200, 100, 12
+_ADDED = 0.5
+"""Weight of the compliance that slip adds, against that of a cell, in the preconditioner. With 0.25
+to 0.5 it takes two thirds of the products that it takes with 1 (512² cells, ν = 0.3)."""
+_DECREASE = 0.9
+"""Residual after a step, relative to that before, above which the gradient takes over. Steps that
+come closer halve it; with 0.7 half of them do without need on periodic surfaces."""
+_GRADIENT_STEPS = 8
+"""Steps along the gradient in a row."""
+_MOST_MOTIONS, _ROUNDING = 20, 1e-14
+"""Newton steps for the shift under a prescribed force, and their last change over the slip."""
+_FORCING = (0.2, 0.01)
+"""Displacements at which the conjugate gradients of a step end, relative to the present residual:
+where the slipping cells have changed, and where they are the same as before."""
+
+
+class FreeTractions:
+    """Tractions of some cells that stick, and of others that turn, as one linear problem.
+
+    It is a `LinearCompliance` that `ContactCells` takes.
+
+    Args:
+        problem: The traction problem.
+        normal: Directions in which tractions stay as they are, unit vectors of the cells that slip
+            and zeros of those that stick, shape (2, n).
+        stiffness: Compliance |s|/g that slip adds across these directions, shape (n,) [mm].
+    """
+
+    def __init__(self, problem: TractionProblem, normal: Array, stiffness: Array) -> None:
+        self._problem, self._normal, self._added = problem, normal, stiffness
+        ratio = stiffness / problem.grid.self_compliance
+        self._weight = 1.0 / np.sqrt(1.0 + _ADDED * ratio)
+
+    def free_part(self, vectors: Array) -> Array:
+        """Return the part of vectors along which tractions are free, shape (2, n)."""
+        return vectors - self._normal * (self._normal * vectors).sum(axis=0)
+
+    def apply_compliance(self, cells: Cells, change: Array) -> Array:
+        """Return the free part of the displacements by a free change, both flat."""
+        part = change.reshape(2, -1)
+        moved = self._problem.grid.roughly(cells, part) + self._added * part
+        return self.free_part(moved).ravel()
+
+    def inverse_on(self, cells: Cells) -> FreeInverse:
+        """Return an approximate inverse of the compliance of the cells."""
+        return FreeInverse(self, cells)
+
+    def roughly_resisted(self, cells: Cells, displacement: Array) -> Array:
+        """Return roughly the free change that displaces the cells, both flat."""
+        part = self.free_part(self._weight * displacement.reshape(2, -1))
+        moved = self._problem.grid.inverse(cells, part)
+        return self.free_part(self._weight * moved).ravel()
+
+    def solution(self, displacement: Array, *, stop: float, limit: int) -> Array:
+        """Return the free change that makes displacements, and keeps a prescribed force.
+
+        Args:
+            displacement: The displacements, shape (2, n) [mm].
+            stop: Largest part of them that may be left [mm].
+            limit: Number of iterations after which the change is returned as it is.
+        """
+        count = displacement.shape[1]
+        modes = np.zeros((0, 2 * count))
+        if self._problem.force is not None:
+            units = np.zeros((2, 2, count))
+            units[0, 0] = units[1, 1] = 1.0
+            modes = np.stack([self.free_part(unit).ravel() for unit in units])
+        contact = ContactCells(self, self._problem.cells, modes)
+        left = -self.free_part(displacement).ravel()
+        return contact.close(left, stop=stop, limit=limit).reshape(2, -1)
+
+
+class FreeInverse:
+    """Approximate inverse of the compliance of free tractions; a `ContactInverse`.
+
+    Args:
+        free: The free tractions.
+        cells: Their cells.
+    """
+
+    accurate = False
+
+    def __init__(self, free: FreeTractions, cells: Cells) -> None:
+        self._free, self._cells = free, cells
+
+    def __call__(self, displacement: Array) -> Array:
+        """Return roughly the free change that displaces the cells, both flat."""
+        return self._free.roughly_resisted(self._cells, displacement)
+
+
+class StickSlip:
+    """Tractions on cells and how far they are from a solution.
+
+    Args:
+        problem: The traction problem.
+        start: Tractions / E* to begin with, shape (2, n).
+
+    Attributes:
+        traction: Present tractions / E*, which are admissible, shape (2, n).
+        motion: Shift of all cells where the force is prescribed, shape (2,) [mm].
+        slip: Slip of the cells in this step as the tractions have it, shape (2, n) [mm].
+        slipping: Which cells slip, shape (n,).
+        residual: Largest violation of the conditions over the largest shift.
+    """
+
+    def __init__(self, problem: TractionProblem, start: Array) -> None:
+        self.problem = problem
+        self._set = np.zeros(len(problem.bound), bool)
+        self._cautious = False  # since a step has raised the energy
+        tractions = problem.admissible(start)
+        if tractions is None:
+            tractions = problem.admissible(np.zeros_like(start))
+        if tractions is None:
+            raise NotConverged(
+                "the tractions to start from",
+                reason="no tractions within the bounds have the prescribed shear force",
+                iterations=0,
+                remedy="give a smaller shear force",
+            )
+        self._accept(tractions)
+
+    def _accept(self, traction: Array) -> None:
+        """Evaluate admissible tractions."""
+        problem, self.traction = self.problem, traction
+        moved = problem.grid.displacement_of(problem.cells, traction)
+        self._energy = float(np.vdot(traction, 0.5 * moved - problem.shift))
+        wanted, at_bound = problem.shift - moved, problem.at_bounds(traction)
+        self._normal = traction / np.maximum(np.hypot(*traction), 1e-300)
+        self.motion = np.zeros(2)
+        if problem.force is not None:
+            self.motion = _closest_motion(wanted, self._normal * at_bound, problem.bound)
+        slip = self.slip = wanted + self.motion[:, None]
+        outward = (self._normal * slip).sum(axis=0)
+        self.slipping = at_bound & (outward > 0.0)
+        self._normal *= self.slipping
+        self._outward = np.where(self.slipping, outward, 0.0)
+        self._left = slip - self._outward * self._normal
+        shifted = np.abs(problem.shift + self.motion[:, None]).max(initial=0.0)
+        self._scale = max(float(shifted), float(np.abs(moved).max(initial=0.0)))
+        largest = float(np.abs(self._left).max(initial=0.0))
+        self.residual = largest / self._scale if self._scale > 0.0 else 0.0
+
+    def step(self) -> None:
+        """Solve with the cells that seem to slip, or move along the gradient where that fails."""
+        old, residual, energy = self.traction, self.residual, self._energy
+        change = self._newton_change()
+        moved = self.problem.admissible(old + change)
+        if moved is not None:
+            self._accept(moved)
+            falls = self.residual <= _DECREASE * residual
+            if self.residual <= self.problem.tolerance or (falls and not self._cautious):
+                return
+            if falls and self._energy < energy:
+                return
+        if moved is None or self._energy >= energy:
+            self._cautious = True
+            self._accept(old)
+        self._follow_gradient()
+
+    def _newton_change(self) -> Array:
+        """Return the change of the tractions by the linear problem of the present cells."""
+        problem = self.problem
+        same = bool(np.array_equal(self.slipping, self._set))
+        self._set = self.slipping
+        free = FreeTractions(problem, self._normal, self._outward / problem.bound)
+        stop = max(_FORCING[same] * self.residual, 0.25 * problem.tolerance) * self._scale
+        return free.solution(self._left, stop=stop, limit=_MOST_ITERATIONS)
+
+    def _follow_gradient(self) -> None:
+        """Lower the energy by some projected steps along the slip, weighted by the bounds.
+
+        Where slip is large against what tractions displace, they follow its direction, and solving
+        for cells as if they stuck leads astray.
+        """
+        problem, bound = self.problem, self.problem.bound
+        ahead = bound * self.slip
+        moved = problem.grid.displacement_of(problem.cells, ahead)
+        length = float((bound * self.slip**2).sum()) / float(np.vdot(ahead, moved))
+        for _ in range(_GRADIENT_STEPS):
+            old, slip, energy = self.traction, self.slip, self._energy
+            for _ in range(_MOST_HALVINGS):
+                trial = problem.admissible(old + length * bound * slip)
+                if trial is not None:
+                    self._accept(trial)
+                    if self._energy <= energy:
+                        break
+                length *= 0.25
+            else:
+                self._accept(old)
+                return
+            change = self.traction - old
+            curvature = -float(np.vdot(change, self.slip - slip))
+            if not curvature > 0.0:
+                return
+            length = float((change**2 / bound).sum()) / curvature
+
+
+def _closest_motion(wanted: Array, normal: Array, weights: Array) -> Array:
+    """Return the shift of all cells that violates the conditions of slip least.
+
+    The weighted sum of the squares of what is left of the slip is convex in the shift. It counts
+    whole in cells that stick, and not along the traction where that points outwards in others.
+
+    Args:
+        wanted: Slip without the shift, shape (2, n) [mm].
+        normal: Directions of the tractions at the bound, 0 of those within it, shape (2, n).
+        weights: Weights of the cells, shape (n,).
+
+    Returns:
+        Shape (2,) [mm].
+    """
+    motion = -np.average(wanted, axis=1, weights=weights)
+    for _ in range(_MOST_MOTIONS):
+        slip = wanted + motion[:, None]
+        outward = (normal * slip).sum(axis=0)
+        free = normal * (outward > 0.0)
+        left = slip - free * outward
+        curvature = weights.sum() * np.eye(2) - (weights * free) @ free.T
+        change = -np.linalg.lstsq(curvature, left @ weights, rcond=1e-12)[0]
+        motion = motion + change
+        if np.abs(change).max() <= _ROUNDING * np.abs(slip).max():
+            break
+    return np.asarray(motion)
+
+
+def solve_tractions(problem: TractionProblem, start: Array) -> Tractions:
+    """Solve the traction problem.
+
+    Args:
+        problem: The traction problem.
+        start: Tractions / E* to start from, shape (2, n).
+
+    Raises:
+        NotConverged: When the residual stays above the tolerance, or the contact slides under a
+            prescribed force.
+
+    Source:
+        Stadler 2004, doi 10.1137/S1052623403420833, for friction with a given bound as a
+        semismooth Newton method; Hüeber, Stadler & Wohlmuth 2008, doi 10.1137/060671061, in two
+        directions.
+    """
+    used, limit = problem.grid.products, float(problem.bound.sum())
+    if problem.slides:
+        raise NotConverged(
+            "the tractions",
+            reason="the shear force exceeds what friction transmits: the contact slides",
+            iterations=0,
+            remedy="give a smaller shear force, or prescribe the shift",
+        )
+    if not limit > 0.0:
+        empty = np.zeros_like(start)
+        return Tractions(empty, np.zeros(2), empty, np.zeros(0, bool), 0.0, 0)
+    search = StickSlip(problem, start)
+    for _ in range(_MOST_STEPS):
+        if search.residual <= problem.tolerance:
+            return Tractions(
+                search.traction,
+                search.motion,
+                np.where(search.slipping, search._outward, 0.0) * search._normal,
+                problem.at_bounds(search.traction),
+                search.residual,
+                problem.grid.products - used,
+            )
+        search.step()
+    raise NotConverged(
+        f"the tractions (residual {search.residual:.1e}, asked {problem.tolerance:.1e})",
+        reason="the cells that slip were not found",
+        iterations=problem.grid.products - used,
+        remedy="take smaller steps of the shear",
+    )

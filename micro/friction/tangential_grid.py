@@ -1,0 +1,265 @@
+"""The half-space under tangential tractions on a grid of cells, by fast Fourier transforms.
+
+Tractions q are uniform on the cells, and tangential displacements u are those of their centres:
+
+    u = (1/(π E*)) ∫ [1/ρ + κ d dᵀ/ρ³] q dA,    κ = ν/(1 − ν),
+
+the point force of Cerruti integrated over cells. On a periodic grid each wave k has its own
+compliance (2/|k|) (I + κ (I − k kᵀ/k²)). Tractions are over E*, as pressures are, so that
+compliances are lengths. Two elastic bodies are one of their E* and of the ν that weights theirs by
+1/G.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from scipy import fft
+
+from micro.boundary_elements.half_space_grid import Cells, Field, fast_counts
+from micro.closed_forms.love import corner_parts
+from support.arrays import Array, Indices
+from support.cores import BLOCK, blocks, cores, in_threads
+
+Pair = tuple[float, float]
+
+
+def cerruti_kernels(grid: tuple[int, int], spacing: Pair, poisson_ratio: float) -> Array:
+    """Return displacements at cell (i, j) by uniform unit tractions on cell (0, 0).
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+        poisson_ratio: ν.
+
+    Returns:
+        Displacements along x by tractions along x, along y by y, and along x by y, shape
+        (3, nx, ny) [mm]. The first two are even in both distances, the last one is odd.
+
+    Source:
+        Cerruti's point force: Johnson, Contact Mechanics (1985), eq. 3.75.
+    """
+    u, v = ((np.arange(n + 1) - 0.5) * step for n, step in zip(grid, spacing, strict=True))
+    along_x, along_y = corner_parts(u[:, None], v)
+    parts = np.stack([along_x, along_y, -np.hypot(u[:, None], v)])
+    xx, yy, xy = np.diff(np.diff(parts, axis=1), axis=2) / np.pi
+    ratio = poisson_ratio / (1.0 - poisson_ratio)
+    return np.stack([xx + yy + ratio * xx, xx + yy + ratio * yy, ratio * xy])
+
+
+def padded_spectra(padded: tuple[int, int], spacing: Pair, poisson_ratio: float) -> Array:
+    """Return the transforms of Cerruti's kernels on a padded grid.
+
+    Args:
+        padded: Cells (mx, my) of the padded grid, even, at least twice the loaded ones.
+        spacing: Sides (dx, dy) of a cell [mm].
+        poisson_ratio: ν.
+
+    Returns:
+        Real quarter spectra of the kernels xx, yy and xy, shape (3, mx // 2 + 1, my // 2 + 1) [mm];
+        the last one changes its sign with each wave number.
+    """
+    half = padded[0] // 2 + 1, padded[1] // 2 + 1
+    kernels = cerruti_kernels(half, spacing, poisson_ratio)
+    spectra = np.zeros_like(kernels)
+    for kernel, spectrum in zip(kernels[:2], spectra, strict=False):
+        spectrum[:] = fft.dctn(kernel, type=1, workers=cores())
+    spectra[2, 1:-1, 1:-1] = -fft.dstn(kernels[2, 1:-1, 1:-1], type=1, workers=cores())
+    return spectra
+
+
+def periodic_spectra(grid: tuple[int, int], spacing: Pair, poisson_ratio: float) -> Array:
+    """Return the periodic compliance at the wave vectors of a grid.
+
+    The mean displacement is not determined. It is set to 0, as that under pressures is.
+
+    Args:
+        grid: Numbers of cells (nx, ny) of a period.
+        spacing: Sides (dx, dy) of a cell [mm].
+        poisson_ratio: ν.
+
+    Returns:
+        Real quarter spectra xx, yy and xy, shape (3, nx // 2 + 1, ny // 2 + 1) [mm].
+    """
+    kx = 2.0 * np.pi * fft.rfftfreq(grid[0], spacing[0])[:, None]
+    ky = 2.0 * np.pi * fft.rfftfreq(grid[1], spacing[1])
+    k, ratio = np.hypot(kx, ky), poisson_ratio / (1.0 - poisson_ratio)
+    normal = np.divide(2.0, k, out=np.zeros_like(k), where=k > 0.0)
+    across = ratio * np.divide(normal, k * k, out=np.zeros_like(k), where=k > 0.0)
+    mixed = -across * kx * ky
+    if grid[0] % 2 == 0:
+        mixed[-1] = 0.0  # waves of two cells run either way
+    if grid[1] % 2 == 0:
+        mixed[:, -1] = 0.0
+    return np.stack([normal + across * ky * ky, normal + across * kx * kx, mixed])
+
+
+class TangentialConvolution:
+    """Multiplication of two fields by a symmetric 2 × 2 spectrum, on all cores.
+
+    Rows and columns are transformed as those of `half_space_grid.Convolution` are. The result does
+    not depend on the number of threads.
+
+    Args:
+        spectra: Real quarter spectra xx, yy and xy, shape (3, mx // 2 + 1, my // 2 + 1); their
+            precision is that of the products.
+        grid: Cells (nx, ny) of the fields.
+        padded: Cells (mx, my) of the grid on which the convolution is circular.
+        work: Complex array of 2 nx (my // 2 + 1) numbers at least; overwritten by every call.
+    """
+
+    def __init__(
+        self, spectra: Field, grid: tuple[int, int], padded: tuple[int, int], work: Field
+    ) -> None:
+        self.grid, self.padded, self._spectra = grid, padded, spectra
+        self._work = work.ravel().view(np.result_type(spectra.dtype, np.complex64))
+
+    def __call__(self, fields: Field, rows: Indices) -> Field:
+        """Convolve two fields in place.
+
+        Args:
+            fields: Values on the cells of some rows of the grid, shape (2, r, ny); overwritten.
+            rows: Indices of these rows, shape (r,), zeros being on all others.
+
+        Returns:
+            ``fields``, holding the result on the same rows.
+        """
+        (mx, my), count, half = self.padded, len(rows), self.padded[0] // 2 + 1
+        work, waves = self._rows(count), self._spectra.shape[2]
+        dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
+        loaded = slice(rows[0], rows[-1] + 1) if dense else rows
+
+        def along_rows(here: slice) -> None:
+            work[:, here] = fft.rfft(fields[:, here], n=my, axis=2)
+
+        def along_columns(here: slice) -> None:
+            columns = np.zeros((2, mx, here.stop - here.start), work.dtype)
+            columns[:, loaded] = work[:, :, here]
+            columns = fft.fft(columns, axis=1, overwrite_x=True)
+            part, beyond = self._spectra[:, :, here], slice(mx - half, 0, -1)
+            _multiply(columns[:, :half], part, np.add)
+            _multiply(columns[:, half:], part[:, beyond], np.subtract)
+            work[:, :, here] = fft.ifft(columns, axis=1, overwrite_x=True)[:, loaded]
+
+        def back_along_rows(here: slice) -> None:
+            fields[:, here] = fft.irfft(work[:, here], n=my, axis=2)[:, :, : self.grid[1]]
+
+        size = 4 * work.itemsize
+        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        in_threads(along_columns, blocks(waves, max(BLOCK // mx, 128) // size))
+        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        return fields
+
+    def on_cells(self, cells: Cells, values: Array) -> Array:
+        """Convolve values on some cells, shape (2, n); return those of the same cells."""
+        scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
+        # the fields take the place of their own transforms, whose rows are at least as long
+        memory = self._rows(len(cells.rows)).view(self._spectra.dtype)
+        place = cells.row * memory.shape[2] + cells.column
+        fields, flat = memory[:, :, : self.grid[1]], memory.reshape(2, -1)
+        fields[:] = 0.0
+        flat[0, place], flat[1, place] = values / scale
+        self(fields, cells.rows)
+        return np.stack([flat[0, place], flat[1, place]]).astype(np.float64) * scale
+
+    def _rows(self, count: int) -> Field:
+        """Return the memory of transformed rows, shape (2, count, my // 2 + 1)."""
+        waves = self._spectra.shape[2]
+        return self._work[: 2 * count * waves].reshape(2, count, waves)
+
+
+def _multiply(columns: Field, matrix: Field, combine: np.ufunc) -> None:
+    """Multiply two fields' waves by a symmetric matrix, in place.
+
+    Args:
+        columns: The waves, shape (2, m, c).
+        matrix: Elements xx, yy and xy of the matrix, shape (3, m, c).
+        combine: `numpy.add`, or `numpy.subtract` where xy has the other sign.
+    """
+    (x, y), (xx, yy, xy) = columns, matrix
+    of_x, of_y = x * xy, y * xy
+    x *= xx
+    combine(x, of_y, out=x)
+    y *= yy
+    combine(y, of_x, out=y)
+
+
+class TangentialGrid:
+    """Tangential compliance of nx × ny cells of a half-space, and its approximate inverse.
+
+    The inverse is that of the kernel on a period as large as the grid, as under pressures.
+
+    Args:
+        grid: Numbers of cells (nx, ny).
+        spacing: Sides (dx, dy) of a cell [mm].
+        poisson_ratio: ν.
+        periodic: Whether tractions continue periodically; a half-space that is loaded on the grid
+            alone otherwise.
+
+    Attributes:
+        grid: Numbers of cells (nx, ny).
+        self_compliance: Displacement of a cell by a unit traction on it alone, nearly [mm].
+        products: Products with tractions so far; each is worth two with pressures.
+    """
+
+    def __init__(
+        self, grid: tuple[int, int], spacing: Pair, *, poisson_ratio: float, periodic: bool
+    ) -> None:
+        self.grid, self.products = grid, 0
+        padded = period = grid
+        if periodic:
+            spectra = periodic_spectra(grid, spacing, poisson_ratio)
+        else:
+            period = fast_counts(grid)
+            padded = 2 * period[0], 2 * period[1]
+            spectra = padded_spectra(padded, spacing, poisson_ratio)
+        self.self_compliance = float(cerruti_kernels((1, 1), spacing, poisson_ratio)[0, 0, 0])
+        waves = periodic_spectra(period, spacing, poisson_ratio)
+        # at the mean of a period, where the compliance vanishes, its largest value counts
+        waves[:2, 0, 0] = waves[:2].max()
+        inverse = np.stack([waves[1], waves[0], -waves[2]])
+        inverse /= waves[0] * waves[1] - waves[2] ** 2
+        work = np.empty(2 * grid[0] * (padded[1] // 2 + 1), complex)  # one for all: they take turns
+        self._exact = TangentialConvolution(spectra, grid, padded, work)
+        self._rough = TangentialConvolution(spectra.astype(np.float32), grid, padded, work)
+        self._inverse = TangentialConvolution(inverse.astype(np.float32), grid, period, work)
+
+    def displacement(self, tractions: Array) -> Array:
+        """Return the displacements of all cells by tractions / E*, shape (2, nx, ny) [mm].
+
+        Args:
+            tractions: The tractions along x and y, shape (2, nx, ny).
+        """
+        self.products += 1
+        return self._exact(tractions.copy(), np.arange(self.grid[0]))
+
+    def displacement_of(self, cells: Cells, tractions: Array) -> Array:
+        """Return the displacements of some cells by tractions / E* on them, shape (2, n) [mm].
+
+        Args:
+            cells: The cells.
+            tractions: The tractions on them, shape (2, n).
+        """
+        self.products += 1
+        return self._exact.on_cells(cells, tractions)
+
+    def roughly(self, cells: Cells, tractions: Array) -> Array:
+        """Return the same in single precision."""
+        self.products += 1
+        return self._rough.on_cells(cells, tractions)
+
+    def inverse(self, cells: Cells, displacements: Array) -> Array:
+        """Return very roughly the tractions / E* on some cells that displace them, (2, n).
+
+        Args:
+            cells: The cells.
+            displacements: Their displacements, shape (2, n) [mm].
+        """
+        return self._inverse.on_cells(cells, displacements)
+
+
+tangential_grid = lru_cache(maxsize=4)(TangentialGrid)
+"""Half-spaces on grids, the last few of them cached with their kernels and work arrays."""

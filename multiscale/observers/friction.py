@@ -1,0 +1,141 @@
+"""What friction adds to load steps: tangential stiffness, and what a report says of its limits.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from micro.friction.goodman import NeglectedCoupling
+from multiscale.couplings.coupling import Coupling
+from multiscale.loading.load_step import LoadStep
+from multiscale.observers.step_observers import StepObserver
+from multiscale.readable import Caution, number, percent, quantity
+
+_SAME = 1e-9
+"""Distance of two shears, relative to the largest, at which a loop counts as closed."""
+_MUCH = 0.1
+"""Neglected share of the shear force from which on a run warns of it."""
+
+
+class FrictionObserver(StepObserver):
+    """Adds the tangential stiffness to load steps with friction, and notes on what is left out.
+
+    Args:
+        coupling: What finds the load steps, with friction.
+    """
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        self._finds_stiffness = coupling.scene.output.contact != "none"
+        self._neglected: NeglectedCoupling | None = None
+
+    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+        """Return the load step with its tangential stiffness."""
+        solver = self._coupling.solver
+        if last:
+            self._neglected = solver.neglected_coupling()
+        if not self._finds_stiffness:
+            return step
+        found = solver.tangential_stiffness()
+        return replace(
+            step,
+            tangential_stiffness_N_per_mm=found.value,
+            linear_iterations=step.linear_iterations + found.iterations,
+        )
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what the last loop lost, and what friction leaves out."""
+        if loop := last_loop(steps):
+            yield loop
+        yield from self._coupling_notes()
+        yield from self._body_notes(steps)
+
+    def _coupling_notes(self) -> Iterator[str]:
+        if self._neglected is None:
+            return
+        found = self._neglected
+        if found.beta == 0.0:
+            yield "friction: two like bodies, whose pressures and tractions do not see each other"
+            return
+        change = found.force_change / found.force if found.force else 0.0
+        text = (
+            "friction after Goodman: of two unlike bodies (Dundurs' β = "
+            f"{number(found.beta, 3)}) it leaves out that pressures pull the surface sideways, by "
+            f"up to {quantity(found.sideways, 'mm', 2)} against the mean of the contact, and that "
+            f"tractions lift it, by up to {quantity(found.across, 'mm', 2)}. Pulled sideways "
+            f"first, a first loading to the last shift has a shear force of "
+            f"{quantity(found.force, 'N', 3)} that differs by {percent(change, 2)}"
+        )
+        yield Caution(text) if change > _MUCH else text
+
+    def _body_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what the shift leaves out of the body below the contact."""
+        coupling = self._coupling
+        if not coupling.has_body:
+            return
+        text = "shift and tangential stiffness are those of the contact on a half-space"
+        sheared = [step for step in steps if step.shear_force_x_N is not None]
+        if coupling.scene.block is None or not sheared:
+            yield f"{text}; the body's own shear comes on top"
+            return
+        height = coupling.scene.block.height_under(coupling.surface.lengths)
+        flexibility = height / (coupling.materials.first.shear_modulus * coupling.area)
+        force = max(_size(_force(step)) for step in sheared)
+        yield (
+            f"{text}; a block sheared as a whole would add up to "
+            f"{quantity(flexibility * force, 'mm', 2)} at the largest shear force"
+        )
+
+
+def last_loop(steps: Sequence[LoadStep]) -> str:
+    """Return what the last closed loop of the shear lost; empty where there is none.
+
+    The loss factor is the energy lost over 2π times ½ F s, with half the largest changes F of the
+    force and s of the shift.
+
+    Args:
+        steps: The load steps.
+    """
+    sheared = [step for step in steps if step.shear_force_x_N is not None]
+    if not sheared:
+        return ""
+    last, largest = sheared[-1], max(_size(_shift(step)) for step in sheared)
+
+    def returns(step: LoadStep) -> bool:
+        moved = _size(_shift(step) - _shift(last)) <= _SAME * largest
+        return moved and abs(step.force_N - last.force_N) <= _SAME * last.force_N
+
+    first = next((k for k in range(len(sheared) - 2, -1, -1) if returns(sheared[k])), None)
+    if first is None:
+        return ""
+    loop = sheared[first:]
+    force, shift = (
+        0.5 * float(np.ptp([along(step) for step in loop], axis=0).max())
+        for along in (_force, _shift)
+    )
+    if not (force and shift):
+        return ""
+    lost = (last.dissipated_mJ or 0.0) - (loop[0].dissipated_mJ or 0.0)
+    factor = lost / (np.pi * force * shift)
+    return (
+        f"friction: the loop from load step {loop[0].step} to {last.step} loses "
+        f"{quantity(lost, 'mJ', 4)}, with an amplitude of {quantity(shift, 'mm', 4)} and "
+        f"{quantity(force, 'N', 4)}; loss factor {number(factor, 3)}"
+    )
+
+
+def _force(step: LoadStep) -> np.ndarray:
+    return np.array([step.shear_force_x_N or 0.0, step.shear_force_y_N or 0.0])
+
+
+def _shift(step: LoadStep) -> np.ndarray:
+    return np.array([step.shear_x_mm or 0.0, step.shear_y_mm or 0.0])
+
+
+def _size(pair: np.ndarray) -> float:
+    return float(np.hypot(*pair))

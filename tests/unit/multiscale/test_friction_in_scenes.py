@@ -1,0 +1,291 @@
+"""Scenes with friction: what is solved, kept, written, said and refused."""
+
+from dataclasses import replace
+from functools import cache
+
+import h5py
+import numpy as np
+import pytest
+
+from geometry.shear_state import ShearControl
+from micro import HalfSpaceModel
+from micro.friction.friction_model import FrictionModel
+from multiscale import Run, Scene, make_setup, run
+from multiscale.cli import main
+from multiscale.loading.load_history import LoadHistory
+from multiscale.output.results import write_results
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.results.reading import read_history
+from support.errors import InputError, NotConverged
+
+SHIFT = 4e-4
+PATH = {
+    "force": "0.9 N",
+    "steps": 2,
+    "shear": [["0.4 um", "0 um"], ["-0.4 um", "0.1 um"], ["0.4 um", "0 um"]],
+    "shear_steps": 3,
+}
+
+
+def scene(kind="analytic", *, load=PATH, friction=0.3, periodic=False, **sections):
+    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
+    grid = {"grid": [24, 24], "lengths": [1.0, 1.0], "periodic": periodic}
+    data = {
+        "surface": {"spectrum": spectrum, **grid},
+        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
+        "patches": {"grid": [2, 2]},
+        "coupling": {"kind": kind},
+        "load": load,
+        "output": {"check": "none", "figures": False, "report": False},
+    }
+    if friction is not None:
+        data["friction"] = {"coefficient": friction}
+    return Scene.from_dict(data | sections)
+
+
+@cache
+def ran(kind, periodic=False):
+    return run(scene(kind, periodic=periodic))
+
+
+@pytest.mark.parametrize(
+    ("kind", "periodic"), [("analytic", False), ("analytic", True), ("concurrent", False)]
+)
+def test_the_plane_presses_then_shifts_there_and_back(kind, periodic):
+    history = ran(kind, periodic)
+    assert len(history) == 2 + 3 * 3
+    assert history.force_N[1:] == pytest.approx(0.9, rel=1e-10)
+    ends = history.shear_x_mm[[1, 4, 7, 10]], history.shear_y_mm[[1, 4, 7, 10]]
+    assert ends[0] == pytest.approx([0.0, SHIFT, -SHIFT, SHIFT])
+    assert ends[1] == pytest.approx([0.0, 0.0, SHIFT / 4, 0.0])
+    assert not history.shear_force_x_N[:2].any()
+    assert (history.shear_force_x_N[[4, 10]] > 0.0).all()
+    assert history.shear_force_x_N[7] < 0.0
+    assert np.hypot(history.shear_force_x_N, history.shear_force_y_N).max() < 0.3 * 0.9
+    assert (np.diff(history.dissipated_mJ) >= 0.0).all()
+    assert history.dissipated_mJ[-1] > 0.0
+    slip, area = history.slip_area_fraction, history.contact_area_fraction
+    assert ((slip >= 0.0) & (slip <= 1.2 * area)).all()  # the area is corrected, counts are not
+    # the first way from nothing: the more cells slip, the softer
+    stiffness = history.tangential_stiffness_N_per_mm[1:5]
+    assert (np.diff(stiffness) <= 0.0).all()
+    assert stiffness[-1] < 0.8 * stiffness[0]
+
+
+def test_the_scene_is_the_model():
+    made = make_setup(scene())
+    surface, materials = made.surface, made.materials
+    normal = HalfSpaceModel(surface, contact_modulus=materials.contact_modulus)
+    model = FrictionModel(materials=materials, coefficient=0.3, spacing=surface.spacing)
+    bare = run(scene(micro={"finite_slopes": False}))
+    state = None
+    for step in bare:
+        pressed = normal.solve_force(step.force_N)
+        shift = step.shear_x_mm, step.shear_y_mm
+        state = model.advance(state, pressed.pressures, ShearControl(shift=shift))
+        assert state.force == pytest.approx(
+            (step.shear_force_x_N, step.shear_force_y_N), rel=1e-5, abs=1e-7
+        )
+    assert state.dissipated == pytest.approx(step.dissipated_mJ, rel=1e-4)
+
+
+def test_a_shear_force_is_prescribed_and_goes_along_with_the_load():
+    along = {
+        "force": ["0.5 N", "0.9 N"],
+        "steps": 2,
+        "shear_force": [["0.1 N", "0 N"], ["0.1 N", "-0.2 N"]],
+        "shear_path": "along",
+    }
+    history = run(scene(load=along))
+    assert len(history) == 4
+    assert history.force_N == pytest.approx([0.25, 0.5, 0.7, 0.9])
+    assert history.shear_force_x_N == pytest.approx([0.05, 0.1, 0.1, 0.1], abs=1e-9)
+    assert history.shear_force_y_N == pytest.approx([0.0, 0.0, -0.1, -0.2], abs=1e-9)
+    assert (np.diff(history.shear_y_mm[1:]) < 0.0).all()
+
+
+def test_cycles_return_to_where_they_were():
+    twice = PATH | {"shear": PATH["shear"][1:], "shear_cycles": 2, "shear_steps": 2}
+    history = run(scene(load=twice))
+    assert len(history) == 2 + 2 * 2 * 2
+    assert history.shear_force_x_N[-1] == pytest.approx(history.shear_force_x_N[5], rel=0.05)
+    assert "the loop from load step" in " ".join(history.notes)
+
+
+def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path):
+    whole, path = ran("analytic"), tmp_path / "run.state"
+    first = Run(scene())
+    for step in first.load_steps():
+        if step.step == 6:
+            break
+    write_checkpoint(path, checkpoint_of(first, first.state()))
+    first.close()
+    stored, second = read_checkpoint(path), Run(scene())
+    second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)
+    rest = list(second.load_steps())
+    second.close()
+    assert [step.step for step in rest] == list(range(7, 12))
+    for name in ("shear_force_x_N", "shear_force_y_N", "dissipated_mJ", "force_N"):
+        found = [getattr(step, name) for step in rest]
+        # the normal contact is solved once more, to its tolerance
+        assert found == pytest.approx(list(getattr(whole, name)[6:]), rel=2e-6, abs=1e-9)
+
+
+def test_fields_columns_figure_and_report_are_written(tmp_path):
+    output = {"check": "none", "figures": True, "report": True, "contact": "all"}
+    whole = Run(scene(output=output))
+    list(whole.load_steps())
+    files = {path.name for path in write_results(tmp_path, whole, options=[])}
+    whole.close()
+    assert {"shear.png", "contact.h5", "report.html"} <= files
+    last = whole.history().steps[-1]
+    with h5py.File(tmp_path / "contact.h5") as file:
+        group = file[f"step_{last.step}"]
+        traction, pressure = group["traction_MPa"][:], group["pressure_MPa"][:]
+        slip, slipping = group["slip_mm"][:], group["slipping"][:]
+    assert traction.shape == slip.shape == (2, 24, 24)
+    size = np.hypot(*traction)
+    assert (size <= 0.3 * pressure * (1.0 + 1e-9)).all()
+    assert size[slipping] == pytest.approx(0.3 * pressure[slipping], rel=1e-9)
+    assert not slip[:, pressure == 0.0].any()
+    assert traction[0].sum() / 24**2 == pytest.approx(last.shear_force_x_N, rel=1e-9)
+    again = read_history(tmp_path)
+    assert again.shear_force_x_N == pytest.approx(whole.history().shear_force_x_N, rel=1e-9)
+    report = (tmp_path / "report.html").read_text()
+    for text in ("shear force along x", "coefficient of friction", "Which cells stick", "Goodman"):
+        assert text in report
+
+
+def test_what_is_neglected_is_measured_and_said():
+    notes = " ".join(ran("concurrent").notes)
+    assert "of two unlike bodies (Dundurs' β = 0.412)" in notes
+    assert "a block sheared as a whole would add up to" in notes
+    like = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
+    notes = " ".join(run(scene(counter_body=like)).notes)
+    assert "two like bodies, whose pressures and tractions do not see each other" in notes
+
+
+def test_the_plan_says_the_shear():
+    said = dict(make_setup(scene()).statements())["load"]
+    assert "then in 3 steps each to a shift of (400 nm, 0 mm), (-400 nm, 100 nm)" in said
+
+
+SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "text"),
+    [
+        ({"friction": -0.1}, "friction.coefficient", "greater than 0"),
+        ({"friction": 0.0}, "friction.coefficient", "greater than 0"),
+        ({"friction": "rough"}, "friction.coefficient", "must be a valid number"),
+        ({"friction": None}, "load.shear", "needs friction"),
+        (
+            {"friction": None, "load": {"force": 1.0, "shear_force": [0.1, 0.0]}},
+            "load.shear_force",
+            "needs friction",
+        ),
+        ({"load": {"force": 1.0}}, "friction", "has no effect without shear"),
+        ({"kind": "consistent"}, "friction", "does not go with coupling.kind = 'consistent'"),
+        ({"kind": "isolated"}, "friction", "does not go with coupling.kind = 'isolated'"),
+        ({"kind": "reference"}, "friction", "does not go with coupling.kind = 'reference'"),
+        ({"kind": "auto"}, "friction", "does not go with coupling.kind = 'auto'"),
+        ({"micro": {"model": "elliptic"}}, "friction", "which has no cells"),
+        ({"load": SHEARED | {"shear": ["1 um"]}}, "load.shear", "is no pair of quantities"),
+        ({"load": SHEARED | {"shear": ["1 N", "0 N"]}}, "load.shear", "mm"),
+        ({"load": SHEARED | {"shear": []}}, "load.shear", "is no pair of quantities"),
+        ({"load": SHEARED | {"shear": [0.0, 0.0]}}, "load.shear", "repeats a point, or starts"),
+        (
+            {"load": SHEARED | {"shear_force": [0.1, 0.0]}},
+            "load.shear_force",
+            "is a second shear load",
+        ),
+        ({"load": {"force": 1.0, "shear_steps": 3}}, "load.shear_steps", "needs 'shear'"),
+        ({"load": SHEARED | {"shear_cycles": 2}}, "load.shear_cycles", "needs two points"),
+        (
+            {"load": SHEARED | {"shear_path": "along", "shear_steps": 3}},
+            "load.shear_steps",
+            "does not go with shear_path = 'along'",
+        ),
+        (
+            {"load": SHEARED | {"shear_path": "along", "force": ["1 N", "2 N"]}},
+            "load.shear",
+            "has another number of points than the load",
+        ),
+        (
+            {"load": {"force": 1.0, "shear_force": [0.24, 0.18]}},
+            "load.shear_force",
+            "slides: friction transmits less than 0.3 N under 1 N",
+        ),
+    ],
+)
+def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
+    with pytest.raises(InputError) as caught:
+        scene(**({"load": SHEARED} | changes))
+    assert caught.value.key == key
+    assert text in str(caught.value)
+
+
+def test_laws_of_samples_have_no_friction():
+    with pytest.raises(InputError, match=r"law\.kind = .representative., which has no tang"):
+        scene(
+            load=SHEARED,
+            law={"kind": "representative"},
+            coupling={},
+            patches={},
+            block={"young_modulus": 4e3, "poisson_ratio": 0.15, "lengths": [4.0, 4.0]},
+        )
+
+
+def test_a_force_that_slides_ends_the_run_with_what_was_found(tmp_path, capsys):
+    path = tmp_path / "slides.toml"
+    path.write_text(
+        """
+[surface]
+spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.2, seed = 1 }
+grid = [16, 16]
+lengths = ["1 mm", "1 mm"]
+[block]
+young_modulus = "4 GPa"
+poisson_ratio = 0.15
+[friction]
+coefficient = 0.3
+[coupling]
+kind = "analytic"
+[load]
+approach = "8 um"
+steps = 1
+shear_force = ["1 kN", "0 N"]
+shear_steps = 1
+[output]
+figures = false
+report = false
+"""
+    )
+    assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 3
+    said = capsys.readouterr().err
+    assert "load step 2" in said
+    assert "exceeds what friction transmits: the contact slides" in said
+    assert len(read_history(tmp_path / "out")) == 1
+
+
+def test_a_step_that_slides_is_refused_in_python_too():
+    whole = Run(scene(load={"approach": 0.008, "steps": 1, "shear_force": [900.0, 0.0]}))
+    with pytest.raises(NotConverged, match="the contact slides"):
+        list(whole.load_steps())
+    whole.close()
+
+
+def test_halved_loads_take_their_part_of_the_shear():
+    loads = LoadHistory(
+        force=(2.0, 4.0), steps=1, shear=((1.0, 0.0), (1.0, 2.0)), shear_path="along"
+    )
+    assert loads.control_at(0.5).shear == ShearControl(shift=(0.5, 0.0))
+    assert loads.control_at(1.5).shear == ShearControl(shift=(1.0, 1.0))
+    assert loads.control_at(1.5).force == 3.0
+    after = replace(loads, shear_path="after", shear_steps=2)
+    assert [after.control_at(time).force for time in range(1, 7)] == [2.0] + 5 * [4.0]
+    assert after.count == 6
+    shears = [after.control_at(time).shear.shift for time in range(2, 7)]
+    assert shears == [(0.0, 0.0), (0.5, 0.0), (1.0, 0.0), (1.0, 1.0), (1.0, 2.0)]
+    assert after.control(4.0).shear is None
