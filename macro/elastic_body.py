@@ -134,6 +134,10 @@ class ElasticBody:
     held: Any
     linear: Any
 
+    def as_quadratic(self) -> ElasticBody:
+        """Return the same body with quadratic displacements; of linear ones."""
+        raise NotImplementedError
+
     @property
     def lattice(self) -> Lattice | None:
         """The rectangular lattice of the nodes; None where they form none."""

@@ -294,6 +294,17 @@ def checked(
         return probe.measure(*plane, start=start, turns=turns, stiffness=by_force)
 
     found = on_root_alone(comm, measured)
+    return with_errors(step, found, by_force=by_force)
+
+
+def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> LoadStep:
+    """Return a load step with measured errors.
+
+    Args:
+        step: The load step.
+        found: Its errors.
+        by_force: Whether the force is prescribed, and not the approach.
+    """
     force, approach = (
         each if math.isfinite(each) else None for each in (found.force, found.approach)
     )

@@ -266,12 +266,22 @@ class ContactForces:
     def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
         operator, samples = self._sampling.operator, self._sampling.values
         operator.multTranspose(x, samples)
-        stretch = samples.array_r
+        samples.array[:] = self._change(samples.array_r, slope, border)
+        operator.multAdd(samples, y, y)
+
+    def pressure_change(self, stretch: Array) -> Array:
+        """Return the change of pressures where samples close in, the plane following them.
+
+        Args:
+            stretch: What this rank's samples close in by, times their weights, shape (n,) [mm³].
+        """
+        return self._change(stretch, self.slope, self._border)
+
+    def _change(self, stretch: Array, slope: Array, border: Array) -> Array:
         pressure = slope * stretch
         if border.shape[1]:
             pressure -= border @ self.levers.summed(border.T @ stretch)
-        samples.array[:] = pressure
-        operator.multAdd(samples, y, y)
+        return np.asarray(pressure)
 
     def pressure(self, closure: Array) -> Array:
         """Return the laws' pressures at this rank's samples, shape (n,) [MPa].

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.rigid_plane import Control
+from geometry.rigid_plane import Control, RigidPlane
 from macro import compat
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
 from macro.contact.equations import Equilibrium
@@ -23,6 +23,7 @@ from macro.contact.first_steps import FirstSteps
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
+from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
@@ -32,8 +33,42 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 
+_LINEAR = 1e-9
+"""Relative residual of the response to the approach."""
+
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
+
+
+class ApproachResponse(NamedTuple):
+    """First order change of a contact with the approach of the plane.
+
+    Operators of body and laws are symmetric, so that it also tells what errors of laws change: the
+    force at the approach by ∫ λ Δp dA, where laws err by pressures Δp.
+
+    Attributes:
+        stiffness: dF/dδ [N/mm].
+        closing: λ, the change of this rank's closures with the approach, shape (n,); 0 where laws
+            have no stiffness.
+        closure: The closures, shape (n,) [mm].
+        sampling: The samples.
+    """
+
+    stiffness: float
+    closing: Array
+    closure: Array
+    sampling: Sampling
+
+    def force_changes(self, pressures: Array) -> Array:
+        """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
+
+        Args:
+            pressures: Their sizes at this rank's samples, shape (n,) [MPa].
+
+        Note:
+            Collective.
+        """
+        return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
 
 
 class LawContactProblem:
@@ -140,6 +175,61 @@ class LawContactProblem:
         if pressure.any():
             samples = pressure[self._sampling.patch]
             self.basis.add(self._displacement(samples)[0], samples)
+
+    def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
+        """Take a displacement for the latest solution, such as that on other elements.
+
+        Args:
+            displacement: This rank's owned displacements, preload included, shape (n,) [mm].
+            plane: The plane there.
+            body_state: Position among the states of what else loads the bodies, see `Control`.
+
+        Note:
+            Collective.
+        """
+        self._load_bodies(body_state)
+        start = self.equilibrium.body.stiffness.createVecRight()
+        start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
+        self._plane = np.array([plane.approach, *plane.tilt])
+        self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
+        self.basis.add(start, self.forces.pressure(self.forces.closure(start)))
+
+    def same_approach(self) -> Control:
+        """Return what prescribes the latest plane by its approach; it turns where it was free."""
+        approach, *slopes = map(float, self._plane)
+        control = self.forces.control
+        tilt = None if control.tilt is None else (slopes[0], slopes[1])
+        return replace(control, approach=approach, force=None, tilt=tilt)
+
+    def approach_response(self) -> ApproachResponse:
+        """Return what the latest equilibrium changes with the approach, to first order.
+
+        The plane turns with it where it is free to, so that its moments stay.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
+        forces.prescribe(self.same_approach(), self._plane)
+        stiffness = forces.stiffness(self._closure)
+        forces.linearise(stiffness)
+        self._preconditioner.update()
+        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        risen = forces.pressure_change(sampling.weight)
+        sampling.values.array[:] = risen
+        sampling.operator.mult(sampling.values, load)
+        solver = self.newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
+        solve_linear(solver, load, moved)
+        sampling.operator.multTranspose(moved, sampling.values)
+        change = risen - forces.pressure_change(sampling.values.array_r.copy())
+        compat.collect_garbage(load.comm)
+        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
+        return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""

@@ -308,6 +308,15 @@ class Coupling(SceneParts, ABC):
         """Say how the run will know its error."""
         return f"not measured: {self.unmeasured()}"
 
+    def measured_at(self, causes: Iterable[str]) -> str:
+        """Say at which load steps errors are measured.
+
+        Args:
+            causes: Their causes.
+        """
+        which = "every load step" if self.scene.output.check == "all" else "the last load step"
+        return f"measured at {which}, by cause: {', '.join(causes)}"
+
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""
         known = self.plane_at_largest_load is not None
@@ -366,6 +375,11 @@ class Coupling(SceneParts, ABC):
     @abstractmethod
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
+
+    @property
+    def checks_steps(self) -> bool:
+        """Whether further solutions measure the errors of load steps, see `checked`."""
+        return not self.unmeasured()
 
     # --- load steps
 

@@ -254,10 +254,9 @@ class MicroCoupling(PressedSurface):
         """Say how the run will know its error."""
         if self.unmeasured():
             return super().error_statement()
-        which = "every load step" if self.scene.output.check == "all" else "the last load step"
         body = ", body" if self.has_body else "; there is no block"
         laws = " and laws" * self.has_laws
-        return f"measured at {which}, by cause: grid, zero, slopes{body}{laws}"
+        return self.measured_at(("grid", "zero", f"slopes{body}{laws}"))
 
     def contact_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the contact and of its micro model."""

@@ -301,6 +301,11 @@ class ReferenceCoupling(PressedSurface):
         several = len(self.rough_meshes.shapes) > 1
         return "" if several else "one mesh has no error bar (reference.meshes = 2)"
 
+    @property
+    def checks_steps(self) -> bool:
+        """Further solutions measure nothing; the meshes of a load step do."""
+        return False
+
     def record(self) -> dict[str, Any]:
         """Return what the provenance of a run says of the coupling alone, by name."""
         made = self.made_solver

@@ -16,6 +16,7 @@ import numpy as np
 
 from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
+from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import Source
@@ -24,6 +25,14 @@ from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_surface
+from multiscale.law_errors import (
+    CHECKS_OF_SAMPLE,
+    LawErrorProbe,
+    causes_of,
+    check_cycles,
+    check_requests,
+    omission_notes,
+)
 from multiscale.law_solvers.embedded import ExtendedLaws
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -31,6 +40,8 @@ from multiscale.laws.refinement import MOST_ROWS
 from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
+from multiscale.machine import MemoryRequest
+from multiscale.measured_errors import ErrorProbe, with_errors
 from multiscale.readable import Caution, Observer, number, percent, quantity
 from support.arrays import Array
 
@@ -121,19 +132,67 @@ class RepresentativeCoupling(LawCoupling):
         rows = SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
         unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
         steps = step_count(self.scene.loading)
+        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
+        checks = 0 if self.unmeasured() else (steps if self.scene.output.check == "all" else 1)
         return Work(
             size=int(self.surface.heights.size),
-            solutions=float(rows),
+            solutions=float(rows + checks * CHECKS_OF_SAMPLE * len(self.rough_surfaces)),
             rows=rows,
             finite_slopes=self.finite_slopes,
             unknowns=unknowns,
-            cycles=unknowns * (SET_UP_CYCLES + 24 * steps),  # 6 to 60 a step on four parts
+            cycles=cycles + checks * check_cycles(self.shown_bodies),
             ranks=ranks,
         )
 
+    def memory_requests(self) -> Iterator[MemoryRequest]:
+        """Yield what a run needs memory for, that of measured errors included."""
+        yield from super().memory_requests()
+        if not self.unmeasured():
+            yield from check_requests({"body": self.body, "counter_body": self.counter})
+
     def unmeasured(self) -> str:
-        """Return why a run does not measure the errors of its load steps."""
-        return "laws of samples have no measure of it, but for errors between rows and scatter"
+        """Return why a run does not measure the errors of its load steps; empty where it does."""
+        return "output.check = 'none'" if self.scene.output.check == "none" else ""
+
+    def error_statement(self) -> str:
+        """Say how the run will know its error."""
+        if self.unmeasured():
+            return super().error_statement()
+        return self.measured_at(causes_of(self.samples))
+
+    # --- errors
+
+    def checked(self, step: LoadStep) -> LoadStep:
+        """Return a load step with its errors measured, by further steps on the same bodies."""
+        solver = self.solver
+        assert isinstance(solver, ExtendedLaws)
+        problem, state = solver.solved
+        probe = LawErrorProbe(
+            problem=problem,
+            face=solver.face,
+            state=state,
+            problem_of=lambda face: self._problem(face, solver.table),
+            laws=solver.table.laws,
+            samples=self.samples,
+            probe_of=self._probe_of,
+            comm=self.comm,
+        )
+        by_force = problem.forces.control.force is not None
+        return with_errors(step, probe.measure(), by_force=by_force)
+
+    def _probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
+        """Return what measures the errors of one sample."""
+        return ErrorProbe(
+            model=replace(self._model_of(region, sample), slopes=()),
+            on_body=on_body(None, region.materials, None),
+            order=SLOPES if self.finite_slopes else 0,
+        )
+
+    def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what measured errors leave out."""
+        measured = [step for step in steps if step.errors]
+        if measured:
+            yield from omission_notes(self.samples, measured[-1])
 
     # --- laws and load steps
 

@@ -56,6 +56,15 @@ class EmbeddedLaws(LawSolver):
         return self._last
 
     @property
+    def solved(self) -> tuple[LawContactProblem, FaceContactState]:
+        """The body with the laws on its face, and the contact at the latest load step.
+
+        Raises:
+            ValueError: Before the first load step.
+        """
+        return self._problem, self._known
+
+    @property
     def displacement(self) -> Array:
         """This rank's displacements at the latest load step; earlier ones are not kept [mm].
 

@@ -34,7 +34,7 @@ MOST_ROWS = 97
 
 _FIRST_ROWS = 17
 _BATCH = 8  # rows that are solved together, each starting from those before it
-_LEAST_LOAD = 0.03  # of the mean pressure at the end: smaller loads count as this much
+LEAST_LOAD = 0.03  # of the mean pressure at the end: smaller loads count as this much
 _LEAST_SLOPE = 0.1  # of the closure over the approach, in a stiffness
 _ERROR_OF_HALVES = 0.5  # of an interval's error
 
@@ -124,7 +124,7 @@ def refined(
     if end <= start or not rows.pressure[-1].any():
         return list(laws), 0.0
     most_rows = max(most_rows, 2 * _FIRST_ROWS - 1)  # each first interval is measured once
-    least = _LEAST_LOAD * float(rows.pressure[-1].mean())
+    least = LEAST_LOAD * float(rows.pressure[-1].mean())
     intervals = [(low, high, Errors()) for low, high in pairwise(approaches)]
     while (budget := min(_BATCH, most_rows - len(rows))) > 0:
         worst = np.array([errors.worst for _, _, errors in intervals])

@@ -169,7 +169,7 @@ class ErrorCheck(StepObserver):
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""
         asked = self._check == "all" or (self._check == "last" and last)
-        if not asked or self._coupling.cells is None or self._coupling.unmeasured():
+        if not asked or not self._coupling.checks_steps:
             return step
         # the plastic depth is then not that of rising loads, which the check solves for
         if self._coupling.scene.micro.hardness is not None and self._has_unloaded():

@@ -48,8 +48,9 @@ class SceneSections:
             ``"auto"`` or, with an accuracy, not stated (``surface.grid`` of a spectrum,
             ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws on a mesh,
             ``block.cells``) get values by a rule from errors that are measured before the run, the
-            same on every machine. The results say whether the error that is measured in the run
-            keeps the accuracy. Without it, ``auto`` means 2 %.
+            same on every machine. Under laws of samples (``law.kind = "representative"``) nothing
+            is chosen. The results say whether the error that is measured in the run keeps the
+            accuracy. Without it, ``auto`` means 2 %.
         surface: The rough surface.
         counter_surface: Roughness of the other side, which is smooth without this section: heights
             as measured on it, facing up, on the grid of ``[surface]``. It is laid on the surface
@@ -208,7 +209,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
             "law.kind = 'representative'",
         )
     other = scene.counter_surface
-    chosen = scene.accuracy is not None and other is None
+    chosen = scene.accuracy is not None and other is None and not scene.law.representative
     maps = [("law.regions", region) for region in scene.law.regions]
     for key, one in [("surface", scene.surface), ("counter_surface", other), *maps]:
         if one is not None and one.lacks_grid and not (chosen and key == "surface"):
@@ -248,12 +249,12 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
             "coupling.kind = 'consistent'",
         )
-    chosen = scene.accuracy is not None or "auto" in (coupling.kind, scene.surface.grid)
-    if scene.body is not None and chosen:
+    by_accuracy = scene.accuracy is not None and not scene.law.representative
+    if scene.body is not None and (by_accuracy or "auto" in (coupling.kind, scene.surface.grid)):
         yield (
             "accuracy",
             "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
-            "leave it out, and state them",
+            "leave it out, and state them; law.kind = 'representative' says whether it is kept",
         )
 
 
@@ -285,8 +286,6 @@ def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> It
         yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
     if scene.patches != type(scene.patches)():
         yield "patches.grid", f"does not go with {law}, which has no patches", out
-    if scene.accuracy is not None:
-        yield "accuracy", f"does not go with {law}", "coupling.table_tolerance"
     if scene.micro.model != "half-space":
         yield "micro.model", f"does not go with {law}", "'half-space'"
     if scene.output.contact in ("last", "all"):

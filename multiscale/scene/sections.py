@@ -265,7 +265,8 @@ class OutputSection:
         fields: Load steps whose displacements, stresses and contact pressures are written for
             ParaView: "last" (or true), "all", or a list of their numbers.
         check: Load steps whose errors are measured by solving further contact problems, where the
-            micro model is ``half-space``.
+            micro model is ``half-space``; under laws of samples the load step, too, on other
+            elements.
         contact: Load steps whose contact is written, with a row for every spot and, where the model
             has cells or nodes, maps of pressure and gap. With "all" the report has a slider over
             the load steps, whose pictures take half a second each. With laws the contact problem

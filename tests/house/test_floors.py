@@ -58,6 +58,7 @@ FLOORS = {
         "inputs",
         "bodies",
         "law_solvers measured_errors",
+        "law_errors",
         "couplings",
         "auto observers",
         "setup",

@@ -46,7 +46,12 @@ def sections(folder):
     warm = {**body, "thermal_expansion": "20 ppm/K"}
     parts = {"load": {"stage": stages, "tilt": "free"}}
     yield "stages", {**sample, **parts, "body": warm, "output": QUIET}
-    yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": QUIET}
+    measured = QUIET | {"check": "last"}
+    above["element"] = "quadratic"
+    yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": measured}
+    sample["law"] = sample["law"] | {"seeds": [1, 2, 3]}
+    load["load"] = {"approach": "6 um", "steps": 1, "tilt": [1e-3, 0]}
+    yield "errors", {**sample, **load, "body": body, "output": measured}
 
 
 def main(folder):
@@ -56,7 +61,9 @@ def main(folder):
         run = Run(Scene.from_dict(content), comm)
         list(run.load_steps())
         last = run.steps[-1]
-        found[name] = last.force_N, last.approach_mm, last.leak_mm3_per_s or 0.0
+        # errors are differences of forces
+        errors = [last.force_N + error for _, error in last.errors]
+        found[name] = last.force_N, last.approach_mm, last.leak_mm3_per_s or 0.0, *errors
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))

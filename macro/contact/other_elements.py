@@ -1,0 +1,131 @@
+"""A contact face on other elements of the same meshes, with another quadrature, on fewer cells.
+
+Theory: section 11 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from dolfinx import fem
+
+from geometry.meshes.block import BlockShape
+from macro.bodies import Block
+from macro.contact.face_contact_state import FaceContactState
+from macro.contact.face_pair import FacePair
+from macro.contact.law_problem import LawContactProblem
+from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
+from macro.elastic_body import ElasticBody
+from macro.mesh.block import block_mesh
+from macro.mesh.contact_face import top_facets
+from support.arrays import Array
+
+ChooseBody = Callable[[ElasticBody], ElasticBody]
+"""Returns a body on the same mesh, with displacements of any degree."""
+
+
+def bodies_of(face: ContactFace) -> list[ElasticBody]:
+    """Return the body under a face, or both."""
+    pair = [face.body.body, face.body.counter] if isinstance(face, FacePair) else [face.body]
+    return list[ElasticBody](pair)
+
+
+def quadratic_dofs(body: ElasticBody) -> int:
+    """Return the degrees of freedom that quadratic displacements have, or would have.
+
+    Args:
+        body: The body.
+
+    Note:
+        Collective. Tetrahedra have a node on every edge; hexahedra on faces and in cells, too.
+    """
+    if body.degree == 2:
+        return body.dofs
+    topology, count = body.mesh.mesh.topology, body.dofs // 3
+    for dimension in (1, 2, 3) if body.hexahedral else (1,):
+        topology.create_entities(dimension)
+        count += int(topology.index_map(dimension).size_global)
+    return 3 * count
+
+
+def face_on(face: ContactFace, choose: ChooseBody, finer: bool = False) -> ContactFace:
+    """Return the face on other elements.
+
+    Args:
+        face: The contact face of a body, or of two.
+        choose: Returns the bodies with these elements.
+        finer: Whether the quadrature is exact for polynomials of more than twice the degree that
+            it is now.
+
+    Note:
+        Collective.
+    """
+    if isinstance(face, FacePair):
+        return FacePair(_one_on(face.first, choose, finer), _one_on(face.second, choose, finer))
+    assert isinstance(face, LoadedFace)
+    return _one_on(face, choose, finer)
+
+
+def _one_on(face: LoadedFace, choose: ChooseBody, finer: bool) -> LoadedFace:
+    degree = face.quadrature_degree
+    return replace(face, body=choose(face.body), degree=2 * degree + 2 if finer else degree)
+
+
+def face_on_half(face: ContactFace) -> LoadedFace | None:
+    """Return the face of a block with half as many cells along every side; None where it has few.
+
+    Args:
+        face: The contact face; None comes back for bodies on meshes of their own.
+
+    Note:
+        Collective.
+    """
+    if not isinstance(face, LoadedFace) or not isinstance(face.body, Block):
+        return None
+    block, patches = face.body, face.patches
+    shape = block.mesh.shape
+    if not isinstance(shape, BlockShape) or not isinstance(patches, Outline):
+        return None
+    if min(shape.cells) < 4:
+        return None
+    x, y, z = (count // 2 for count in shape.cells)
+    mesh = block_mesh(replace(shape, cells=(x, y, z)), block.comm)
+    half = Block(mesh, block.material, block.sides)
+    coarse = LoadedFace.of_regions(half, (top_facets(mesh),), patches.lengths)
+    return replace(coarse, degree=face.quadrature_degree)
+
+
+def start_from_elements(
+    problem: LawContactProblem,
+    face: ContactFace,
+    known: FaceContactState,
+    before: ContactFace,
+    body_state: float = 0.0,
+) -> None:
+    """Take the solution on some elements for the latest one of a problem on others.
+
+    Args:
+        problem: The problem.
+        face: Its face.
+        known: A solution.
+        before: The face that it is of.
+        body_state: Position among the states of the bodies' loads there.
+
+    Note:
+        Collective.
+    """
+    parts, pairs = [], zip(bodies_of(before), bodies_of(face), strict=True)
+    whole = before.body.split(known.displacement) if isinstance(before, FacePair) else None
+    for part, (one, other) in zip(whole or [known.displacement], pairs, strict=True):
+        parts.append(part if one is other else _carried(part, one, other))
+    problem.start_at(np.concatenate(parts), known.plane, body_state)
+
+
+def _carried(displacement: Array, of: Any, to: Any) -> Array:
+    """Return this rank's displacements at the nodes of other elements on the same mesh."""
+    found = fem.Function(to.space)
+    found.interpolate(of.function(displacement))
+    return np.asarray(found.x.array[: to.owned_dofs].copy())

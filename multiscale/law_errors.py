@@ -1,0 +1,332 @@
+"""Errors of load steps under laws of samples, by cause, measured in the run.
+
+Each cause is varied while all others stay, under the plane of the load step: elements and
+quadrature of the body by solving the step again, from the known solution; the laws by what they err
+at the pressures of the step. To first order one linear solution tells what that changes: the
+response of the contact to the approach, which tells the error of the approach, too.
+
+Errors of elements are set in proportion to the change of the force from linear to quadratic ones.
+The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
+(docs/accuracy.md).
+
+The cells and the finite slopes of samples are judged as those of any contact problem, by
+`multiscale.measured_errors`, at the mean closure of every region. The scatter among samples gives
+the error of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's t.
+
+Theory: docs/theory.md, section 13.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.special import stdtrit
+
+from geometry import Control, Surface
+from multiscale.bodies.bodies import free_bodies
+from multiscale.inputs.bodies import BodyFacts
+from multiscale.inputs.memory import body_request
+from multiscale.inputs.surfaces import RegionSamples
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.refinement import LEAST_LOAD
+from multiscale.loading.load_step import LoadStep
+from multiscale.machine import MemoryRequest
+from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.readable import Caution
+from support.arrays import Array
+from support.collective import shared
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
+
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
+"""The causes, in their order."""
+MOST_CHECKED_UNKNOWNS = 400_000
+"""Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
+is measured for a block alone, by half of its cells along every side."""
+OF_LINEAR, OF_QUADRATIC, OF_HALF = 1.3, 0.3, 1.0
+"""Errors of linear and of quadratic elements over the change of the force from one to the other,
+and of linear ones over the change from half as many cells along every side."""
+CHECKS_OF_SAMPLE = 4
+"""Contact problems that measure the errors of one sample: 3 to 6."""
+_SHARE = 0.975
+"""Share of sets of samples whose mean lies less than the stated error too low, or too high."""
+_LEAST_SEPARATION = 1e-3
+"""Separation at which samples near full contact are judged, over that at zero closure."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawErrorProbe:
+    """Measures the errors of the latest load step on a face with laws of samples.
+
+    Args:
+        problem: The body with the laws on its contact face, at the load step.
+        face: The contact face.
+        state: The contact there.
+        problem_of: Returns the problem on another face of the same bodies.
+        laws: The laws of the regions.
+        samples: Their samples.
+        probe_of: Returns what measures the errors of one sample.
+        comm: MPI communicator; None for this process alone.
+    """
+
+    problem: LawContactProblem
+    face: LoadedFace | FacePair
+    state: FaceContactState
+    problem_of: Callable[[Any], LawContactProblem]
+    laws: Sequence[PatchLaw]
+    samples: Sequence[RegionSamples]
+    probe_of: Callable[[RegionSamples, Surface], ErrorProbe]
+    comm: Any = None
+
+    @cached_property
+    def control(self) -> Control:
+        """What prescribes the plane of the load step, by its approach."""
+        return self.problem.same_approach()
+
+    def measure(self) -> MeasuredErrors:
+        """Measure the errors of the force at the approach.
+
+        A plane that is free to turn does so in every comparison.
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+
+        Note:
+            Collective.
+        """
+        causes = causes_of(self.samples)
+        if not self.state.force:
+            return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
+        response = self.problem.approach_response()
+        closure, patch = response.closure, response.sampling.patch
+        pressure = self.state.sample_pressure
+
+        def changed(errors: Array) -> float:
+            return float(response.force_changes(errors).sum())
+
+        def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
+            found = np.zeros_like(closure)
+            for region, law in enumerate(self.laws):
+                here = patch == region
+                found[here] = function(law, closure[here])
+            return found
+
+        mesh, quadrature = self.discretisation()
+        factors = np.array([mean_error(region.surfaces) for region in self.samples])
+        scatter = by_region(lambda law, c: law.pressure_scatter(c))
+        parts = {
+            "mesh": mesh,
+            "quadrature": quadrature,
+            "laws": changed(by_region(interpolation_errors) * (pressure > 0.0)),
+            "samples": changed(factors[patch] * scatter),
+        }
+        forces = response.sampling.patch_sums(pressure)
+        weighted = response.sampling.patch_sums(pressure * closure)
+        means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
+        of_samples = self._of_samples(means, forces)
+        for row, cause in enumerate(("grid", "slopes")):
+            share = of_samples[row][patch]
+            # without load an unknown error is none
+            parts[cause] = changed(np.where(pressure > 0.0, share, 0.0) * pressure)
+        return MeasuredErrors(
+            parts={cause: parts[cause] for cause in causes}, stiffness=response.stiffness
+        )
+
+    # --- elements
+
+    def discretisation(self) -> tuple[float, float]:
+        """Return the errors of the force by elements and by quadrature [N].
+
+        The first is infinite where the elements are linear and quadratic ones too many.
+
+        Note:
+            Collective.
+        """
+        from macro.contact.other_elements import bodies_of, face_on
+
+        own, force = bodies_of(self.face), self.state.force
+        points = self._force_on(face_on(self.face, lambda body: body, finer=True))
+        mesh = 0.0
+        if any(body.degree == 2 for body in own):
+            lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
+            mesh += OF_QUADRATIC * abs(self._force_on(lowered) - force)
+        if any(body.degree == 1 for body in own):
+            mesh += self._of_linear(own, points)
+        return mesh, abs(points - force)
+
+    def _of_linear(self, own: Sequence[Any], points: float) -> float:
+        """Return the error of linear elements [N]; infinite where it is not measured.
+
+        Args:
+            own: The bodies.
+            points: Force on them with a finer quadrature [N].
+        """
+        from macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
+
+        made = list[Any]()
+
+        def raised(body: Any) -> Any:
+            if body.degree == 1:
+                made.append(body.as_quadratic())
+            return made[-1] if body.degree == 1 else body
+
+        if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
+            other: Any = face_on(self.face, raised, finer=True)
+            error = OF_LINEAR * abs(self._force_on(other) - points)
+        else:
+            other = face_on_half(self.face)
+            if other is None:
+                return math.inf
+            made.append(other.body)
+            error = OF_HALF * abs(self._force_on(other, same=False) - self.state.force)
+        del other
+        free_bodies(made)
+        return error
+
+    def _force_on(self, face: Any, *, same: bool = True) -> float:
+        """Return the force under the same plane on another face [N].
+
+        Args:
+            face: The face.
+            same: Whether its meshes are the same.
+        """
+        from macro.contact.other_elements import start_from_elements
+
+        problem = self.problem_of(face)
+        if same:
+            start_from_elements(problem, face, self.state, self.face, self.control.body_state)
+        else:
+            problem.start_from(self.state.patch_pressure)
+        return problem.solve(self.control).force
+
+    # --- samples
+
+    def _of_samples(self, closures: Array, forces: Array) -> Array:
+        """Return the errors of pressures by cells and finite slopes, relative, (2, regions).
+
+        Args:
+            closures: Mean closures of the regions, weighted by pressure, shape (regions,) [mm].
+            forces: Forces on them [N].
+        """
+        tasks = [
+            (number, sample)
+            for number, region in enumerate(self.samples)
+            for sample in region.surfaces
+            if forces[number] > 0.0
+        ]
+
+        def measure(task: int) -> tuple[float, float, float]:
+            number, sample = tasks[task]
+            probe = self.probe_of(self.samples[number], sample)
+            reference = probe.model.reference_height - sample.mean_height
+            separation = self.laws[number].initial_separation - float(closures[number])
+            approach = reference - max(separation, _LEAST_SEPARATION * reference)
+            force = probe.on_body(probe.model, probe.order).press(Control(approach=approach)).force
+            if not force:  # the closure is that of others of the samples
+                return 0.0, 0.0, 0.0
+            parts = probe.measure(force, approach, (0.0, 0.0)).parts
+            return parts["grid"], parts["slopes"], force
+
+        found = shared(self.comm, len(tasks), measure)
+        sums = np.zeros((3, len(self.samples)))
+        for (number, _), errors in zip(tasks, found, strict=True):
+            sums[:, number] += errors
+        return np.divide(sums[:2], sums[2], out=np.zeros_like(sums[:2]), where=sums[2] > 0.0)
+
+
+def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
+    """Return the causes of errors that are measured.
+
+    Args:
+        samples: Those of every region; single ones tell no error of their mean.
+    """
+    several = any(len(region.surfaces) > 1 for region in samples)
+    return [cause for cause in CAUSES if several or cause != "samples"]
+
+
+def _raised(bodies: Iterable[BodyFacts | None]) -> list[tuple[BodyFacts, int]]:
+    """Return bodies that are solved with quadratic elements, and their unknowns then."""
+    linear = [(body, 8 * body.unknowns) for body in bodies if body and body.degree == 1]
+    affordable = sum(unknowns for _, unknowns in linear) <= MOST_CHECKED_UNKNOWNS
+    return linear if affordable else []
+
+
+def check_cycles(bodies: Sequence[BodyFacts]) -> float:
+    """Return unknowns times multigrid cycles that measuring the errors of a load step takes.
+
+    Args:
+        bodies: What is known of the bodies.
+    """
+    # 40 to 90 on the mesh itself, with finer quadrature and for the response; others from nothing
+    own = 60.0 * sum(body.unknowns for body in bodies)
+    return own + 80.0 * sum(unknowns for _, unknowns in _raised(bodies))
+
+
+def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryRequest]:
+    """Yield the memory that measuring the errors of a load step takes beside that of the run.
+
+    Args:
+        bodies: What is known of the bodies, by their section of the scene.
+    """
+    raised = dict(_raised(bodies.values()))
+    for key, body in bodies.items():
+        if body in raised:
+            asked = body_request(key, f"{body.element[0]}2", raised[body], 0, in_parts=True)
+            purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
+            yield replace(asked, key="output.check", purpose=purpose)
+
+
+def interpolation_errors(law: PatchLaw, closure: Array) -> Array:
+    """Return what a law may err between its rows at closures [MPa].
+
+    Its error is relative to the pressure, or to a small share of its largest where that is more.
+
+    Args:
+        law: The law.
+        closure: Closures, shape (n,) [mm].
+    """
+    least = LEAST_LOAD * float(law.rows.pressure.max(initial=0.0))
+    return np.asarray(law.interpolation_error * np.maximum(law.pressure(closure), least))
+
+
+def mean_error(samples: Sequence[Surface]) -> float:
+    """Return the error of the mean of samples over the standard deviation among them.
+
+    It is not exceeded in 19 of 20 sets of as many; 0 for a single sample, whose scatter is unknown.
+
+    Args:
+        samples: The samples, which count by their areas.
+
+    Source:
+        Student, Biometrika 6 (1908), 1-25.
+    """
+    areas = np.array([sample.area for sample in samples])
+    count = float(areas.sum() ** 2 / (areas @ areas))
+    return float(stdtrit(count - 1.0, _SHARE)) / math.sqrt(count) if count > 1.0 else 0.0
+
+
+def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:
+    """Yield what the measured errors of a load step leave out.
+
+    Args:
+        samples: Those of every region.
+        step: The load step.
+    """
+    alone = [region.name for region in samples if len(region.surfaces) == 1]
+    if alone:
+        yield (
+            f"{', '.join(alone)}: the error is that for this one sample of the roughness; what "
+            "others would change is not known (law.seeds gives a spectrum several)"
+        )
+    if math.inf in [error for cause, error in step.errors if cause == "mesh"]:
+        yield Caution(
+            "the error by mesh was not measured: quadratic elements, which would tell that of "
+            f"linear ones, have more than {MOST_CHECKED_UNKNOWNS} unknowns on this mesh; take a "
+            "coarser mesh with quadratic elements, whose error linear ones tell"
+        )

@@ -1,0 +1,343 @@
+"""Bodies under laws, drawn at random: shapes, cells, elements, laws and controls.
+
+Outlines in the plane of x and z are extruded along y: a plate on two feet, a wide base with a foot
+whose end is the contact face, a pad of two materials, a wedge. A quarter of a ring stands on
+rollers. The support is the lowest plane, the contact face the highest.
+"""
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
+from geometry.meshes.gmsh_session import gmsh_session
+from geometry.rigid_plane import Control
+from macro import LawContactProblem, LoadedFace, Material, MeshedBody, Support, contact_facets
+from macro.mesh.tagged import planar_face
+from multiscale.law_errors import LawErrorProbe
+
+from .refined_mesh import refined, tagged
+
+SHAPES = "feet", "foot", "pad", "ring", "wedge"
+FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}
+_SLACK = 1e-6
+
+
+class Exponential:
+    """p = a (exp(c / s) − 1)."""
+
+    def __init__(self, pressure, length):
+        self._pressure, self._length = pressure, length
+
+    def pressure(self, closure):
+        return self._pressure * np.expm1(np.clip(closure / self._length, 0.0, 60.0))
+
+    def stiffness(self, closure):
+        grown = np.exp(np.clip(closure / self._length, 0.0, 60.0))
+        return np.where(closure > 0.0, self._pressure * grown / self._length, 0.0)
+
+
+class Power:
+    """p = k c^m."""
+
+    def __init__(self, factor, power):
+        self._factor, self._power = factor, power
+
+    def pressure(self, closure):
+        return self._factor * np.maximum(closure, 0.0) ** self._power
+
+    def stiffness(self, closure):
+        return self._factor * self._power * np.maximum(closure, 0.0) ** (self._power - 1.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomBody:
+    """A body and its load.
+
+    Args:
+        shape: One of `SHAPES`.
+        hexahedra: Whether its cells are hexahedra.
+        order: Degree of the displacements.
+        size: Length of the cells [mm].
+        length: A length of the shape, and further ones relative to it, shape (4,).
+        materials: Of the volumes, from the support up.
+        law: The law of the whole face.
+        pressure: Mean pressure of the load [MPa].
+        tilt: Slopes of the plane; None: free to turn.
+    """
+
+    shape: str
+    hexahedra: bool
+    order: int
+    size: float
+    length: float
+    ratios: tuple[float, ...]
+    materials: tuple[Material, Material]
+    law: object
+    pressure: float
+    tilt: tuple[float, float] | None
+
+    @property
+    def name(self):
+        """What it is, in short."""
+        cells = f"{'Q' if self.hexahedra else 'P'}{self.order}"
+        turns = "free" if self.tilt is None else "held" if any(self.tilt) else "level"
+        return f"{self.shape}, {cells}, {type(self.law).__name__.lower()} law, {turns}"
+
+
+_CELLS = {"P1": (3.0, 7.0), "Q1": (5.0, 10.0), "P2": (2.0, 4.0), "Q2": (3.0, 6.0)}
+"""Cells along the length of a body, at least and at most: 300 to 8000 unknowns."""
+
+
+def drawn(seed, *, coarser=1.0):
+    """Return a random body; shapes follow in turn.
+
+    Args:
+        seed: Its number.
+        coarser: How many times as long its cells are.
+    """
+    rng = np.random.default_rng([31, seed])
+    length = float(rng.uniform(8.0, 40.0))
+    modulus = float(np.exp(rng.uniform(np.log(2e3), np.log(210e3))))
+    pressure = float(np.exp(rng.uniform(np.log(0.3), np.log(15.0)))) * modulus / 2e5
+    # roughness over what the body gives way by, from stiff to soft laws
+    closure = float(np.exp(rng.uniform(np.log(0.01), np.log(1.0)))) * pressure / modulus * length
+    law = (
+        Exponential(pressure / np.expm1(5.0), closure / 5.0)
+        if rng.random() < 0.6
+        else Power(pressure / closure ** (power := float(rng.uniform(1.0, 3.0))), power)
+    )
+    # held ones lift a part of some faces off the plane
+    tilts = (0.0, 0.0), tuple(rng.uniform(-2.0, 2.0, 2) * pressure / modulus), None
+    hexahedra, order = bool(rng.random() < 0.5), int(rng.integers(1, 3))
+    cells = float(rng.uniform(*_CELLS[f"{'Q' if hexahedra else 'P'}{order}"]))
+    return RandomBody(
+        shape=SHAPES[seed % len(SHAPES)],
+        hexahedra=hexahedra,
+        order=order,
+        size=coarser * length / cells,
+        length=length,
+        ratios=tuple(map(float, rng.uniform(0.25, 0.75, 4))),
+        materials=(
+            Material(young_modulus=modulus, poisson_ratio=float(rng.uniform(0.0, 0.4))),
+            Material(
+                young_modulus=modulus * float(np.exp(rng.uniform(-2.0, 0.0))),
+                poisson_ratio=float(rng.uniform(0.0, 0.4)),
+            ),
+        ),
+        law=law,
+        pressure=pressure,
+        tilt=tilts[int(rng.integers(3))],
+    )
+
+
+def arrays_of(body):
+    """Return its mesh as arrays; call it on one rank."""
+    sections, height = _sections(body)
+    return _hexahedra(body, sections, height) if body.hexahedra else _tetrahedra(
+        body, sections, height
+    )  # fmt: skip
+
+
+def _sections(body):
+    """Return quadrilaterals that a section consists of, row by row, and the height of the top.
+
+    A section is a lattice of corners, shape (columns + 1, rows + 1, 2), in which some
+    quadrilaterals have a volume, shape (columns, rows): its number from 1 on, or 0 for none.
+    """
+    a, (r, s, t, _) = body.length, body.ratios
+    h = a * (0.5 + s)
+    if body.shape == "ring":  # radii and angles
+        radii, angles = [a * (1.0 - 0.6 * r), a], [0.0, 0.5 * np.pi]
+        return (_lattice(radii, angles), np.ones((1, 1), int)), a * 0.6 * s
+    if body.shape == "feet":
+        volumes = np.array([[1, 1], [0, 1], [1, 1]])
+        return (_lattice([0, 0.4 * r * a, a - 0.4 * t * a, a], [0, s * h, h]), volumes), h
+    if body.shape == "foot":
+        volumes = np.array([[1, 0], [1, 1], [1, 0]])
+        return (_lattice([0, 0.5 * r * a, a - 0.5 * t * a, a], [0, 0.6 * h, h]), volumes), h
+    if body.shape == "pad":
+        return (_lattice([0, a], [0, r * h, h]), np.array([[1, 2]])), h
+    corners = [[(0, 0), (0.3 * t * a, h)], [(a, 0), (a * (0.5 + r), h)]]
+    return (np.array(corners, float), np.ones((1, 1), int)), h
+
+
+def _lattice(x, z):
+    return np.stack(np.meshgrid(x, z, indexing="ij"), axis=2).astype(float)
+
+
+def _hexahedra(body, section, height):
+    """Return a lattice of hexahedra, without the parts that have no volume."""
+    corners, volumes = section
+    depth = height if body.shape == "ring" else body.length * body.ratios[3]
+    spans = [np.linalg.norm(np.diff(corners, axis=k), axis=2).max(axis=1 - k) for k in (0, 1)]
+    if body.shape == "ring":
+        spans[1] = spans[1] * body.length
+    counts = [np.maximum(np.round(span / body.size).astype(int), 2) for span in spans]
+    layers = max(2, round(depth / body.size))
+    u, v = (np.concatenate([k + np.arange(n) / n for k, n in enumerate(c)] + [[len(c)]])
+            for c in counts)  # fmt: skip
+    flat = _between(corners, *np.meshgrid(u, v, indexing="ij"))
+    if body.shape == "ring":
+        flat = np.stack([flat[..., 0] * np.cos(flat[..., 1]), flat[..., 0] * np.sin(flat[..., 1])],
+                        axis=2)  # fmt: skip
+    along = np.linspace(0.0, depth, layers + 1)
+    points = np.concatenate(
+        [np.broadcast_to(flat[:, :, None], (*flat.shape[:2], layers + 1, 2)),
+         np.broadcast_to(along[:, None], (*flat.shape[:2], layers + 1, 1))], axis=3
+    )  # fmt: skip
+    order = [0, 1, 2] if body.shape == "ring" else [0, 2, 1]  # x and y, or x and z, in the section
+    points = points[..., order].reshape(-1, 3)
+    number = np.arange(len(points)).reshape(len(u), len(v), layers + 1)
+    where = volumes[np.repeat(np.arange(len(counts[0])), counts[0])]
+    where = where[:, np.repeat(np.arange(len(counts[1])), counts[1])]
+    tags = np.repeat(where[:, :, None], layers, axis=2)
+    cells = np.stack(
+        [number[i : len(u) - 1 + i, j : len(v) - 1 + j, k : layers + k]
+         for k in (0, 1) for j in (0, 1) for i in (0, 1)], axis=3
+    )[tags > 0]  # fmt: skip
+    used, cells = np.unique(cells, return_inverse=True)
+    cells, points = cells.reshape(-1, 8), points[used]
+    sides = [(0, 1, 3, 2), (4, 5, 7, 6), (0, 1, 5, 4), (2, 3, 7, 6), (0, 2, 6, 4), (1, 3, 7, 5)]
+    quads = cells[:, sides].reshape(-1, 4)
+    facets, facet_tags = [], []
+    for name, axis, place in _surfaces(height):
+        on = np.all(np.abs(points[quads, axis] - place) < _SLACK, axis=1)
+        facets.append(quads[on])
+        facet_tags.append(np.full(int(on.sum()), FACES[name], np.int32))
+    return MeshArrays(
+        points=points,
+        cells=cells,
+        cell_tags=tags[tags > 0].astype(np.int32),
+        facets=np.concatenate(facets),
+        facet_tags=np.concatenate(facet_tags),
+        cell_names={str(number): int(number) for number in np.unique(tags[tags > 0])},
+        facet_names=FACES,
+    )
+
+
+def _between(corners, u, v):
+    """Return points of a lattice of corners at bilinear coordinates."""
+    i, j = (np.minimum(w.astype(int), n - 2) for w, n in zip((u, v), corners.shape, strict=False))
+    s, t = (u - i)[..., None], (v - j)[..., None]
+    low = (1 - s) * corners[i, j] + s * corners[i + 1, j]
+    return (1 - t) * low + t * ((1 - s) * corners[i, j + 1] + s * corners[i + 1, j + 1])
+
+
+def _surfaces(height):
+    return [("support", 2, 0.0), ("contact", 2, height), ("x", 0, 0.0), ("y", 1, 0.0)]
+
+
+def _tetrahedra(body, section, height):
+    """Return a mesh of tetrahedra by gmsh."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "body.msh"
+        with gmsh_session(body.shape) as gmsh:
+            volumes = _volumes(gmsh.model.occ, body, section)
+            gmsh.model.occ.synchronize()
+            if body.shape == "pad":
+                for number, volume in enumerate(volumes, start=1):
+                    gmsh.model.addPhysicalGroup(3, [volume], number)
+            else:
+                gmsh.model.addPhysicalGroup(3, volumes, 1)
+            for name, axis, place in _surfaces(height):
+                box = np.array([[-1e3] * 3, [1e3] * 3])
+                box[:, axis] = place - _SLACK, place + _SLACK
+                found = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box.ravel(), 2)]
+                if found:
+                    gmsh.model.addPhysicalGroup(2, found, FACES[name])
+                    gmsh.model.setPhysicalName(2, FACES[name], name)
+            for option in ("MeshSizeMax", "MeshSizeMin"):
+                gmsh.option.setNumber(f"Mesh.{option}", body.size)
+            gmsh.option.setNumber("Mesh.Binary", 1)
+            gmsh.model.mesh.generate(3)
+            gmsh.write(str(path))
+        return read_gmsh_file(path)
+
+
+def _volumes(occ, body, section):
+    """Make the volumes, those of a pad from the support up."""
+    a, (corners, parts) = body.length, section
+    if body.shape == "ring":
+        inner = corners[0, 0, 0]
+        disc = occ.intersect(
+            [(2, occ.addDisk(0, 0, 0, a, a))], [(2, occ.addRectangle(0, 0, 0, a, a))]
+        )[0]
+        faces = occ.cut(disc, [(2, occ.addDisk(0, 0, 0, inner, inner))])[0]
+        way = (0.0, 0.0, 0.6 * a * body.ratios[1])
+    else:
+        way = (0.0, a * body.ratios[3], 0.0)
+        faces = [_quadrilateral(occ, corners[i : i + 2, j : j + 2]) for i, j in np.argwhere(parts)]
+    occ.extrude(faces, *way)
+    if len(faces) > 1:
+        occ.removeAllDuplicates()
+    return [tag for _, tag in occ.getEntities(3)]
+
+
+def _quadrilateral(occ, corners):
+    around = corners[[0, 1, 1, 0], [0, 0, 1, 1]]
+    points = [occ.addPoint(x, 0.0, z) for x, z in around]
+    pairs = zip(points, points[1:] + points[:1], strict=True)
+    return 2, occ.addPlaneSurface([occ.addCurveLoop([occ.addLine(p, q) for p, q in pairs])])
+
+
+def problem_on(body, arrays, comm):
+    """Return the contact face of a random body on a mesh, and what makes a problem on a face."""
+    mesh = tagged(arrays, comm)
+    names = mesh.facet_names
+    fixed = (None, None, 0.0) if body.shape == "ring" else (0.0, 0.0, 0.0)
+    held = [Support(tag=names["support"], displacement=fixed)]
+    if body.shape == "ring":
+        held.append(Support(tag=names["x"], displacement=(0.0, None, None)))
+        held.append(Support(tag=names["y"], displacement=(None, 0.0, None)))
+    tags = sorted(mesh.cell_names.values())
+    materials = dict(zip(tags, body.materials, strict=False))
+    whole = materials if len(tags) > 1 else body.materials[0]
+    elastic = MeshedBody(mesh, whole, held, order=body.order)
+    plane = planar_face(mesh, names["contact"])
+    facets = contact_facets(mesh.mesh, mesh.facet_tags.find(names["contact"]), plane.frame)
+    face = LoadedFace.of_regions(elastic, (facets,), plane.lengths)
+    return face, lambda other: LawContactProblem(other, [body.law], "pointwise")
+
+
+def stated_and_true(body, comm, *, refinements=2):
+    """Return the measured errors of a random body, and the forces on refined meshes.
+
+    Args:
+        body: The body.
+        comm: MPI communicator.
+        refinements: Uniform refinements.
+
+    Returns:
+        A record with `dofs` of the meshes, `forces` on them at the same approach [N], `mesh` and
+        `quadrature`, the measured errors [N].
+    """
+    arrays = comm.bcast(arrays_of(body) if comm.rank == 0 else None)
+    face, problem_of = problem_on(body, arrays, comm)
+    problem = problem_of(face)
+    load = body.pressure * float(face.areas.sum())
+    state = problem.solve(Control(force=load, tilt=body.tilt))
+    probe = LawErrorProbe(
+        problem=problem,
+        face=face,
+        state=state,
+        problem_of=problem_of,
+        laws=(),
+        samples=(),
+        probe_of=None,
+        comm=comm,
+    )
+    mesh, quadrature = probe.discretisation()
+    dofs, forces = [face.body.dofs], [state.force]
+    same = Control(approach=state.approach, tilt=body.tilt)
+    for _ in range(refinements):
+        arrays = comm.bcast(refined(arrays) if comm.rank == 0 else None)
+        finer, problem_of = problem_on(body, arrays, comm)
+        forces.append(problem_of(finer).solve(same).force)
+        dofs.append(finer.body.dofs)
+    return SimpleNamespace(
+        dofs=dofs, forces=np.array(forces), mesh=mesh, quadrature=quadrature, load=load
+    )

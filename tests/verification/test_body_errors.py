@@ -1,0 +1,53 @@
+"""Measured errors of bodies under laws against refined meshes; study: benchmarks/body_errors."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.random_bodies import FACES, arrays_of, drawn, problem_on, stated_and_true
+from helpers.refined_mesh import refined
+from mpi4py import MPI
+
+from geometry import Control
+
+
+@pytest.mark.parametrize("seed", [1, 4, 12, 14])  # P2, P1, Q2, Q1; foot, wedge, pad
+def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
+    found = stated_and_true(drawn(seed, coarser=1.4), MPI.COMM_SELF, refinements=1)
+    # one refinement leaves a quarter to a third of the error
+    true = 1.5 * abs(found.forces[1] - found.forces[0])
+    assert 1e-4 * found.load < true < 1.5 * (found.mesh + found.quadrature)
+    assert found.mesh < 6.0 * true
+
+
+@pytest.mark.parametrize("seed", [3, 9])  # hexahedra of a ring, tetrahedra of a wedge
+def test_refinement_keeps_volumes_and_faces_and_halves_cells(seed):
+    body = drawn(seed)
+    once = arrays_of(body)
+    twice, count = refined(once), once.cells.shape[1]
+    assert len(twice.cells) == 8 * len(once.cells)
+    faces = [problem_on(body, arrays, MPI.COMM_SELF)[0] for arrays in (once, twice)]
+    assert faces[1].areas == pytest.approx(faces[0].areas, rel=1e-12)
+    # nodes of quadratic elements are the vertices of cells half as long
+    assert len(twice.points) == problem_on(body, once, MPI.COMM_SELF)[0].body.dofs // 3
+    for name, tag in FACES.items():
+        assert np.sum(twice.facet_tags == tag) == 4 * np.sum(once.facet_tags == tag), name
+    if count == 4:
+        edges = [mesh.points[mesh.cells[:, 1:]] - mesh.points[mesh.cells[:, :1]]
+                 for mesh in (once, twice)]  # fmt: skip
+        volumes = [np.abs(np.linalg.det(each)) for each in edges]
+        assert volumes[1].min() == pytest.approx(volumes[0].min() / 8, rel=1e-9)
+        assert volumes[1].sum() == pytest.approx(volumes[0].sum(), rel=1e-12)
+
+
+def test_quadrature_matters_where_a_plane_touches_a_part_of_the_face():
+    body = drawn(3)  # held in a tilt
+    face, problem_of = problem_on(body, arrays_of(body), MPI.COMM_SELF)
+    load = body.pressure * float(face.areas.sum())
+    state = problem_of(face).solve(Control(force=load, tilt=body.tilt))
+    assert 0.05 < np.mean(state.sample_pressure == 0.0) < 0.95
+    found = stated_and_true(body, MPI.COMM_SELF, refinements=0)
+    many = problem_of(replace(face, degree=28))
+    true = abs(many.solve(Control(approach=state.approach, tilt=body.tilt)).force - state.force)
+    assert 1e-6 * load < true < 1.5 * found.quadrature
+    assert found.quadrature < 6.0 * true
