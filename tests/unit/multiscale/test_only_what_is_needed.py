@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -46,8 +47,10 @@ def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
         f"code = main({words!r})\n"
         "print(json.dumps([code, sorted(sys.modules)]))"
     )
+    without = dict(os.environ)  # without what MPI has put into this process behind Python's back
+    words = [sys.executable, "-c", code]
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=120
+        words, env=without, capture_output=True, text=True, check=True, timeout=120
     )
     code, names = json.loads(done.stdout.splitlines()[-1])
     assert code == 0
