@@ -34,6 +34,9 @@ _NEEDS = {
     for package in packages.split()
 }
 
+_PARTS = dict.fromkeys(("basix", "ffcx", "ufl"), "dolfinx")
+"""Packages that come with another one, which users know."""
+
 _SHARED = ("numpy", "scipy", "h5py", "mpi4py", "petsc4py")
 """Packages that dolfinx and each other's compiled parts are built against."""
 _TOGETHER = ("numpy", "scipy.special", "h5py")
@@ -94,7 +97,8 @@ def optional_packages() -> Iterator[None]:
         problem = "is not installed"
         if not (isinstance(error, ModuleNotFoundError) and error.name == package):
             problem = f"cannot be imported ({' '.join(str(error).split())[:200]})"
-        raise NotInstalled(f"{package} {problem}, and {what} need it: {source}") from error
+        name = _PARTS.get(package, package)
+        raise NotInstalled(f"{name} {problem}, and {what} need it: {source}") from error
 
 
 def shadows(path: Sequence[str] | None = None) -> dict[str, str]:
