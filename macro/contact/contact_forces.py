@@ -245,9 +245,10 @@ class ContactForces:
 
     def moved_from(self, slope: Array) -> bool:
         """Return whether the slopes differ from earlier ones by half of the largest or more."""
-        both = np.abs(self.slope - slope).max(initial=0.0), self.slope.max(initial=0.0)
-        change, largest = (self.comm.allreduce(each, op=MPI.MAX) for each in both)
-        return bool(change > _MOVED * largest)
+        own = np.array([np.abs(self.slope - slope).max(initial=0.0), self.slope.max(initial=0.0)])
+        both = np.empty(2)
+        self.comm.Allreduce(own, both, op=MPI.MAX)
+        return bool(both[0] > _MOVED * both[1])
 
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
         """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.

@@ -6,6 +6,7 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
+from helpers.small_scene import SMALL_SCENE
 
 from geometry.shear_state import ShearControl
 from micro import HalfSpaceModel
@@ -239,29 +240,10 @@ def test_laws_of_samples_have_no_friction():
 
 def test_a_force_that_slides_ends_the_run_with_what_was_found(tmp_path, capsys):
     path = tmp_path / "slides.toml"
-    path.write_text(
-        """
-[surface]
-spectrum = { hurst = 0.95, waves = [2, 5], rms_slope = 0.2, seed = 1 }
-grid = [16, 16]
-lengths = ["1 mm", "1 mm"]
-[block]
-young_modulus = "4 GPa"
-poisson_ratio = 0.15
-[friction]
-coefficient = 0.3
-[coupling]
-kind = "analytic"
-[load]
-approach = "8 um"
-steps = 1
-shear_force = ["1 kN", "0 N"]
-shear_steps = 1
-[output]
-figures = false
-report = false
-"""
-    )
+    slides = 'approach = "8 um"\nsteps = 1\nshear_force = ["1 kN", "0 N"]\nshear_steps = 1\n'
+    text = SMALL_SCENE.replace('approach = "8 um"\nsteps = 2\n', slides)
+    assert slides in text
+    path.write_text(f"{text}[friction]\ncoefficient = 0.3\n", encoding="utf-8")
     assert main(["run", str(path), "--out", str(tmp_path / "out")]) == 3
     said = capsys.readouterr().err
     assert "load step 2" in said

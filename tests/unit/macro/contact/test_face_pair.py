@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from helpers.body_meshes import HIGH, box, hanging, standing
+from helpers.contact_laws import Spring
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
@@ -30,19 +31,6 @@ class Power:
 
     def stiffness(self, closure):
         return 1.5 * self.k * np.sqrt(np.maximum(closure - self.touch, 0.0))
-
-
-class Spring:
-    """A law p = k c."""
-
-    def __init__(self, k):
-        self.k = k
-
-    def pressure(self, closure):
-        return self.k * closure
-
-    def stiffness(self, closure):
-        return np.full_like(closure, self.k)
 
 
 def pair(first, second):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from helpers.body_meshes import box, hanging, standing
+from helpers.contact_laws import Spring
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
@@ -14,19 +15,6 @@ STEEL = Material(young_modulus=210e3, poisson_ratio=0.3)
 SOFT = Material(young_modulus=5e3, poisson_ratio=0.3)
 RUBBER = Material(young_modulus=5e2, poisson_ratio=0.49)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-
-
-class Spring:
-    """A law p = k c."""
-
-    def __init__(self, k):
-        self.k = k
-
-    def pressure(self, closure):
-        return self.k * closure
-
-    def stiffness(self, closure):
-        return np.full_like(closure, self.k)
 
 
 def faces(cells=("tetrahedron", "tetrahedron"), orders=(1, 1), materials=(STEEL, SOFT)):
