@@ -16,6 +16,7 @@ import numpy as np
 
 from micro.flow.triangle_flow import TriangleFace
 from multiscale.laws.transmissivity import Transmissivity, transmissivities
+from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.results.leak_notes import leak_notes
@@ -73,11 +74,8 @@ class FaceLeakObserver(StepObserver):
                 coupling.comm, lambda: [self._face.flow(one).total for one in found]
             )
         scale = section.drop / (12.0 * section.viscosity_MPa_s)
-        return replace(
-            step,
-            leak_mm3_per_s=scale * fine,
-            leak_error_mm3_per_s=abs(scale * (fine - coarse)),
-        )
+        leak = Leak(way="face", rate=scale * fine)
+        return replace(step, leaks=(leak.with_errors({"grid": abs(scale * (fine - coarse))}),))
 
     def _of_triangles(self, which: int) -> Array:
         """Return the transmissivities of all triangles of the face, shape (n, 2) [mm³].

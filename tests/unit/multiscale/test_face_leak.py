@@ -62,13 +62,14 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, edges, axis, tmp_path):
         flow = gap_flow(gap, (0.5, 0.5), axis=axis, periodic=True)
         expected = flow.transmissivity * across / along * 0.4 / (12.0 * 1e-8)
         # monotone interpolation between some twenty rows
-        assert step.leak_mm3_per_s == pytest.approx(expected, rel=0.03)
+        leak = step.leak("face")
+        assert leak.rate == pytest.approx(expected, rel=0.03)
         half = gaps(model.resampled((24, 24)), step.mean_separation_mm)
         coarse = gap_flow(half, (0.5, 0.5), axis=axis, periodic=True).transmissivity
         error = expected * abs(coarse / flow.transmissivity - 1.0)
-        assert step.leak_error_mm3_per_s == pytest.approx(error, abs=0.04 * expected)
-        assert step.leak_x_mm3_per_s is None
-    assert steps[0].leak_mm3_per_s > steps[1].leak_mm3_per_s > 0.0
+        assert leak.error == pytest.approx(error, abs=0.04 * expected)
+        assert step.leak("x") is None
+    assert steps[0].leak("face").rate > steps[1].leak("face").rate > 0.0
     write_results(tmp_path, done, options=[])
     assert (tmp_path / "leak.png").stat().st_size > 5_000
     assert "leak over the contact face" in (tmp_path / "report.html").read_text(encoding="utf-8")

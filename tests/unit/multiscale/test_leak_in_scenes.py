@@ -54,17 +54,16 @@ def test_every_load_step_has_the_flow_through_its_gaps():
         for axis, direction in enumerate("xy"):
             flow = gap_flow(gap, (1.0, 1.5), axis=axis, periodic=True)
             along, across = (1.0, 1.5) if axis == 0 else (1.5, 1.0)
-            cubed = getattr(step, f"transmissivity_{direction}_mm3")
+            leak = step.leak(direction)
+            cubed = leak.transmissivity
             assert cubed == pytest.approx(flow.transmissivity, rel=1e-9)
             # 1 bar is 0.1 MPa, 1 mPa s is 1e-9 MPa s
-            rate = getattr(step, f"leak_{direction}_mm3_per_s")
+            rate = leak.rate
             assert rate == pytest.approx(cubed * across / along * 0.1 / 12e-9, rel=1e-12)
-            gap_there = getattr(step, f"hydraulic_gap_{direction}_mm")
-            assert gap_there**3 == pytest.approx(cubed, rel=1e-12)
-            factor = getattr(step, f"flow_factor_{direction}")
-            assert factor == pytest.approx(flow.flow_factor, rel=1e-6)
-            assert getattr(step, f"percolates_{direction}") == flow.percolates == (rate > 0.0)
-            share = getattr(step, f"constriction_{direction}_fraction")
+            assert leak.hydraulic_gap**3 == pytest.approx(cubed, rel=1e-12)
+            assert leak.flow_factor == pytest.approx(flow.flow_factor, rel=1e-6)
+            assert leak.percolates == flow.percolates == (rate > 0.0)
+            share = leak.constriction
             if flow.percolates:
                 assert share == pytest.approx(flow.constriction.share, rel=1e-6)
             else:
@@ -94,14 +93,14 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
     notes = " ".join(history.notes)
     assert "leak along x at load step 6: closed, nothing leaks: the surfaces touch" in notes
     assert "the gap is closed along x at" in notes
-    step = history.steps[0]
-    assert leak_text(replace(step, leak_error_x_mm3_per_s=None), "x_").endswith("mm³/s")
-    unsure = replace(step, leak_x_mm3_per_s=0.0, leak_error_x_mm3_per_s=2.0)
-    assert leak_text(unsure, "x_") == "closed, nothing leaks (or 2 mm³/s)"
+    leak = history.steps[0].leak("x")
+    assert leak_text(replace(leak, error=None)).endswith("mm³/s")
+    unsure = replace(leak, rate=0.0, error=2.0)
+    assert leak_text(unsure) == "closed, nothing leaks (or 2 mm³/s)"
 
 
 def test_coarse_grids_are_warned_of():
-    assert any("the leak along y depends on the grid" in note for note in ran().notes)
+    assert any("the leak along y is uncertain: on half as many cells" in note for note in ran().notes)
 
 
 def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
@@ -140,8 +139,9 @@ def test_a_block_has_walls_and_gaps_of_its_own():
     for step in done.load_steps():
         gap = done.coupling.solver.gaps
         flow = gap_flow(gap, (1.0, 1.5), periodic=False)
-        assert step.transmissivity_x_mm3 == pytest.approx(flow.transmissivity, rel=1e-12)
-        assert step.leak_error_x_mm3_per_s > 0.0
+        leak = step.leak("x")
+        assert leak.transmissivity == pytest.approx(flow.transmissivity, rel=1e-12)
+        assert leak.error > 0.0
     done.close()
 
 
