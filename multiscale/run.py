@@ -70,6 +70,7 @@ class Run:
         self.position = LoadPosition()
         self._start: Any = None
         self._notes: list[str] = []
+        self._leak: StepObserver | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
@@ -88,7 +89,8 @@ class Run:
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
         if self.scene.leak is not None:
-            self._observers.append(self._leak_observer(self.scene.leak))
+            self._leak = self._leak_observer(self.scene.leak)
+            self._observers.append(self._leak)
         if self.scene.friction is not None:
             from multiscale.observers.friction import FrictionObserver  # others do without
 
@@ -154,6 +156,11 @@ class Run:
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
         return tuple(self._contacts.records)
+
+    @property
+    def fluid_pressures(self) -> Any:
+        """Triangles of the contact face and fluid pressures at their corners; None without."""
+        return getattr(self._leak, "map", None)
 
     def _has_unloaded(self) -> bool:
         """Tell whether the load was larger at an earlier load step."""

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 
 from micro.flow.gap_flow import GapFlow
 from multiscale.figures.maps import coarsened, colour_bar, map_axes
@@ -35,7 +37,9 @@ _COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
 
 
 @styled()
-def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figure:
+def leak_figure(
+    history: Any, record: Any, section: Any, periodic: bool, face: tuple[Any, Any] | None = None
+) -> Figure:
     """Draw the flow at the last recorded load step, and the leak at all of them.
 
     Args:
@@ -44,9 +48,13 @@ def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figu
             the curves alone.
         section: A `multiscale.scene.leak.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
+        face: Triangles of a contact face, shape (n, 3, 2) [mm], and fluid pressures at their
+            corners at the last load step, shape (n, 3) [MPa]; None draws the curve alone.
     """
     over_face = section.between_edges
     ways = ["face"] if over_face else list(section.directions)
+    if over_face and face is not None:
+        return _face_figure(history, section, *face)
     shown = section.directions if record is not None and not over_face else ()
     title = f"flow at load step {record.step}" if shown else ""
     rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
@@ -61,6 +69,34 @@ def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figu
     _draw_leak(axes[len(shown)], history, ways)
     if len(axes) > len(shown) + 1:
         _draw_factors(axes[-1], history, ways)
+    return figure
+
+
+def _face_figure(history: Any, section: Any, triangles: Any, pressure: Any) -> Figure:
+    """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
+    figure, (left, right) = panels(1, 2, 3.2, bars=[0])
+    lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
+    scale = map_axes(left, tuple(upper))
+    left.set(
+        xlim=scale * np.array([lower[0], upper[0]]), ylim=scale * np.array([lower[1], upper[1]])
+    )
+    wet = ~np.isnan(pressure).any(axis=1)
+    dry = PolyCollection(scale * triangles[~wet], facecolor=_CONTACT, edgecolor="none")
+    left.add_collection(dry)
+    name, unit = usual_unit(list(section.pressures), "MPa")
+    first, second = sorted(one / unit for one in section.pressures)
+    if wet.any():
+        places, numbers = scale * triangles[wet].reshape(-1, 2), np.arange(3 * wet.sum())
+        net = Triangulation(*places.T, numbers.reshape(-1, 3))
+        values = pressure[wet].ravel() / unit
+        look = {"cmap": "Blues", "vmin": first, "vmax": second, "shading": "gouraud"}
+        image = left.tripcolor(net, values, rasterized=True, **look)
+        colour_bar(image, left, f"fluid pressure [{name}]")
+        levels = np.linspace(first, second, 9)[1:-1]
+        left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
+    step = history.steps[-1]
+    left.set_title(f"fluid at load step {step.step}")
+    _draw_leak(right, history, ["face"])
     return figure
 
 

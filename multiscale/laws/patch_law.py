@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from geometry import InputError
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
+from multiscale.laws.transmissivity import Transmissivity
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -52,6 +53,7 @@ class PatchLaw:
             its range of validity [MPa]; infinite when it never did.
         repaired: Largest change that made falling rows rise, see `LawRows.rising`.
         sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
+        transmissivity: What a fluid finds between the gaps; None where no leak was asked for.
 
     Raises:
         InputError: When the rows are no law.
@@ -65,6 +67,7 @@ class PatchLaw:
     warning_pressure: float = np.inf
     repaired: float = 0.0
     sample_area: float = float("nan")
+    transmissivity: Transmissivity | None = None
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -170,6 +173,22 @@ class PatchLaw:
             return np.zeros(closures.shape)
         rows = self.rows[: self.rising_rows]
         return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
+
+    def transmissivities(self, closure: ArrayLike) -> Array:
+        """Return the transmissivities along x and y at closures, shape (n, 2) [mm³].
+
+        Args:
+            closure: Closures, shape (n,) [mm]; beyond the rows the tangents continue.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        if self.transmissivity is None:
+            raise InputError(
+                "the law has no transmissivity",
+                allowed="a law made with leak = True, or in a scene with [leak]",
+            )
+        return self.transmissivity.at(self.at(closure, extend=True).separation)
 
     def shifted(self, distance: float) -> PatchLaw:
         """Return the law with approach and closure counted from a plane that is higher.

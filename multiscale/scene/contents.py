@@ -260,7 +260,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
 
 def _leak(scene: SceneSections) -> Iterator[Problem]:
     """Yield what does not fit of the flow over a face, between its edges."""
-    leak, second = scene.leak, scene.counter_body
+    leak = scene.leak
     if leak is None:
         return
     over_face = "law.kind = 'representative' on a [body]"
@@ -269,8 +269,6 @@ def _leak(scene: SceneSections) -> Iterator[Problem]:
     if scene.law.representative and not leak.between_edges:
         problem = "is required with law.kind = 'representative': the fluid flows over the face"
         yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-    if scene.law.representative and second is not None and second.mesh is not None:
-        yield "leak", "does not go with a counter-body on a mesh", "a rigid side or a half-space"
 
 
 def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:

@@ -100,7 +100,9 @@ def test_closed_gaps_leak_nothing_and_are_called_closed():
 
 
 def test_coarse_grids_are_warned_of():
-    assert any("the leak along y is uncertain: on half as many cells" in note for note in ran().notes)
+    assert any(
+        "the leak along y is uncertain: on half as many cells" in note for note in ran().notes
+    )
 
 
 def test_flow_is_solved_along_one_axis_where_one_is_asked_for(monkeypatch):
