@@ -98,12 +98,17 @@ class Run:
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def _leak_observer(self, section: LeakSection) -> StepObserver:
-        """Return what adds the leak to load steps: through gaps of cells, or over a face."""
+        """Return what adds the leak to load steps: through gaps, patches, or over a face."""
         if section.between_edges:
             from multiscale.observers.face_leak import FaceLeakObserver
 
             coupling: Any = self.coupling
             return FaceLeakObserver(coupling, section)
+        if self.coupling.has_laws:
+            from multiscale.observers.patch_leak import PatchLeakObserver
+
+            laws: Any = self.coupling
+            return PatchLeakObserver(laws, section)
         from multiscale.observers.leak import LeakObserver
 
         return LeakObserver(self.coupling, section, self._has_unloaded)

@@ -33,8 +33,8 @@ Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
 
 
-_WITHOUT_CELLS = {"isolated", "consistent", "reference", "auto"}
-"""Couplings that know no gaps of the surface's cells."""
+_WITHOUT_GAPS = {"isolated", "reference", "auto"}
+"""Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,7 +233,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         ("counter_surface", scene.counter_surface, {"reference"}, block),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
-        ("leak", scene.leak, _WITHOUT_CELLS, mapped),
+        ("leak", scene.leak, _WITHOUT_GAPS, mapped),
     ):
         if value is not None and scene.kind in kinds:
             others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))

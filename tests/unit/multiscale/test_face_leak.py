@@ -1,6 +1,9 @@
 """The leak over a contact face between two edges, under laws of samples; and its refusals."""
 
+import csv
+from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 from helpers.box_msh import write_box
@@ -8,6 +11,8 @@ from helpers.box_msh import write_box
 from geometry import Control
 from micro.flow.gap_flow import gap_flow
 from multiscale import Run, Scene
+from multiscale.exports.export import csv_text
+from multiscale.laws.flow_rows import sample_transmissivity
 from multiscale.output.results import write_results
 from multiscale.results.reading import read_history
 from support.errors import InputError
@@ -105,6 +110,10 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box):
         np.testing.assert_allclose(values[0], expected, rtol=2e-3)
     closure = law.initial_separation - separation
     np.testing.assert_allclose(law.transmissivities(closure), flow.at(separation), rtol=1e-9)
+    rows = list(csv.DictReader(csv_text(done.laws, 1e-3).splitlines()))
+    found = np.array([float(row["transmissivity_y_mm3"]) for row in rows])
+    at = np.array([float(row["separation_mm"]) for row in rows])
+    np.testing.assert_allclose(found, flow.at(at)[:, 1], rtol=1e-12)
     done.close()
 
 
@@ -129,6 +138,73 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box):
 def test_bad_edges(box, leak, text):
     with pytest.raises(InputError, match=text):
         Run(scene(box, leak))
+
+
+def test_two_bodies_leak_as_their_sample(box):
+    """Evenly pressed: one separation everywhere; the counter-body is the same box upside down."""
+    above = {"mesh": str(box), "contact": "bottom", "young_modulus": "8 GPa", "poisson_ratio": 0.3}
+    supports = [one | {"surface": "top"} if one["surface"] == "bottom" else one for one in SUPPORTS]
+    output = {"figures": False, "report": False}
+    pair = scene(box, counter_body=above | {"supports": supports}, output=output)
+    done = Run(pair)
+    *_, step = done.load_steps()
+    ((model,),) = done.coupling.periodic_models
+    gap = gaps(model, step.mean_separation_mm)
+    expected = gap_flow(gap, (0.5, 0.5), periodic=True).transmissivity * 4.0 / 6.0 * 0.4 / 12e-8
+    assert step.leak("face").rate == pytest.approx(expected, rel=2e-3)
+    done.close()
+
+
+def test_bodies_whose_faces_do_not_meet_are_refused(box, tmp_path):
+    small = tmp_path / "small.msh"
+    write_box(small, [np.linspace(0, 2, 3), np.linspace(0, 4, 5), np.linspace(0, 2, 3)])
+    above = {"mesh": str(small), "contact": "bottom", "supports": [{"surface": "top"}]}
+    above |= {"young_modulus": "8 GPa", "poisson_ratio": 0.3}
+    with pytest.raises(InputError, match="leak: a part of the contact face has no laws, or no fac"):
+        Run(scene(box, counter_body=above))
+
+
+def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
+    """Of two samples, each solved under the pressure itself, the difference over √2."""
+    done = Run(scene(box))
+    ((model,),) = done.coupling.periodic_models
+    done.close()
+    turned = replace(model.surface, heights=1.1 * model.surface.heights.T)
+    models = [model, replace(model, surface=turned)]
+    models = [one.resampled((24, 24)) for one in models]
+    reference = models[1].reference_height - turned.mean_height
+    law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(300.0, 0.0, 20)
+    flow = sample_transmissivity(models, lambda separation: np.interp(separation, *law))
+    for row in (-6, -10):
+        pressure = float(np.interp(flow.separation[row], *law))
+        each = []
+        for one in models:
+            gap = one.press(Control(force=pressure * one.surface.area)).open_gap
+            flows = (gap_flow(gap, (0.5, 0.5), axis=k, periodic=True) for k in (0, 1))
+            each.append([one.transmissivity for one in flows])
+        expected = np.abs(np.subtract(*each)) / np.sqrt(2.0)
+        np.testing.assert_allclose(flow.scatter[row], expected, rtol=0.03)
+    separation = flow.separation
+    np.testing.assert_allclose(
+        flow.varied("samples", separation, 2.0) - flow.at(separation), 2.0 * flow.scatter, rtol=1e-9
+    )
+    same = sample_transmissivity([model, model], lambda separation: np.interp(separation, *law))
+    assert (same.scatter <= 1e-9 * same.at(same.separation).max()).all()
+
+
+def test_the_fluid_pressure_is_written_with_the_fields(box, tmp_path):
+    done = Run(scene(box, output={"figures": False, "report": False, "fields": "last"}))
+    list(done.load_steps())
+    done.write_fields(tmp_path / "fields.xdmf")
+    text = (tmp_path / "fields.xdmf").read_text(encoding="utf-8")
+    assert text.count('Name="fluid_pressure"') == 1
+    with h5py.File(tmp_path / "fields.h5") as file:
+        (values,) = file["Function/fluid_pressure"].values()
+        pressure, points = values[:, 0], file["Mesh/mesh/geometry"][:]
+    on_face = np.isclose(points[:, 2], points[:, 2].max())
+    expected = 0.5 - 0.4 * points[on_face, 0] / 6.0  # from 5 to 1 bar
+    np.testing.assert_allclose(pressure[on_face], expected, atol=1e-9)
+    done.close()
 
 
 def test_edges_need_a_body_and_a_sample(box):

@@ -154,6 +154,30 @@ def test_after_unloading_cells_that_yielded_leak_more_and_have_no_error():
     assert any("error of the leak after unloading is not measured" in one for one in history.notes)
 
 
+def test_one_patch_leaks_as_the_cells_and_more_of_them_roughly():
+    """One patch is the whole surface, whose laws reproduce it; sixteen are walls and means."""
+    cells = run(scene(kind="concurrent", micro={"finite_slopes": False}))
+    for grid, within in (([1, 1], 0.01), ([2, 2], 0.7)):
+        laws = run(scene(kind="consistent", patches={"grid": grid}, micro={"finite_slopes": False}))
+        for step, of_cells in zip(laws.steps[:3], cells.steps[:3], strict=True):
+            for way in "xy":
+                found, known = step.leak(way), of_cells.leak(way)
+                assert list(dict(found.causes)) == ["grid", "rows"]
+                assert found.rate == pytest.approx(known.rate, rel=within), (grid, step.step, way)
+                assert found.constriction is None
+        if grid == [1, 1]:
+            grids = [dict(leak.causes)["grid"] for leak in laws.steps[0].leaks]
+            assert grids == pytest.approx([one.error for one in cells.steps[0].leaks], rel=0.05)
+    assert any("through 4 patches of one transmissivity each" in note for note in laws.notes)
+
+
+def test_patches_with_too_few_cells_are_refused():
+    with pytest.raises(
+        InputError, match=r"patches.grid = \[9, 2\]: leaves patches fewer than 4 ce"
+    ):
+        Run(scene(kind="consistent", patches={"grid": [9, 2]}))
+
+
 def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
     done = Run(scene(output={"figures": True, "report": True}))
     for step in done.load_steps():
@@ -201,7 +225,7 @@ def test_bad_input(given, text):
         scene(given)
 
 
-@pytest.mark.parametrize("kind", ["isolated", "consistent", "reference"])
+@pytest.mark.parametrize("kind", ["isolated", "reference"])
 def test_couplings_without_gaps_of_cells_are_refused(kind):
     text = rf"^leak: does not go with coupling.kind = '{kind}', which knows no gaps of cells"
     with pytest.raises(InputError, match=text):
