@@ -163,8 +163,8 @@ class Run:
         return tuple(self._contacts.records)
 
     @property
-    def fluid_pressures(self) -> Any:
-        """Triangles of the contact face and fluid pressures at their corners; None without."""
+    def fluid(self) -> Any:
+        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
         return getattr(self._leak, "map", None)
 
     def _has_unloaded(self) -> bool:

@@ -34,12 +34,14 @@ class FaceFlow:
             triangles join the two.
         pressure: Pressures at the corners of the triangles, NaN where none of both reaches, shape
             (n, 3).
+        leaving: What of it leaves the face from each triangle, shape (n,) [mm³].
         imbalance: Sum of the absolute differences of what enters and what leaves over all nodes,
             over the total.
     """
 
     total: float
     pressure: Array
+    leaving: Array
     imbalance: float = 0.0
 
 
@@ -104,7 +106,19 @@ class TriangleFace:
         found = self._solved(whole)
         pressure = np.full(self._node.shape, np.nan)
         pressure[is_open] = found.potential[self._node[is_open]]
-        return FaceFlow(total=found.total, pressure=pressure, imbalance=found.imbalance)
+        return FaceFlow(
+            total=found.total,
+            pressure=pressure,
+            leaving=self._leaving(whole, found, is_open),
+            imbalance=found.imbalance,
+        )
+
+    def _leaving(self, network: Network, found: NetworkFlow, is_open: Flags) -> Array:
+        """Return what leaves the face from each triangle, shape (n,) [mm³]."""
+        tail, head = self._links(is_open)
+        of = np.repeat(np.flatnonzero(is_open)[:, None], 3, axis=1)[tail != head]
+        into = (network.head == network.outlet).astype(float) - (network.tail == network.outlet)
+        return np.asarray(np.bincount(of, into * found.flow, len(is_open)), float)
 
     def _solved(self, network: Network) -> NetworkFlow:
         try:

@@ -38,7 +38,7 @@ _COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
 
 @styled()
 def leak_figure(
-    history: Any, record: Any, section: Any, periodic: bool, face: tuple[Any, Any] | None = None
+    history: Any, record: Any, section: Any, periodic: bool, fluid: Any = None
 ) -> Figure:
     """Draw the flow at the last recorded load step, and the leak at all of them.
 
@@ -48,13 +48,13 @@ def leak_figure(
             the curves alone.
         section: A `multiscale.scene.leak.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
-        face: Triangles of a contact face, shape (n, 3, 2) [mm], and fluid pressures at their
-            corners at the last load step, shape (n, 3) [MPa]; None draws the curve alone.
+        fluid: A `multiscale.observers.face_leak.FluidMap` of the last load step; None draws the
+            curve alone.
     """
     over_face = section.between_edges
     ways = ["face"] if over_face else list(section.directions)
-    if over_face and face is not None:
-        return _face_figure(history, section, *face)
+    if over_face and fluid is not None:
+        return _face_figure(history, section, fluid)
     shown = section.directions if record is not None and not over_face else ()
     title = f"flow at load step {record.step}" if shown else ""
     rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
@@ -72,8 +72,9 @@ def leak_figure(
     return figure
 
 
-def _face_figure(history: Any, section: Any, triangles: Any, pressure: Any) -> Figure:
+def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
     """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
+    triangles, pressure = fluid.triangles, fluid.pressure_MPa
     figure, (left, right) = panels(1, 2, 3.2, bars=[0])
     lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
     scale = map_axes(left, tuple(upper))

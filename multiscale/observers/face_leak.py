@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,20 @@ from support.errors import InputError
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro.contact.face_leak import LeakingFace
     from multiscale.couplings.representative import RepresentativeCoupling
+
+
+class FluidMap(NamedTuple):
+    """The fluid on the triangles of a contact face.
+
+    Attributes:
+        triangles: Corners of the triangles in the frame of the face, shape (n, 3, 2) [mm].
+        pressure_MPa: Fluid pressures at the corners, NaN where no fluid comes, (n, 3) [MPa].
+        leaving_mm3_per_s: Part of the flow rate that leaves from each triangle, (n,) [mm³/s].
+    """
+
+    triangles: Array
+    pressure_MPa: Array
+    leaving_mm3_per_s: Array
 
 
 class FaceLeakObserver(StepObserver):
@@ -102,15 +116,16 @@ class FaceLeakObserver(StepObserver):
         return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
 
     @property
-    def map(self) -> tuple[Array, Array] | None:
-        """Triangles of the face (n, 3, 2) [mm] and fluid pressures at their corners (n, 3) [MPa].
-
-        They are those of the load step solved last; None where there is none.
-        """
+    def map(self) -> FluidMap | None:
+        """The fluid on the face at the load step solved last; None where there is none."""
         if self._known is None:
             return None
-        first, second = self._section.pressures
-        return self._leaking().triangles, second + self._known[1].pressure * (first - second)
+        section, flow = self._section, self._known[1]
+        return FluidMap(
+            triangles=self._leaking().triangles,
+            pressure_MPa=section.pressures[1] + flow.pressure * section.drop,
+            leaving_mm3_per_s=flow.leaving * section.drop / (12.0 * section.viscosity_MPa_s),
+        )
 
     def _flow_at(self, step: LoadStep) -> Any:
         """Return the flow at the load step solved last, solved once."""

@@ -58,6 +58,8 @@ def test_ring_whose_transmissivity_falls_outwards():
     assert found.total == pytest.approx(exact, rel=2e-4)
     assert (found.pressure.min(), found.pressure.max()) == (0.0, 1.0)
     assert 0.0 < found.pressure.mean(axis=1).min()
+    assert found.leaving.sum() == pytest.approx(found.total, rel=1e-10)
+    assert (found.leaving[radius < 0.99 * OUTER * 0.99] == 0.0).all()
 
 
 @pytest.mark.parametrize("along", [True, False])
