@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -63,6 +63,15 @@ class LawTable:
     def together(self) -> PatchLaws:
         """Return the laws as one, which evaluates them together."""
         return PatchLaws(self.laws)
+
+    def with_stiffness_ratios(self, ratios: Sequence[float]) -> LawTable:
+        """Return the laws with Mindlin's ratios of the bodies, which friction takes.
+
+        Args:
+            ratios: One for every law, see `MaterialPair.stiffness_ratio`.
+        """
+        pairs = zip(self.laws, ratios, strict=True)
+        return replace(self, laws=tuple(replace(law, stiffness_ratio=r) for law, r in pairs))
 
     @property
     def rows(self) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import InputError
+from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
 
@@ -52,6 +53,8 @@ class PatchLaw:
             its range of validity [MPa]; infinite when it never did.
         repaired: Largest change that made falling rows rise, see `LawRows.rising`.
         sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
+        stiffness_ratio: Mindlin's ratio of the normal to the tangential stiffness of the bodies,
+            which friction takes; NaN where it is not known.
 
     Raises:
         InputError: When the rows are no law.
@@ -65,6 +68,7 @@ class PatchLaw:
     warning_pressure: float = np.inf
     repaired: float = 0.0
     sample_area: float = float("nan")
+    stiffness_ratio: float = float("nan")
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -159,6 +163,11 @@ class PatchLaw:
         """Return the derivative of `pressure` over the closure [MPa/mm]."""
         return self.at(closure, extend=True).stiffness
 
+    @cached_property
+    def springs(self) -> SpringBed:
+        """The springs behind the law, which give its shear stresses under friction."""
+        return springs_of(self.pressure, self.stiffness, *self.range)
+
     def pressure_scatter(self, closure: ArrayLike) -> Array:
         """Return the standard deviation of the pressure among the samples of the law [MPa].
 
@@ -224,12 +233,13 @@ class PatchLaws:
         laws: The laws, in the order of the flat patch index.
 
     Attributes:
+        laws: The laws.
         first_touch: Closures at first touch, infinite where there is nothing to touch, (N,) [mm].
         end: Local approaches up to which the laws are valid, shape (N,) [mm].
     """
 
     def __init__(self, laws: Sequence[PatchLaw]) -> None:
-        self._laws = tuple(laws)
+        self.laws = tuple(laws)
         self._index = np.arange(len(laws))
         self._curves = LawCurves.packed([law.curves for law in laws])
         self.first_touch = np.array([law.first_touch for law in laws])
@@ -239,7 +249,7 @@ class PatchLaws:
         )
 
     def __len__(self) -> int:
-        return len(self._laws)
+        return len(self.laws)
 
     def along(self, approach: Array) -> LawPoint:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
@@ -260,7 +270,7 @@ class PatchLaws:
             beyond = closure > _with_rounding(self._ends)[patch]
             if beyond.any():
                 of_one = patch == patch[beyond][0]
-                self._laws[patch[beyond][0]].check_range(closure[of_one])
+                self.laws[patch[beyond][0]].check_range(closure[of_one])
         return self._rising.at_closure(patch, closure)
 
     def pressures(self, patch: Indices, closure: Array) -> Array:
@@ -273,11 +283,11 @@ class PatchLaws:
 
     @cached_property
     def _ends(self) -> Array:
-        return np.array([law.range[1] for law in self._laws])
+        return np.array([law.range[1] for law in self.laws])
 
     @cached_property
     def _rising(self) -> LawCurves:
-        return LawCurves.packed([law.rising_curves for law in self._laws])
+        return LawCurves.packed([law.rising_curves for law in self.laws])
 
 
 def repaired_law(law: PatchLaw) -> PatchLaw:

@@ -26,8 +26,8 @@ FLOORS = {
     ],
     "geometry": [
         "interpolant legendre_modes materials",
-        "face_frame filters surface",
-        "patches spectrum statistics summits zero",
+        "face_frame filters spring_bed surface",
+        "patches sliders spectrum statistics summits zero",
         "plausibility shear_state",
         "facing preparation rigid_plane",
         "files",
