@@ -24,7 +24,7 @@ from geometry.materials import mindlin_ratio
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.shear_state import ShearControl
 from geometry.spring_bed import Friction
-from macro import ContactProblem, Interface, compat
+from macro import ContactProblem, Interface, LawsAtPoints, compat
 from support.errors import InputError, NotConverged
 
 MU, NU = 0.41, 0.2
@@ -229,6 +229,13 @@ def test_misuse_is_refused_by_key(body, options, problem):
     with pytest.raises(InputError) as error:
         problem_on(body, **options)
     assert problem in str(error.value)
+    assert error.value.key == "friction"
+
+
+def test_an_external_operator_with_friction_is_refused(body):
+    rough, _ = problem_on(body)
+    with pytest.raises(InputError, match="knows pressures alone") as error:
+        LawsAtPoints(rough, np.zeros((1, 1, 3)))
     assert error.value.key == "friction"
 
 
