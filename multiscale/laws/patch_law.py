@@ -17,6 +17,8 @@ from geometry import InputError
 from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
+from multiscale.readable import column, span
+from support.displayed import Displayed, Table, of_columns, spread
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -25,8 +27,8 @@ _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PatchLaw:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class PatchLaw(Displayed):
     """Mean pressure, contact area and contacts of one patch: a contact law of `macro`.
 
     The closure c is the rigid approach at the patch minus the macroscopic displacement of its
@@ -95,6 +97,23 @@ class PatchLaw:
             raise InputError("a patch law needs a pressure without tension")
         if len(self.rows) and self.rows.pressure[0] != 0.0:
             raise InputError("a patch law starts at zero pressure", value=self.rows.pressure[0])
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return the range of the law in a line, and a table of some of its rows."""
+        if self.is_open:
+            return "PatchLaw of a patch that stays open", ((), ())
+        rows = self.rows[np.array(spread(len(self.rows), 12))]
+        line = (
+            f"PatchLaw in {len(self.rows)} rows: pressure {span(self.rows.pressure, 'MPa')} at "
+            f"closures {span(self.rows.closure, 'mm')}"
+        )
+        return line, of_columns(
+            column("closure", rows.closure, "mm"),
+            column("pressure", rows.pressure, "MPa"),
+            column("stiffness", self.along(rows.approach).stiffness, "MPa/mm"),
+            column("area", rows.contact_area_fraction, "%"),
+            ["contacts", *map(str, rows.contacts)],
+        )
 
     @property
     def is_open(self) -> bool:

@@ -20,7 +20,7 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays cores errors small_caches",
+        "arrays cores displayed errors small_caches",
         "checks collective fields packages quantities whole_files",
         "checked_store",
     ],
@@ -52,8 +52,9 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "figures machine",
+        "console figures machine",
         "laws loading",
+        "progress",
         "exports results scene",
         "inputs",
         "bodies",
