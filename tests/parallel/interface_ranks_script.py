@@ -2,7 +2,7 @@
 
 import json
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from helpers.user_problems import (
     TETRAHEDRA,
     TOP,
     PowerLaw,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -29,6 +30,8 @@ from helpers.user_problems import (
 
 from geometry.meshes.block import BlockShape
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction
 from macro import (
     Block,
     ContactProblem,
@@ -83,6 +86,28 @@ def bar():
         problem.solve()
         found[f"bar {in_matrix}"] = [rough.force, problem.reaction()[2] / rough.force - 1.0]
     return found, COMM.allgather(given)
+
+
+def rubbing():
+    """Return shear forces, energies and shifts of a face that slips, step by step, per element."""
+    found, laws = {}, [RangedLaw(law.k, law.touch) for law in LAWS]
+    shears = [ShearControl(shift=(6e-4, 2e-4)), ShearControl(force=(-0.2, 0.3))]
+    for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
+        mesh = box(cell=cell, comm=COMM)
+        tags, space = marked(mesh), compat.vector_space(mesh, 1)
+        u, friction = fem.Function(space), Friction(coefficient=0.3, poisson_ratio=0.2)
+        options = {"patches": PATCHES, "mode": mode, "friction": friction}
+        force = Control(force=3.0, tilt=None)
+        rough = Interface(space, tags, TOP, laws=laws, indenter=force, **options)
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        for k, shear in enumerate((None, *shears)):
+            rough.indenter = replace(force, shear=shear)
+            problem.solve()
+            if k == 1:
+                rough.slip_record = rough.slip_record  # as from another run
+            values = [*rough.shear_force, rough.dissipated, rough.slip_area, *rough.shift]
+            found[f"{mode} {k}"] = [float(value) for value in values]
+    return found
 
 
 def refusals():
@@ -140,6 +165,8 @@ if __name__ == "__main__":
         result |= cube(element, mode)
     ends, facets = bar()
     errors, leaks = refusals(), leak()
+    rubbed = rubbing()
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
+        values["rubbed"] = rubbed
         sys.stdout.write(json.dumps(values) + "\n")
