@@ -153,7 +153,7 @@ class TriangleFace:
         ends, values = ends[order], values[order]
         first = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # the largest of a side
         first &= ends[:, 0] != ends[:, 1]
-        network = Network(self._count, *ends[first].T, values[first])
+        network = Network(self._count, ends[first, 0], ends[first, 1], values[first])
         reached = network.joined[network.tail] == network.joined[network.inlet]
         limits = np.full(self._count + 2, np.inf)
         joined = network.joined == network.joined[network.inlet]

@@ -184,6 +184,7 @@ class ConsistentCoupling(PatchLaws):
         from multiscale.laws.flow_rows import patch_transmissivities  # others do without
 
         assert self.cells is not None, "scenes of summits are refused"
+        assert isinstance(self._model, HalfSpaceModel)
         model, probe, largest = self._model, self.error_probe(), self._largest_control()
         coarse = probe.model.resampled((self.cells[0] // 2, self.cells[1] // 2))
         end, first = on_root_alone(self.comm, lambda: _ends(model, largest))

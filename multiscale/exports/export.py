@@ -56,15 +56,22 @@ def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None
     where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
     names = () if conducts is None else tuple(conducts(np.zeros(1)))
     leaks = all(law.transmissivity is not None for law in table.laws)
-    flow = FLOW_COLUMNS if leaks else ()
-    writer.writerow((*where, *CSV_COLUMNS, *names, *flow, *scatter))
+    flows = FLOW_COLUMNS if leaks else ()
+    writer.writerow((*where, *CSV_COLUMNS, *names, *flows, *scatter))
     for place, law in zip(places(table), table.laws, strict=True):
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
             conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
-            flows = law.transmissivity.at(np.array([row[_SEPARATION]]))[0] if flow else ()
-            writer.writerow((*place.cells, *row, *map(float, (*conductances, *flows)), *more))
+            further: list[Any] = [*conductances]
+            further += _flows_of(law, row[_SEPARATION]) if leaks else []
+            writer.writerow((*place.cells, *row, *map(float, further), *more))
     return text.getvalue()
+
+
+def _flows_of(law: PatchLaw, separation: float) -> list[float]:
+    """Return the transmissivities of a law at a separation; none where it does not know them."""
+    flow = law.transmissivity
+    return [] if flow is None else flow.at(np.array([separation]))[0].tolist()
 
 
 def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:

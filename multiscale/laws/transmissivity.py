@@ -49,7 +49,9 @@ class Transmissivity:
             values, shape = getattr(self, one.name), (count, 2)[: 1 + (one.name != "separation")]
             if not count or values.shape != shape or not np.isfinite(values).all():
                 raise InputError(
-                    f"a transmissivity needs a finite {one.name}", value=values.shape, allowed=shape
+                    f"a transmissivity needs a finite {one.name}",
+                    value=values.shape,
+                    allowed=f"{shape}",
                 )
             if (values < 0.0).any():
                 raise InputError(f"a transmissivity needs a {one.name} ≥ 0")

@@ -63,7 +63,8 @@ class FaceLeakObserver(StepObserver):
 
     def __init__(self, coupling: RepresentativeCoupling, section: LeakSection) -> None:
         super().__init__(coupling)
-        self._section, self._face = section, None
+        self._section = section
+        self._face: LeakingFace | None = None
         self._known: tuple[int, Any] | None = None
         first = coupling.bodies.first
         assert first is not None, "scenes without a body on a mesh are refused"
