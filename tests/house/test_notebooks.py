@@ -47,12 +47,9 @@ def test_a_kernel_shows_tables_progress_and_pictures():
     pytest.importorskip("ipykernel")
     nbclient, jupytext = pytest.importorskip("nbclient"), pytest.importorskip("jupytext")
     notebook = jupytext.read(FOLDER / "my_map.py")
-    notebook.cells[
-        -1
-    ].source += "\nfrom mpi4py import MPI\nMPI.COMM_WORLD.size, MPI.Is_initialized()"
-    nbclient.NotebookClient(
-        notebook, timeout=300, resources={"metadata": {"path": FOLDER}}
-    ).execute()
+    last, place = notebook.cells[-1], {"metadata": {"path": FOLDER}}
+    last.source += "\nfrom mpi4py import MPI\nMPI.COMM_WORLD.size, MPI.Is_initialized()"
+    nbclient.NotebookClient(notebook, timeout=300, resources=place).execute()
     shown = [one for cell in notebook.cells for one in cell.get("outputs", ())]
     pages = [one.data["text/html"] for one in shown if "text/html" in one.get("data", {})]
     assert any("surface.filter.short" in page for page in pages)
