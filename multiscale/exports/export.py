@@ -62,9 +62,9 @@ def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
             conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
-            further: list[Any] = [*conductances]
+            further = [float(one) for one in conductances]
             further += _flows_of(law, row[_SEPARATION]) if leaks else []
-            writer.writerow((*place.cells, *row, *map(float, further), *more))
+            writer.writerow((*place.cells, *row, *further, *more))
     return text.getvalue()
 
 

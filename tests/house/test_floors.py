@@ -20,9 +20,9 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays cores displayed errors small_caches network",
-        "checks collective fields network_flow packages quantities whole_files",
-        "checked_store",
+        "arrays cores displayed errors small_caches",
+        "checks collective fields network packages quantities whole_files",
+        "checked_store network_flow",
     ],
     "geometry": [
         "interpolant legendre_modes materials",
