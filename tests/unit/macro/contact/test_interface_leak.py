@@ -79,7 +79,7 @@ def test_a_wedge_leaks_as_its_parts_in_series():
     face = LeakingFace(mesh, loaded.facets, loaded.quadrature, ends)
     harmonic = face.flow(values, harmonic=True).total
     assert harmonic == pytest.approx(exact, rel=2e-4)
-    values[np.isclose(values[:, 0], values[:, 0].min())] = 0.0  # points on a line across the flow
+    values[values[:, 0] < 1.001 * values[:, 0].min()] = 0.0  # points on a line across the flow
     assert face.flow(values, harmonic=True).total == 0.0 < face.flow(values).total
 
 
