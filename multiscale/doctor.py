@@ -26,7 +26,7 @@ from multiscale.machine import cluster_nodes, cores_statement, detached_processe
 from support.collective import on_root
 from support.cores import node_cores
 from support.errors import InputError, PatchlawError
-from support.packages import optional_packages, removal, shadows
+from support.packages import load_wheels_mpi, optional_packages, removal, shadows
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),
@@ -67,6 +67,7 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> Iterator[tuple[str, Check
     Note:
         Collective.
     """
+    load_wheels_mpi()
     for topic, check in checks.items():
         try:
             with optional_packages():
