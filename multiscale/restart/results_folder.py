@@ -51,7 +51,8 @@ def folder_name(scene: str, overrides: Sequence[str] = (), ending: str = "") -> 
     """
     pairs = (text.partition("=") for text in overrides)
     values = {key.strip(): value.strip() for key, _, value in pairs}  # the last of a key counts
-    changed = [f"{key}={values[key]}" for key in sorted(values) if not f"{key}.".startswith(_OUTPUT)]
+    kept = (key for key in sorted(values) if not f"{key}.".startswith(_OUTPUT))
+    changed = [f"{key}={values[key]}" for key in kept]
     name = "".join(f"-{_ODD.sub('_', text).strip('_')}" for text in changed)
     if len(name.encode()) > _LONGEST:
         digest = sha256(repr(changed).encode()).hexdigest()[:8]
