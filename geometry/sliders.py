@@ -38,6 +38,31 @@ class SliderState:
     stress: Array
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SliderRecord:
+    """What load steps leave behind of friction on a whole face, on any number of ranks.
+
+    Attributes:
+        place: Places of the samples in coordinates of the face, shape (m, 2) [mm].
+        shear: Shear stresses there, shape (m, 2) [MPa].
+        closure: Their closures, shape (m,) [mm].
+        slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
+        stress: Shear stresses of their springs, before they are scaled, shape (m, N, 2) [MPa].
+        shift: Shift of the plane, shape (2,) [mm].
+        direction: Unit vector of its last change, shape (2,).
+        dissipated: Energy lost to friction since the start [N mm].
+    """
+
+    place: Array
+    shear: Array
+    closure: Array
+    slip: Array
+    stress: Array
+    shift: Array
+    direction: Array
+    dissipated: float
+
+
 class SliderResponse(NamedTuple):
     """Shear stresses of n samples after a step, and their exact derivatives.
 
@@ -111,7 +136,14 @@ class Sliders:
         return SliderState(closure=closure, slip=np.zeros((n, 2)), stress=np.zeros((n, springs, 2)))
 
     def respond(
-        self, before: SliderState, closure: Array, slip: Array, pressure: Array, rate: Array
+        self,
+        before: SliderState,
+        closure: Array,
+        slip: Array,
+        pressure: Array,
+        rate: Array,
+        *,
+        sticks: bool = False,
     ) -> SliderResponse:
         """Return the shear stresses after a step.
 
@@ -121,13 +153,14 @@ class Sliders:
             slip: Tangential displacements there, shape (n, 2) [mm].
             pressure: Pressures p of the laws there, shape (n,) [MPa].
             rate: dp/dc there, shape (n,) [MPa/mm].
+            sticks: Whether springs stick whatever they bear, as a first guess of a step takes them.
         """
         springs, mu = self._at(closure), self._coefficient
         moved = (slip - before.slip) / self._ratio[:, None]
         trial = before.stress + springs.stiffness[..., None] * moved[:, None]
         size = np.hypot(trial[..., 0], trial[..., 1])
         bound = mu * springs.force
-        slips = size > bound
+        slips = (size > bound) & (not sticks)
         share = np.where(slips, bound / np.where(slips, size, 1.0), 1.0)
         after = trial * share[..., None]
         ahead = np.where(slips[..., None], trial / np.where(slips, size, 1.0)[..., None], 0.0)
@@ -217,7 +250,7 @@ class Sliders:
     def _closure_of(self, stiffness: Array) -> Array:
         """Return the closures at which the springs have a stiffness, shape (n,) [mm]."""
         if not self._start.shape[1]:
-            return np.full(len(stiffness), -np.inf)
+            return np.full(len(stiffness), np.inf)
         upto = np.cumsum(self._stiffness, axis=1)
         last = np.count_nonzero(self._stiffness, axis=1) - 1
         group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))

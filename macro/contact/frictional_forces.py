@@ -6,7 +6,6 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from geometry.rigid_plane import Control
 from geometry.shear_state import ShearControl
-from geometry.sliders import SliderResponse, Sliders, SliderState
+from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
 from macro.contact.face_contact_state import FaceShear
@@ -48,31 +47,6 @@ class SliderMemory(NamedTuple):
     """
 
     sliders: SliderState
-    stress: Array
-    shift: Array
-    direction: Array
-    dissipated: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SliderRecord:
-    """What load steps leave behind of friction on a whole face, on any number of ranks.
-
-    Attributes:
-        place: Places of the samples in coordinates of the face, shape (m, 2) [mm].
-        shear: Shear stresses there, shape (m, 2) [MPa].
-        closure: Their closures, shape (m,) [mm].
-        slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
-        stress: Shear stresses of their springs, before they are scaled, shape (m, N, 2) [MPa].
-        shift: Shift of the plane, shape (2,) [mm].
-        direction: Unit vector of its last change, shape (2,).
-        dissipated: Energy lost to friction since the start [N mm].
-    """
-
-    place: Array
-    shear: Array
-    closure: Array
-    slip: Array
     stress: Array
     shift: Array
     direction: Array
@@ -168,7 +142,13 @@ class FrictionalForces(ContactForces):
         return self.respond_on(closure, displacement, self.pressure(closure), self._rate(closure))
 
     def respond_on(
-        self, closure: Array, displacement: PETSc.Vec, pressure: Array, rate: Array
+        self,
+        closure: Array,
+        displacement: PETSc.Vec,
+        pressure: Array,
+        rate: Array,
+        *,
+        sticks: bool = False,
     ) -> SliderResponse:
         """Return the same where pressures and stiffnesses are not those of the laws.
 
@@ -177,13 +157,15 @@ class FrictionalForces(ContactForces):
             displacement: Displacements of the body [mm].
             pressure: Pressures, shape (n,) [MPa].
             rate: Their derivatives by the closure, shape (n,) [MPa/mm].
+            sticks: Whether springs stick whatever they bear.
         """
         moved = self.along(displacement)
 
         def respond(shift: Array) -> SliderResponse:
             slip = shift - self.preload - moved
             pressed = np.maximum(pressure, 0.0)
-            return self.sliders.respond(self.memory.sliders, closure, slip, pressed, rate)
+            before = self.memory.sliders
+            return self.sliders.respond(before, closure, slip, pressed, rate, sticks=sticks)
 
         if not self._shifts:
             return respond(self._shift)
@@ -279,9 +261,14 @@ class FrictionalForces(ContactForces):
         pressure: Array,
         stiffness: Array,
         load: PETSc.Vec,
+        *,
+        first: bool,
     ) -> None:
-        """Write the forces on laws that are lines; see `ContactForces.write_lines`."""
-        found = self.respond_on(closure, displacement, pressure, stiffness)
+        """Write the forces on laws that are lines; see `ContactForces.write_lines`.
+
+        First all springs stick: where slip is softer than sticking, later steps do not go too far.
+        """
+        found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
         self.write_stresses(pressure, found.stress, load)
         self.linearise_shear(stiffness, found)
 
