@@ -302,15 +302,15 @@ class FrictionalForces(ContactForces):
         tangent[:, 1:, 0], tangent[:, 1:, 1:] = response.by_closure, response.by_slip
         self._take(stiffness, tangent)
 
-    def linearise_sticking(self, response: SliderResponse) -> None:
+    def linearise_sticking(self, stuck: Array) -> None:
         """Move the derivative to that of springs that stick, under unchanging pressures.
 
         Args:
-            response: The shear stresses.
+            stuck: Their tangential stiffness at this rank's samples, shape (n,) [MPa/mm].
         """
-        tangent = np.zeros((len(response.stuck), 3, 3))
-        tangent[:, 1:, 1:] = response.stuck[:, None, None] * np.eye(2)
-        self._take(np.zeros(len(response.stuck)), tangent)
+        tangent = np.zeros((len(stuck), 3, 3))
+        tangent[:, 1:, 1:] = stuck[:, None, None] * np.eye(2)
+        self._take(np.zeros(len(stuck)), tangent)
 
     def _take(self, stiffness: Array, tangent: Array) -> None:
         weight = self._sampling.weight
@@ -373,6 +373,7 @@ class FrictionalForces(ContactForces):
             displacement: Displacements there [mm].
         """
         found, before = self.respond(closure, displacement), self.memory
+        lost = self.sliders.step(before.sliders, found).lost
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         self.memory = SliderMemory(
@@ -380,7 +381,7 @@ class FrictionalForces(ContactForces):
             found.stress,
             self._shift.copy(),
             moved / size if size else before.direction,
-            before.dissipated + float(self.total(found.lost[:, None])[0]),
+            before.dissipated + float(self.total(lost[:, None])[0]),
         )
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear:
@@ -391,14 +392,16 @@ class FrictionalForces(ContactForces):
             displacement: Displacements [mm].
         """
         found = self.respond(closure, displacement)
-        lost = float(self.total(found.lost[:, None])[0])
+        step = self.sliders.step(self.memory.sliders, found)
+        lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
         return FaceShear(
             shift=(float(shift[0]), float(shift[1])),
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
-            stick_closure=np.minimum(found.stick_closure, closure),
+            stick_closure=np.minimum(step.stick_closure, closure),
+            stuck=step.stuck,
         )
 
     def record(self) -> SliderRecord:
@@ -426,11 +429,11 @@ class FrictionalForces(ContactForces):
         """
         sampling, size = self._sampling, self.levers.half
         own = np.column_stack([sampling.x, sampling.y])
-        springs = self.sliders.at_rest.stress.shape[1]
+        springs = self.sliders.at_rest.stress.shape[2]
 
         def found() -> Any:
             far, index = cKDTree(record.place).query(own) if len(own) else (np.zeros(0), [])
-            if np.any(far > _SAME_PLACE * size) or record.stress.shape[1] != springs:
+            if np.any(far > _SAME_PLACE * size) or record.stress.shape[2] != springs:
                 raise InputError("the sliders are those of another face, or of other laws")
             return np.asarray(index, np.intp)
 

@@ -182,7 +182,7 @@ class LawContactProblem:
         if not isinstance(forces, FrictionalForces):
             return None
         shear = forces.shear_state(self._closure, solution)
-        self._sticking = forces.respond(self._closure, solution)
+        self._stuck = shear.stuck
         forces.accept(self._closure, solution)
         return shear
 
@@ -239,17 +239,17 @@ class LawContactProblem:
         """
         forces, equilibrium = self.forces, self.equilibrium
         assert isinstance(forces, FrictionalForces)
-        found, ahead = self._sticking, forces.memory.direction
-        forces.linearise_sticking(found)
+        stuck, ahead = self._stuck, forces.memory.direction
+        forces.linearise_sticking(stuck)
         self._preconditioner.update()
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        stress = found.stuck[:, None] * ahead
+        stress = stuck[:, None] * ahead
         forces.write_stresses(np.zeros(len(stress)), stress, load)
         solver = self.newton.snes.ksp
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_STIFFNESS)
         iterations = solve_linear(solver, load, moved) if load.norm() else 0
-        relaxed = found.stuck[:, None] * forces.along(moved)
+        relaxed = stuck[:, None] * forces.along(moved)
         compat.collect_garbage(load.comm)
         return float(forces.total(stress - relaxed) @ ahead), iterations
 
