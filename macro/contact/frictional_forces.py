@@ -302,15 +302,17 @@ class FrictionalForces(ContactForces):
         tangent[:, 1:, 0], tangent[:, 1:, 1:] = response.by_closure, response.by_slip
         self._take(stiffness, tangent)
 
-    def linearise_sticking(self, stuck: Array) -> None:
-        """Move the derivative to that of springs that stick, under unchanging pressures.
+    def linearise_sticking(self, stiffness: Array, stuck: Array) -> None:
+        """Move the derivative to that of springs that stick, under a given shift.
 
         Args:
-            stuck: Their tangential stiffness at this rank's samples, shape (n,) [MPa/mm].
+            stiffness: Stiffnesses of the laws at this rank's samples, shape (n,) [MPa/mm].
+            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
         """
         tangent = np.zeros((len(stuck), 3, 3))
         tangent[:, 1:, 1:] = stuck[:, None, None] * np.eye(2)
-        self._take(np.zeros(len(stuck)), tangent)
+        self._shear = _HELD
+        self._take(stiffness, tangent)
 
     def _take(self, stiffness: Array, tangent: Array) -> None:
         weight = self._sampling.weight

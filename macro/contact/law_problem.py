@@ -225,8 +225,8 @@ class LawContactProblem:
     def tangential_stiffness(self) -> tuple[float, int]:
         """Return the derivative of the shear force along the plane's shift, body included [N/mm].
 
-        The shift changes on in the direction of its last change. Springs that stick follow it,
-        those that slip keep their stresses, and pressures stay as they are.
+        The shift changes on in the direction of its last change, under what else is prescribed of
+        the plane. Springs that stick follow it, those that slip keep their stresses.
 
         Returns:
             The derivative, and the linear iterations that it took.
@@ -240,7 +240,7 @@ class LawContactProblem:
         forces, equilibrium = self.forces, self.equilibrium
         assert isinstance(forces, FrictionalForces)
         stuck, ahead = self._stuck, forces.memory.direction
-        forces.linearise_sticking(stuck)
+        forces.linearise_sticking(forces.stiffness(self._closure), stuck)
         self._preconditioner.update()
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
         stress = stuck[:, None] * ahead

@@ -349,8 +349,8 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
         problem = f"does not go with {kind}, which has no tangential tractions"
         yield "friction", problem, "another coupling.kind, or laws of samples"
     elif scene.micro.model != "half-space":
-        problem = f"does not go with micro.model = '{scene.micro.model}' without laws"
-        yield "friction", problem, "micro.model = 'half-space'; or coupling.kind = 'consistent'"
+        problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
+        yield "friction", problem, "micro.model = 'half-space'; or laws"
     elif not loading.shear_points:
         yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
     yield from _sliding(scene)
