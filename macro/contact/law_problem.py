@@ -40,7 +40,7 @@ Indices = NDArray[np.intp]
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
 
-_STIFFNESS = 1e-6
+_STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
 
 _ROUGHLY = 1e-3
