@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 
@@ -64,6 +64,8 @@ class RepresentativeCoupling(LawCoupling):
         samples: The samples of every region of the face.
         micro: Micro model of the first sample, the periodic half-space.
     """
+
+    tolerance_by_accuracy: ClassVar[bool] = True
 
     samples: tuple[RegionSamples, ...]
     micro: HalfSpaceModel
@@ -119,6 +121,16 @@ class RepresentativeCoupling(LawCoupling):
         return tuple(one for region in self.samples for one in region.surfaces)
 
     @property
+    def label(self) -> str:
+        """The heights of the samples, and the elements of the bodies."""
+        bodies = ", ".join(
+            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+            for body in self.shown_bodies
+        )
+        slopes = " with finite slopes" * self.finite_slopes
+        return f"laws of samples on {describe.times(self.surface.grid)} heights{slopes}, {bodies}"
+
+    @property
     def finite_slopes(self) -> bool:
         """Whether finite slopes of the samples count: where the scene says so."""
         return bool(self.scene.micro.finite_slopes)
@@ -129,11 +141,22 @@ class RepresentativeCoupling(LawCoupling):
 
     def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
-        rows = SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
-        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
         steps = step_count(self.scene.loading)
-        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
         checks = 0 if self.unmeasured() else (steps if self.scene.output.check == "all" else 1)
+        return self.counted(steps, checks, ranks=ranks)
+
+    def counted(self, steps: int, checks: int, *, laws: bool = True, ranks: int = 1) -> Work:
+        """Count what load steps take.
+
+        Args:
+            steps: Load steps.
+            checks: Those of them whose errors are measured.
+            laws: Whether laws are made for them.
+            ranks: Processes that share meshes.
+        """
+        rows = laws * SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
+        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
+        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
         return Work(
             size=int(self.surface.heights.size),
             solutions=float(rows + checks * CHECKS_OF_SAMPLE * len(self.rough_surfaces)),
