@@ -28,6 +28,7 @@ from macro.compat import mesh_from_cells
 from macro.mesh.from_file import cell_tags, facet_tags
 from macro.mesh.refinement import refined
 from macro.mesh.tagged import planar_face
+from multiscale import Scene
 from multiscale.law_errors import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
@@ -363,3 +364,51 @@ def stated_and_true(body, comm, *, refinements=2):
     return SimpleNamespace(
         dofs=dofs, forces=np.array(forces), mesh=mesh, quadrature=quadrature, load=load
     )
+
+
+def rough_scene(body, mesh, seed, **keys):
+    """Return a scene of a random body with samples of its own under its mean pressure.
+
+    Args:
+        body: The body.
+        mesh: File of its mesh.
+        seed: Seed of the roughness.
+        keys: Further keys of the scene.
+    """
+    rng = np.random.default_rng([47, seed])
+    names = [body.materials[0], body.materials[1]]
+    modulus = names[-1 if body.shape == "pad" else 0].contact_modulus
+    # 2 to 20 % contact area; an rms height of a hundredth of the body's displacement to all of it
+    slope = 2.0 * body.pressure / modulus / float(np.exp(rng.uniform(np.log(0.02), np.log(0.2))))
+    moved = body.pressure / body.materials[0].young_modulus * body.length
+    height = moved * float(np.exp(rng.uniform(np.log(0.01), np.log(1.0))))
+    waves = int(rng.integers(4, 8))
+    spectrum = {"hurst": float(rng.uniform(0.6, 0.95)), "waves": [2, waves], "seed": seed}
+    materials = {"1": names[0], "2": names[1]}
+    fixed = ["free", "free", 0.0] if body.shape == "ring" else [0.0, 0.0, 0.0]
+    supports = [{"surface": "support", "displacement": fixed}]
+    if body.shape == "ring":
+        supports.append({"surface": "x", "displacement": [0.0, "free", "free"]})
+        supports.append({"surface": "y", "displacement": ["free", 0.0, "free"]})
+    section = {"mesh": str(mesh), "contact": "contact", "supports": supports}
+    constants = {
+        name: {"young_modulus": one.young_modulus, "poisson_ratio": one.poisson_ratio}
+        for name, one in materials.items()
+    }
+    section |= {"materials": constants} if body.shape == "pad" else constants["1"]
+    tilt = "free" if body.tilt is None else list(body.tilt)
+    # a wave of such a height and slope has about this length
+    length = 2.0 * np.pi * height / slope * 3.0
+    return Scene.from_dict(
+        {
+            "surface": {
+                "spectrum": {**spectrum, "rms_slope": slope},
+                "lengths": [length, length],
+            },
+            "law": {"kind": "representative"},
+            "body": section,
+            "load": {"pressure": body.pressure, "steps": 1, "zero": "mean plane", "tilt": tilt},
+            "output": {"figures": False, "report": False, "contact": "none"},
+            **keys,
+        }
+    )  # fmt: skip
