@@ -2,14 +2,15 @@
 
 The turning points of the load history are solved on the meshes and samples of every trial, and
 their errors are those that a run would measure there. Whatever exceeds its share of the accuracy is
-refined for the next trial: elements become quadratic, cells are cut into eight, samples get more
-heights, finite slopes are taken into account.
+refined for the next trial: elements become quadratic, cells are cut into eight as long as that
+lowers their error by a fifth, samples get more heights, finite slopes are taken into account.
 
 The rule in words: docs/choosing.md.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
@@ -55,11 +56,15 @@ class SampleSearch:
         """
         meshes = OpenMeshes(self.given)
         coupling = self._affordable(meshes, meshes.start(start))
-        errors = self._errors(coupling)
+        errors, before = self._errors(coupling), math.inf
         for _ in range(TRIALS - 1):
-            finer = self._finer(coupling, errors)
+            by_elements = self._share(errors, _ELEMENTS).error
+            # other meshes may be what is too coarse
+            finer = self._finer(coupling, errors, elements=by_elements <= 0.8 * before)
             if finer is None:
                 break
+            if finer.body != coupling.scene.body or finer.block != coupling.scene.block:
+                before = by_elements
             coupling.release()
             coupling = self._made(finer, coupling)
             errors = self._errors(coupling)
@@ -101,10 +106,18 @@ class SampleSearch:
     def _share(self, errors: Errors, causes: tuple[str, ...]) -> Share:
         return Share(errors, causes, self.accuracy)
 
-    def _finer(self, coupling: RepresentativeCoupling, errors: Errors) -> Scene | None:
-        """Return the scene with all refined that exceeds its share; None where nothing is."""
+    def _finer(
+        self, coupling: RepresentativeCoupling, errors: Errors, *, elements: bool
+    ) -> Scene | None:
+        """Return the scene with all refined that exceeds its share; None where nothing is.
+
+        Args:
+            coupling: The latest trial.
+            errors: Its errors.
+            elements: Whether elements may be refined.
+        """
         scene, auto = coupling.scene, auto_keys(self.given)
-        if self._share(errors, _ELEMENTS).excess > 1.0:
+        if elements and self._share(errors, _ELEMENTS).excess > 1.0:
             scene = self._finer_elements(coupling) or scene
         cells = self._share(errors, _CELLS)
         grid = scene.surface.grid

@@ -66,7 +66,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(COMM.bcast(folder))
         for seed in range(choice.first, choice.first + choice.bodies):
-            body = drawn(seed, coarser=1.5)
+            body = drawn(seed, coarser=2.0)
             mesh = folder / f"{seed}.xdmf"
             write_mesh(mesh_of(body, COMM), mesh)
             for accuracy in choice.accuracy:

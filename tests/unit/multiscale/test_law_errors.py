@@ -99,7 +99,8 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
 
 @pytest.mark.parametrize(("accuracy", "kept"), [(0.4, True), (0.001, False)])
 def test_an_accuracy_is_kept_or_said_not_to_be(mesh, accuracy, kept):
-    history = run(scene(mesh, accuracy=accuracy, law={"kind": "representative"}))
+    stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
+    history = run(scene(mesh, accuracy=accuracy, law={"kind": "representative"}, **stated))
     step = history.steps[-1]
     assert history.accuracy.kept is kept
     assert history.accuracy.error == pytest.approx(step.force_error_N / step.force_N, rel=1e-12)
