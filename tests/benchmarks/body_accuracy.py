@@ -27,7 +27,7 @@ from macro import write_mesh
 from multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
-MOST_UNKNOWNS = 1_500_000  # of the finest mesh; beyond, one refinement less
+MOST_UNKNOWNS = 300_000  # of the finest mesh; beyond, one refinement less
 
 
 def finer(scene, coupling, approach):
@@ -66,7 +66,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(COMM.bcast(folder))
         for seed in range(choice.first, choice.first + choice.bodies):
-            body = drawn(seed, coarser=2.0)
+            body = drawn(seed, coarser=1.5)
             mesh = folder / f"{seed}.xdmf"
             write_mesh(mesh_of(body, COMM), mesh)
             for accuracy in choice.accuracy:
