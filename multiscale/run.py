@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -28,6 +28,7 @@ from multiscale.observers.step_observers import (
     StiffnessObserver,
     WorkObserver,
 )
+from multiscale.progress import run_progress
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.notes import energy_notes, verdict, yielding_notes
@@ -285,7 +286,11 @@ class Run:
 
 @optional_packages()
 def run(
-    scene: Scene, comm: Any = None, *, observe: Callable[[LoadStep], None] | None = None
+    scene: Scene,
+    comm: Any = None,
+    *,
+    observe: Callable[[LoadStep], None] | None = None,
+    progress: bool = False,
 ) -> History:
     """Run a scene from surface to history; nothing is written.
 
@@ -293,6 +298,7 @@ def run(
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
         observe: Called with every accepted load step.
+        progress: Whether what the run is at is shown, in the terminal or below a notebook's cell.
 
     Returns:
         The history, the same on every rank.
@@ -305,14 +311,17 @@ def run(
     Note:
         Collective.
     """
-    whole = Run(scene, comm)
-    try:
-        for step in whole.load_steps():
-            if observe is not None:
-                observe(step)
-        return whole.history()
-    except NotConverged as error:
-        error.history = whole.history()
-        raise
-    finally:
-        whole.close()
+    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
+        advance, at = shown
+        whole = Run(scene, comm)
+        whole.clock.observe = at
+        try:
+            for step in whole.load_steps():
+                for tell in filter(None, (advance, observe)):
+                    tell(step)
+            return whole.history()
+        except NotConverged as error:
+            error.history = whole.history()
+            raise
+        finally:
+            whole.close()

@@ -266,6 +266,9 @@ class RepresentativeCoupling(LawCoupling):
             return model
         return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
 
+    def _stiffness_ratios(self) -> list[float]:
+        return [region.materials.stiffness_ratio for region in self.samples]
+
     def _largest_loads(self) -> tuple[float, float | None]:
         """Return the largest local pressure that laws are made for [MPa], and closure [mm].
 
@@ -323,7 +326,7 @@ class RepresentativeCoupling(LawCoupling):
         longer = self._make_table(None, before=table)
         if longer is table:
             return None
-        self.table = longer
+        self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
         self._extensions.append(
             f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
             "needed"

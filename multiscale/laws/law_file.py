@@ -35,7 +35,7 @@ _SCALARS = {
     "warned_from": "warning_pressure",
     "repaired": "repaired",
 }
-_PATH = "path"
+_PATH, _SPRINGS = "path", "springs"
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
@@ -57,8 +57,9 @@ def law_bytes(table: LawTable) -> bytes:
     """Return the content of a law file.
 
     It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
-    and a group for the path of the plane where there is one. A checksum stands before the content;
-    see `support.checked_store`.
+    and a group for the path of the plane where there is one. The group ``springs`` of a law has the
+    springs of `PatchLaw.springs` where the tangential stiffness is known. A checksum stands before
+    the content; see `support.checked_store`.
 
     Args:
         table: The laws.
@@ -86,12 +87,30 @@ def law_bytes(table: LawTable) -> bytes:
                 group.attrs[name] = getattr(law, attribute)
             if np.isfinite(law.sample_area):
                 group.attrs["sample_area_mm2"] = law.sample_area
+            if np.isfinite(law.stiffness_ratio):
+                group.attrs["stiffness_ratio"] = law.stiffness_ratio
+                _write_springs(group, law)
         if table.path is not None:
             group = file.create_group(_PATH)
             for name, unit in _PATH_UNITS.items():
                 group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
 
     return hdf5_bytes(fill)
+
+
+def _write_springs(group: Any, law: PatchLaw) -> None:
+    """Write the springs of a law under friction, which follow from its rows, for other programs."""
+    if law.is_flat:
+        return
+    bed, springs = law.springs, group.create_group(_SPRINGS)
+    springs.attrs["error"] = bed.error
+    for name, (values, unit) in {
+        "first_touch": (bed.start, "mm"),
+        "last_touch": (bed.start + bed.width, "mm"),
+        "normal_stiffness": (bed.stiffness, "MPa/mm"),
+        "tangential_stiffness": (bed.stiffness / law.stiffness_ratio, "MPa/mm"),
+    }.items():
+        springs.create_dataset(name, data=values).attrs["unit"] = unit
 
 
 def read_laws(path: str | Path | BinaryIO) -> LawTable:
@@ -172,6 +191,7 @@ def _law(group: Any) -> PatchLaw:
     }
     scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
     scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
+    scalars["stiffness_ratio"] = float(group.attrs.get("stiffness_ratio", np.nan))
     return PatchLaw(rows=LawRows(**found), **scalars)
 
 

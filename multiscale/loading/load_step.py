@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import Control, PatchGrid, Regions
+from multiscale.readable import measured, number
 from support.arrays import Array
+from support.displayed import Displayed, Table
 
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
@@ -34,8 +36,8 @@ class PatchState:
     stiffness_MPa_per_mm: Array | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoadStep:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class LoadStep(Displayed):
     """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
 
     Attributes:
@@ -168,6 +170,20 @@ class LoadStep:
     stage: int | None = None
     body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return approach and force in a line, and a table of all numbers that are known."""
+        line = (
+            f"LoadStep {self.step}: {measured(self.approach_mm, self.approach_error_mm, 'mm')}, "
+            f"{measured(self.force_N, self.force_error_N, 'N')}"
+        )
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        rows = [
+            (name, number(value, 6) if isinstance(value, float) else str(value))
+            for name, value in values
+            if isinstance(value, float | int | str) and value != ""
+        ]
+        return line, (("", "value"), rows)
 
     @classmethod
     def of_patches(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, overload
+from dataclasses import KW_ONLY, dataclass, field, replace
+from typing import Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,13 @@ from geometry.patches import PatchGrid, Regions
 from multiscale.figures import by_matplotlib
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
+from multiscale.readable import SCALED_UNITS, Caution, span, usual_unit, with_error
 from multiscale.results.contact_record import ContactRecord
-from multiscale.results.data_frames import data_frame
-from multiscale.results.html_page import Table, table_html
+from multiscale.results.data_frames import data_frame, dataset
 from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
+from support.displayed import Displayed, Table
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -107,11 +108,13 @@ class Column:
         return f"{self.heading} [{name}]" if name else self.heading, texts
 
 
-@dataclass(frozen=True, kw_only=True)
-class History:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class History(Displayed):
     """All load steps of a run; every column of ``history.csv`` is an attribute, as an array.
 
-    A new column is one more `Column` in this class, behind those that are there.
+    ``history[-1]`` is a `LoadStep`, ``history[2:5]`` the history of these load steps alone.
+    Printed, or in a notebook, a history is a table. A new column is one more `Column` in this
+    class, behind those that are there.
 
     Attributes:
         steps: The load steps.
@@ -121,6 +124,7 @@ class History:
         accuracy: Whether the accuracy that was asked for is kept; None where none was.
         reference: Results of all meshes of a reference; None with other couplings.
         contact_records: The contacts of those load steps that the scene asks for.
+        before: Of a part of a history the load step before the first of the part, if there is one.
     """
 
     step = Column("Number of the load step, from 1", heading="step")
@@ -269,12 +273,35 @@ class History:
     accuracy: AccuracyVerdict | None = None
     reference: ReferenceRecord | None = None
     contact_records: tuple[ContactRecord, ...] = ()
+    before: LoadStep | None = None
 
     def __len__(self) -> int:
         return len(self.steps)
 
     def __iter__(self) -> Iterator[LoadStep]:
         return iter(self.steps)
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> LoadStep: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> History: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> LoadStep | History:
+        if not isinstance(index, slice):
+            return self.steps[index]
+        places = range(len(self.steps))[index]
+        if places.step < 0:
+            raise InputError("a history goes forward", value=index, allowed="a step of 1 or more")
+        steps = self.steps[index]
+        numbers = {step.step for step in steps}
+        return replace(
+            self,
+            steps=steps,
+            contact_records=tuple(one for one in self.contact_records if one.step in numbers),
+            reference=None if self.reference is None else self.reference.at(index),
+            before=self.steps[places.start - 1] if places.start else self.before,
+        )
 
     @property
     def patch_pressure_MPa(self) -> Array:
@@ -289,7 +316,7 @@ class History:
     @property
     def unloading(self) -> NDArray[np.bool_]:
         """Whether the load fell to each load step, shape (steps,)."""
-        before = (None, *self.steps)
+        before = (self.before, *self.steps)
         return np.array(
             [step.is_unloading(last) for step, last in zip(self.steps, before, strict=False)], bool
         )
@@ -340,6 +367,39 @@ class History:
             ImportError: When pandas, which patchlaw does not require, is not installed.
         """
         return data_frame(self.records())
+
+    def to_xarray(self) -> Any:
+        """Return all columns and the state of the patches as an xarray dataset.
+
+        Columns that no load step knows are left out. Of patches the dimensions are ``step``, ``ix``
+        and ``iy``, of regions ``step`` and ``region``.
+
+        Raises:
+            ImportError: When xarray, which patchlaw does not require, is not installed.
+        """
+        known = [one for one in COLUMNS if any(one.of(step) is not None for step in self.steps)]
+        values: dict[str, Any] = {
+            one.name: (("step",), getattr(self, one.name), _attributes(one)) for one in known
+        }
+        places: dict[str, Any] = {"step": values.pop("step", (("step",), self.step))}
+        if isinstance(self.patches, PatchGrid):
+            axes = dict(zip(("ix", "iy"), self.patches.grid, strict=True))
+        else:
+            axes, places["region"] = {"region": self.patches.count}, list(self.patches.names)
+        for name in self._patch_values:
+            column = np.array([getattr(step.patches, name) for step in self.steps])
+            shaped = column.reshape(len(self.steps), *axes.values())
+            values[f"patch_{name}"] = (("step", *axes), shaped)
+        return dataset(values, places, {"units": "mm, N, MPa"})
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what the history is in a line, and the curve with the solver's work as a table."""
+        if not self.steps:
+            return "History without a load step", ((), ())
+        count = len(self.steps)
+        ranges = span(self.approach_mm, "mm"), span(self.force_N, "N")
+        line = f"History of {count} load step{'s' * (count > 1)}: {', '.join(ranges)}"
+        return line, self.table(most=60)
 
     def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
@@ -392,13 +452,14 @@ class History:
         """
         return by_matplotlib("figures.curves.history_figure", self, label)
 
-    def _repr_html_(self) -> str:
-        """Return the table as HTML, which notebooks show for a history."""
-        return table_html(self.table())
-
 
 COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
 """The columns of ``history.csv``, in their order."""
+
+
+def _attributes(column: Column) -> dict[str, str]:
+    """Return the attributes of a column in a dataset, which its axes are labelled with."""
+    return {"long_name": column.meaning} | ({"units": column.unit} if column.unit else {})
 
 
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:

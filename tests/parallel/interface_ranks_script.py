@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from helpers.user_problems import (
     PATCHES,
     TETRAHEDRA,
     TOP,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -25,6 +27,8 @@ from helpers.user_problems import (
 
 from geometry.meshes.block import BlockShape
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction
 from macro import (
     Block,
     ContactProblem,
@@ -81,6 +85,28 @@ def bar():
     return found, COMM.allgather(given)
 
 
+def rubbing():
+    """Return shear forces, energies and shifts of a face that slips, step by step, per element."""
+    found, laws = {}, [RangedLaw(law.k, law.touch) for law in LAWS]
+    shears = [ShearControl(shift=(6e-4, 2e-4)), ShearControl(force=(-0.2, 0.3))]
+    for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
+        mesh = box(cell=cell, comm=COMM)
+        tags, space = marked(mesh), compat.vector_space(mesh, 1)
+        u, friction = fem.Function(space), Friction(coefficient=0.3, poisson_ratio=0.2)
+        options = {"patches": PATCHES, "mode": mode, "friction": friction}
+        force = Control(force=3.0, tilt=None)
+        rough = Interface(space, tags, TOP, laws=laws, indenter=force, **options)
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        for k, shear in enumerate((None, *shears)):
+            rough.indenter = replace(force, shear=shear)
+            problem.solve()
+            if k == 1:
+                rough.slip_record = rough.slip_record  # as from another run
+            values = [*rough.shear_force, rough.dissipated, rough.slip_area, *rough.shift]
+            found[f"{mode} {k}"] = [float(value) for value in values]
+    return found
+
+
 def refusals():
     """Return what all ranks say of a face that is not there, and of a wrong facet on the last."""
     mesh = box(cell=TETRAHEDRA, comm=COMM)
@@ -100,6 +126,8 @@ if __name__ == "__main__":
         result |= cube(element, mode)
     ends, facets = bar()
     errors = refusals()
+    rubbed = rubbing()
     if COMM.rank == 0:
         values = {"values": result, "bar": ends, "facets": facets, "errors": errors}
+        values["rubbed"] = rubbed
         sys.stdout.write(json.dumps(values) + "\n")
