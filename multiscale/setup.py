@@ -115,4 +115,5 @@ class _Builder:
         if self._read.get("sections") != sections:
             self._read.clear()  # before others take memory
             self._read.update(meshes=read_bodies(scene, self.comm), sections=sections)
-        return self._read["meshes"]  # type: ignore[no-any-return]
+        meshes: Meshes = self._read["meshes"]
+        return meshes

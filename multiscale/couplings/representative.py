@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,12 +19,17 @@ from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.couplings.coupling import Source
+from multiscale.couplings.coupling import Meshes, Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
-from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_surface
+from multiscale.inputs.surfaces import (
+    RegionSamples,
+    located,
+    region_samples,
+    sample_surface,
+)
 from multiscale.law_errors import (
     CHECKS_OF_SAMPLE,
     LawErrorProbe,
@@ -102,6 +107,14 @@ class RepresentativeCoupling(LawCoupling):
             micro=model,
             plane_at_largest_load=plane,
         )
+
+    def attach(self, comm: Any, meshes: Meshes) -> None:
+        """Put the coupling on its bodies, whose contact faces must have a part in common."""
+        super().attach(comm, meshes)
+        if meshes[1] is not None:
+            face: Any = self.bodies.contact_face()
+            with located(self.scene, "counter_body.contact"):
+                face.check_common()
 
     # --- what is known before the run
 
@@ -181,7 +194,7 @@ class RepresentativeCoupling(LawCoupling):
         """Say how the run will know its error."""
         if self.unmeasured():
             return super().error_statement()
-        return self.measured_at(causes_of(self.samples))
+        return self.measured_at(causes_of(self.samples, half_space=self.both_elastic))
 
     # --- errors
 
@@ -198,6 +211,7 @@ class RepresentativeCoupling(LawCoupling):
             laws=solver.table.laws,
             samples=self.samples,
             probe_of=self._probe_of,
+            left_out=self._left_out(step.mean_pressure_MPa) if self.both_elastic else 0.0,
             comm=self.comm,
         )
         by_force = problem.forces.control.force is not None

@@ -1,6 +1,6 @@
 """Accuracies on bodies drawn at random: what is chosen for them, and whether it is kept.
 
-Run by hand: `.venv/bin/python tests/benchmarks/body_accuracy.py [--bodies 10] [--first 100]`, also
+Run by hand: `.venv/bin/python tests/benchmarks/body_accuracy.py [--bodies 10] [--first 0]`, also
 under mpirun. Every body has rough samples of its own, and runs with `accuracy` and all else open.
 The force at the same approach with cells cut into eight twice more, four times as many heights
 along a side of the samples, laws to a tenth of the tolerance and finite slopes is taken for the
@@ -27,7 +27,7 @@ from macro import write_mesh
 from multiscale import Run, Scene
 
 COMM = MPI.COMM_WORLD
-MOST_UNKNOWNS = 300_000  # of the finest mesh; beyond, one refinement less
+MOST_UNKNOWNS = 500_000  # of the finest mesh; beyond, one refinement less
 
 
 def finer(scene, coupling, approach):
@@ -59,7 +59,7 @@ def solved(scene):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bodies", type=int, default=10)
-    parser.add_argument("--first", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--accuracy", type=float, nargs="+", default=[0.05, 0.02])
     choice = parser.parse_args()
     kept, said = dict.fromkeys(choice.accuracy, 0), dict.fromkeys(choice.accuracy, 0)

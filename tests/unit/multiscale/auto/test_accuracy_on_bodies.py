@@ -195,7 +195,7 @@ def test_bodies_on_both_sides_are_refined_where_that_is_open(plate, tmp_path):
         tmp_path, (3.0, 1.0, 0.5), (4, 2, 1), turn=np.diag([1.0, -1.0, -1.0]), shift=(0, 1, 0)
     )
     counter = {**on_mesh(other), "refinements": 0}
-    given = of_sample(accuracy=0.006, body=on_mesh(plate), counter_body=counter)
+    given = of_sample(accuracy=0.004, body=on_mesh(plate), counter_body=counter)
     setup = make_setup(given)
     assert setup.scene.body.refinements > 0 == setup.scene.counter_body.refinements
     assert setup.scene.body.element == setup.scene.counter_body.element == "quadratic"
