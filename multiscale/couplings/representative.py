@@ -68,12 +68,14 @@ class RepresentativeCoupling(LawCoupling):
     Attributes:
         samples: The samples of every region of the face.
         micro: Micro model of the first sample, the periodic half-space.
+        further_fields: Make functions on the mesh that are written with the other fields.
     """
 
     tolerance_by_accuracy: ClassVar[bool] = True
 
     samples: tuple[RegionSamples, ...]
     micro: HalfSpaceModel
+    further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
     _extensions: list[str] = field(default_factory=list, init=False)
 
     @classmethod
@@ -262,6 +264,7 @@ class RepresentativeCoupling(LawCoupling):
             most_rows=MOST_ROWS,
             make_model=lambda sample: models[id(sample)],
             before=before,
+            leak=self.scene.leak is not None,
             comm=self.comm,
             observe=observe,
         )
@@ -327,7 +330,9 @@ class RepresentativeCoupling(LawCoupling):
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         face = self.bodies.contact_face()
-        return ExtendedLaws(partial(self._problem, face), table, face, self._longer)
+        solver = ExtendedLaws(partial(self._problem, face), table, face, self._longer)
+        solver.further_fields = self.further_fields
+        return solver
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
