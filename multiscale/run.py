@@ -71,6 +71,7 @@ class Run:
         self.position = LoadPosition()
         self._start: Any = None
         self._notes: list[str] = []
+        self._leak: StepObserver | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
@@ -89,7 +90,8 @@ class Run:
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
         if self.scene.leak is not None:
-            self._observers.append(self._leak_observer(self.scene.leak))
+            self._leak = self._leak_observer(self.scene.leak)
+            self._observers.append(self._leak)
         if self.scene.friction is not None:
             from multiscale.observers.friction import FrictionObserver  # others do without
 
@@ -97,12 +99,17 @@ class Run:
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def _leak_observer(self, section: LeakSection) -> StepObserver:
-        """Return what adds the leak to load steps: through gaps of cells, or over a face."""
+        """Return what adds the leak to load steps: through gaps, patches, or over a face."""
         if section.between_edges:
             from multiscale.observers.face_leak import FaceLeakObserver
 
             coupling: Any = self.coupling
             return FaceLeakObserver(coupling, section)
+        if self.coupling.has_laws:
+            from multiscale.observers.patch_leak import PatchLeakObserver
+
+            laws: Any = self.coupling
+            return PatchLeakObserver(laws, section)
         from multiscale.observers.leak import LeakObserver
 
         return LeakObserver(self.coupling, section, self._has_unloaded)
@@ -155,6 +162,11 @@ class Run:
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
         return tuple(self._contacts.records)
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
+        return getattr(self._leak, "map", None)
 
     def _has_unloaded(self) -> bool:
         """Tell whether the load was larger at an earlier load step."""

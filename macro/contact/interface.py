@@ -22,8 +22,14 @@ from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactTangent
 from macro.contact.face_contact_state import FaceContactState, FaceShear
+from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
 from macro.contact.frictional_forces import FrictionalForces, contact_forces
-from macro.contact.interface_parts import InterfaceLaws, chosen_face, laws_on_face
+from macro.contact.interface_parts import (
+    InterfaceLaws,
+    chosen_face,
+    given_facets,
+    laws_on_face,
+)
 from macro.contact.loaded_face import LoadedFace, Mode
 from macro.contact.sampling import by_patch, crown_depth
 from macro.linear_solvers.node_matrices import coupled_springs_at, free_unknowns, springs_at
@@ -121,7 +127,7 @@ class Interface:
         friction: float | Friction | None = None,
     ) -> None:
         self._friction = _friction(friction)
-        self.space = space
+        self.space, self._tags = space, (facet_tags, names)
         face = chosen_face(space, facet_tags, tag, names, frame)
         compat.collect_garbage(self.comm)  # of interfaces before this one
         chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
@@ -435,6 +441,45 @@ class Interface:
                 checks[i](closure[self.sampling.patch == i])
 
         together(self.comm, check)
+
+    def leak(
+        self,
+        inlet: int | str | NDArray[Any],
+        outlet: int | str | NDArray[Any],
+        *,
+        viscosity: float,
+        pressures: tuple[float, float],
+    ) -> FaceLeak:
+        """Return what leaks over the face at the latest `evaluate`, from edge to edge.
+
+        Reynolds' equation on the face with the transmissivity of its laws, which have it where they
+        were made with ``leak=True``. Other edges are walls. Fluid pressure does not move the face.
+
+        Args:
+            inlet: The face of the body, as `tag`, that shares with the contact face the edge where
+                the fluid enters.
+            outlet: That where it leaves.
+            viscosity: Dynamic viscosity of the fluid [MPa s]; that of water is 1e-9.
+            pressures: Fluid pressures at inlet and outlet [MPa].
+
+        Returns:
+            Flow rate, balance, and the fluid pressure as a function on the mesh. With laws per
+            patch the transmissivity is uniform on every patch.
+
+        Raises:
+            InputError: When a law has no ``transmissivities``, the patches do not cover the face,
+                or inlet and outlet do not share an edge with it.
+            NotConverged: When what enters and leaves the nodes of the mesh does not balance.
+        """
+        tags, names = self._tags
+        mesh, points = self.space.mesh, self._face.quadrature
+        closure = self.state.patch_closure[points.patch]
+        if self.mode == "pointwise":
+            closure = self.closure
+        values = together(self.comm, lambda: transmissivities_of(self.laws, points.patch, closure))
+        inside, outside = (given_facets(mesh, tags, one, names)[0] for one in (inlet, outlet))
+        face = LeakingFace(mesh, self._face.facets, points, (inside, outside))
+        return face_leak(face, values, viscosity, pressures)
 
     @property
     def points(self) -> Array:

@@ -17,6 +17,7 @@ from geometry import InputError
 from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
+from multiscale.laws.transmissivity import Transmissivity
 from multiscale.readable import column, span
 from support.displayed import Displayed, Table, of_columns, spread
 
@@ -57,6 +58,7 @@ class PatchLaw(Displayed):
         sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
         stiffness_ratio: Mindlin's ratio of the normal to the tangential stiffness of the bodies,
             which friction takes; NaN where it is not known.
+        transmissivity: What a fluid finds between the gaps; None where no leak was asked for.
 
     Raises:
         InputError: When the rows are no law.
@@ -71,6 +73,7 @@ class PatchLaw(Displayed):
     repaired: float = 0.0
     sample_area: float = float("nan")
     stiffness_ratio: float = float("nan")
+    transmissivity: Transmissivity | None = None
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -198,6 +201,22 @@ class PatchLaw(Displayed):
             return np.zeros(closures.shape)
         rows = self.rows[: self.rising_rows]
         return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
+
+    def transmissivities(self, closure: ArrayLike) -> Array:
+        """Return the transmissivities along x and y at closures, shape (n, 2) [mm³].
+
+        Args:
+            closure: Closures, shape (n,) [mm]; beyond the rows the tangents continue.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        if self.transmissivity is None:
+            raise InputError(
+                "the law has no transmissivity",
+                allowed="a law made with leak = True, or in a scene with [leak]",
+            )
+        return self.transmissivity.at(self.at(closure, extend=True).separation)
 
     def shifted(self, distance: float) -> PatchLaw:
         """Return the law with approach and closure counted from a plane that is higher.

@@ -21,8 +21,8 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 FLOORS = {
     "support": [
         "arrays cores displayed errors small_caches",
-        "checks collective fields packages quantities whole_files",
-        "checked_store",
+        "checks collective fields network packages quantities whole_files",
+        "checked_store network_flow",
     ],
     "geometry": [
         "interpolant legendre_modes materials",

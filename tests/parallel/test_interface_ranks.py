@@ -48,3 +48,11 @@ def test_all_ranks_refuse_together(on_ranks, ranks):
     assert errors == [errors[0]] * ranks
     assert "has no facets" in errors[0][0]
     assert "are not in the mesh" in errors[0][1]
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_a_face_leaks_the_same_on_any_ranks(on_ranks, ranks):
+    for name, (values, imbalance) in on_ranks[ranks]["leaks"].items():
+        assert values == pytest.approx(on_ranks[1]["leaks"][name][0], rel=1e-8), name
+        assert values[0] > 0.0
+        assert imbalance < 1e-10, name
