@@ -228,7 +228,7 @@ class EmbeddedLaws(LawSolver):
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_shear(self, state: FaceContactState, area_fraction: Array) -> dict[str, float]:
+    def _of_shear(self, state: FaceContactState, area_fraction: Array) -> dict[str, Any]:
         """Return the columns of the shear; none without friction.
 
         Args:
