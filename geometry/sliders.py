@@ -117,6 +117,9 @@ class Sliders:
         ratios: Mindlin's ratio r of every law.
         patch: Law of every sample, shape (n,).
         coefficient: Coefficient of friction μ.
+
+    Attributes:
+        ratio: r of every sample, shape (n,).
     """
 
     def __init__(
@@ -134,10 +137,10 @@ class Sliders:
                 row[: len(bed)] = getattr(bed, name)
             return rows[patch]
 
+        self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch
         self._start, self._width = padded("start", np.inf), padded("width", 0.0)
         self._stiffness = padded("stiffness", 0.0)
-        self._ratio = np.asarray(ratios, float)[patch]
         self._coefficient = coefficient
 
     @property
@@ -168,7 +171,7 @@ class Sliders:
             sticks: Whether springs stick whatever they bear, as a first guess of a step takes them.
         """
         springs, mu = self._at(closure), self._coefficient
-        moved = (slip - before.slip) / self._ratio[:, None]
+        moved = (slip - before.slip) / self.ratio[:, None]
         mx, my = moved[:, :1], moved[:, 1:]
         trial = before.stress + springs.stiffness[:, None] * moved[..., None]
         tx, ty = trial[:, 0], trial[:, 1]
@@ -196,9 +199,9 @@ class Sliders:
         scaling = np.divide(rate - scale * stiffness, of_springs, out=0.0 * rate, where=loaded)
         return SliderResponse(
             stress=scale[:, None] * stress,
-            by_slip=(scale / self._ratio)[:, None, None] * by_slip,
+            by_slip=(scale / self.ratio)[:, None, None] * by_slip,
             by_closure=scale[:, None] * by_closure + scaling[:, None] * stress,
-            sticking=scale / self._ratio * stiffness,
+            sticking=scale / self.ratio * stiffness,
             after=SliderState(closure=closure, slip=slip, stress=after),
             trial=trial,
             scale=scale,
@@ -217,7 +220,7 @@ class Sliders:
         stuck = np.where(sticks, now.stiffness, 0.0).sum(axis=1)
         return SliderStep(
             lost=found.scale * self._lost(before, found.trial, stress, now),
-            stuck=found.scale / self._ratio * stuck,
+            stuck=found.scale / self.ratio * stuck,
             stick_closure=self._closure_of(stuck),
         )
 
@@ -265,7 +268,7 @@ class Sliders:
         """
         then = self._at(before.closure)
         stiffness = np.maximum(now.stiffness, then.stiffness)
-        slip = (trial - after) * self._ratio[:, None, None]
+        slip = (trial - after) * self.ratio[:, None, None]
         slip /= np.where(stiffness > 0.0, stiffness, 1.0)[:, None]
         rises = now.force > then.force
         mean = np.where(rises, 0.5 + 0.5 * then.force / np.where(rises, now.force, 1.0), 1.0)

@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 NEAR = 0.01
 """Residual over the contact forces from which Newton's method goes on alone."""
+_FAR = 0.1
+"""Residual beyond which the first lines are those of contact that sticks. Nearer, the guess is that
+already, in the basis of earlier solutions."""
 _MOST_STEPS = 8
 _TOLERANCE = 0.001
 """Relative tolerance of linear solves. With 0.01 closures under a prescribed approach were off by a
@@ -68,7 +71,8 @@ class FirstSteps:
         own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            self._linearise(displacement, lines, first=len(residuals) == 1)
+            first = len(residuals) == 1 and residuals[0] > _FAR
+            self._linearise(displacement, lines, first=first)
             self._follow()
             solver.setTolerances(rtol=_TOLERANCE)
             solver.solve(self._residual, step)

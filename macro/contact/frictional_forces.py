@@ -16,7 +16,7 @@ from geometry.rigid_plane import Control
 from geometry.shear_state import ShearControl
 from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
-from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws, StickingFrom
 from macro.contact.face_contact_state import FaceShear
 from macro.contact.loaded_face import ContactFace, Mode
 from support.arrays import Array
@@ -271,6 +271,13 @@ class FrictionalForces(ContactForces):
         found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
         self.write_stresses(pressure, found.stress, load)
         self.linearise_shear(stiffness, found)
+
+    def sticking_from_last(self) -> StickingFrom | None:
+        """Return what springs that stick bear; None where the shift of the plane is not known."""
+        if self._shifts:
+            return None
+        slip = self._shift - self.preload - self.memory.sliders.slip
+        return StickingFrom(self.memory.stress, slip, self.sliders.ratio)
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step."""
