@@ -273,11 +273,10 @@ class FrictionalForces(ContactForces):
         self.linearise_shear(stiffness, found)
 
     def sticking_from_last(self) -> StickingFrom | None:
-        """Return what springs that stick bear; None where the shift of the plane is not known."""
-        if self._shifts:
-            return None
+        """Return what springs that stick bear; unchanged where the shift is not known yet."""
         slip = self._shift - self.preload - self.memory.sliders.slip
-        return StickingFrom(self.memory.stress, slip, self.sliders.ratio)
+        ratio = np.full_like(self.sliders.ratio, np.inf) if self._shifts else self.sliders.ratio
+        return StickingFrom(self.memory.stress, slip, ratio)
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step."""
