@@ -13,9 +13,10 @@ class Scaled:
     """A preconditioner that is a diagonal."""
 
     def __init__(self, diagonal):
-        self.diagonal = diagonal
+        self.diagonal, self.applied = diagonal, 0
 
     def apply(self, x, y):
+        self.applied += 1
         y.array[:] = self.diagonal * x.array_r
 
 
@@ -47,7 +48,16 @@ def test_modes_span_those_of_the_smallest_eigenvalues(stiff):
 
 def test_a_good_preconditioner_has_no_slow_modes():
     spread = np.diag(np.linspace(1.0, 2.3, SIZE))
-    assert slow_modes(dense(spread), Scaled(np.ones(SIZE))).shape == (SIZE, 0)
+    good = Scaled(np.ones(SIZE))
+    assert slow_modes(dense(spread), good).shape == (SIZE, 0)
+    assert good.applied == 7  # its first Ritz values say so
+
+
+def test_the_first_ritz_values_do_not_hide_a_single_slow_mode():
+    values = np.linspace(0.5, 1.0, SIZE)
+    values[17] = 3.1e-3
+    modes = slow_modes(dense(np.diag(values)), Scaled(np.ones(SIZE)))
+    assert np.abs(modes[17]).max() >= 0.999 * np.linalg.norm(modes, axis=0).max()
 
 
 def test_balanced_is_the_formula_and_exact_on_the_modes(stiff):
