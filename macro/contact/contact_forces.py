@@ -241,6 +241,8 @@ class ContactForces:
         pressure: Array,
         stiffness: Array,
         load: PETSc.Vec,
+        *,
+        first: bool,
     ) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
@@ -250,6 +252,7 @@ class ContactForces:
             pressure: Their pressures on the lines [MPa].
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
+            first: Whether these are the first lines of a load step, which friction tells apart.
         """
         samples = self._sampling.values
         samples.array[:] = pressure

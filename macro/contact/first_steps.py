@@ -68,7 +68,7 @@ class FirstSteps:
         own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            self._linearise(displacement, lines)
+            self._linearise(displacement, lines, first=len(residuals) == 1)
             self._follow()
             solver.setTolerances(rtol=_TOLERANCE)
             solver.solve(self._residual, step)
@@ -97,10 +97,11 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _linearise(self, displacement: PETSc.Vec, lines: Lines) -> None:
+    def _linearise(self, displacement: PETSc.Vec, lines: Lines, *, first: bool) -> None:
         """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
         matrix, forces = self._equilibrium.matrix, self._forces
         closure = self._closure_on(lines, displacement)
-        forces.write_lines(displacement, closure, lines.at(closure), lines.stiffness, self._load)
+        pressure, stiffness = lines.at(closure), lines.stiffness
+        forces.write_lines(displacement, closure, pressure, stiffness, self._load, first=first)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -46,6 +46,8 @@ from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
 
+NOT_WITH_FRICTION = "the measure does not know what has slipped under laws"
+
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
 Meshes = tuple[SceneBody | None, SceneBody | None]
