@@ -53,11 +53,13 @@ def test_a_good_preconditioner_has_no_slow_modes():
     assert good.applied == 7  # its first Ritz values say so
 
 
-def test_the_first_ritz_values_do_not_hide_a_single_slow_mode():
+def test_the_search_goes_on_where_a_single_slow_mode_is_left():
+    """The first Ritz values do not show it, the residual does."""
     values = np.linspace(0.5, 1.0, SIZE)
     values[17] = 3.1e-3
-    modes = slow_modes(dense(np.diag(values)), Scaled(np.ones(SIZE)))
-    assert np.abs(modes[17]).max() >= 0.999 * np.linalg.norm(modes, axis=0).max()
+    hidden = Scaled(np.ones(SIZE))
+    slow_modes(dense(np.diag(values)), hidden)
+    assert hidden.applied > 7
 
 
 def test_balanced_is_the_formula_and_exact_on_the_modes(stiff):
