@@ -590,6 +590,8 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
+        if not bodies and "bodies" in self.__dict__:
+            bodies = self.bodies.made_bodies
         self._meshes = (None, None)
         for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)

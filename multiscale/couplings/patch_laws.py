@@ -176,8 +176,25 @@ class ConsistentCoupling(PatchLaws):
         with self.clock.phase("block"):
             self._model = self.model_on_body()
 
+    def newton(self, table: LawTable | None = None) -> NewtonChoice:
+        """Choose the Newton of the scene; see `PatchLaws.newton`.
+
+        The rows of the laws take the displacements of the mesh by every patch that carries load,
+        and load steps need to know no more of it.
+
+        Args:
+            table: The laws, once made.
+        """
+        choice, coupling = super().newton(table), self.scene.coupling
+        if choice.condensed or coupling.newton != "auto" or coupling.interface != "patchwise":
+            return choice
+        loaded = self.interfering_patches if table is None else len(table.touched)
+        if self.scene.loads_bodies or loaded > self.table_rows:
+            return choice
+        return NewtonChoice(True, "the rows of the laws solve the mesh for every loaded patch")
+
     def _make_table(self, observe: Observer | None) -> LawTable:
-        displacements = self._displacements(self.newton().condensed)
+        displacements = self._displacements(super().newton().condensed)
         table = consistent_laws(
             self._model,
             self.patches,
@@ -231,11 +248,16 @@ class ConsistentCoupling(PatchLaws):
         deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
         turns = self.load_history.slopes is None and not deforms
         free = table.path is not None and turns
+        whole = super().newton(table).condensed
         if free and self.scene.coupling.interface == "patchwise":
-            return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
-        return super()._solver_of(table)
+            return FreePlaneLaws(table, self._displacements(whole))
+        if whole or not self.newton(table).condensed:
+            return super()._solver_of(table)
+        return CondensedLaws(table, self.bodies.loaded_compliance(table.touched))
 
     def _law_cycles(self, steps: int, rows: int) -> float:
+        if self.newton().condensed and not super().newton().condensed:
+            return float(_CYCLES_PER_PATCH * self.interfering_patches)
         cycles = super()._law_cycles(steps, rows)
         # a row takes the displacements of the mesh
         return cycles if self.newton().condensed else cycles + 3.0 * rows
