@@ -189,7 +189,8 @@ class ConsistentCoupling(PatchLaws):
         if choice.condensed or coupling.newton != "auto" or coupling.interface != "patchwise":
             return choice
         loaded = self.interfering_patches if table is None else len(table.touched)
-        if self.scene.loads_bodies or loaded > self.table_rows:
+        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
+        if deforms or loaded > self.table_rows:
             return choice
         return NewtonChoice(True, "the rows of the laws solve the mesh for every loaded patch")
 
