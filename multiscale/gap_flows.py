@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from micro.flow.gap_flow import GapFlow, gap_flow
-from micro.flow.potential_flow import Preconditioner, factorised
 from support.arrays import Array
+from support.network_flow import Preconditioner, factorised
 
 MOST_FACTORISED = 512**2
 """Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with
@@ -22,13 +22,11 @@ def flow_solver(cells: int) -> Preconditioner:
     """
     if cells > MOST_FACTORISED:
         try:
-            from macro.linear_solvers.scalar_multigrid import (
-                has_scalar_multigrid,
-                scalar_multigrid,
-            )
+            from macro.linear_solvers.options import has_hypre
+            from macro.linear_solvers.scalar_multigrid import scalar_multigrid
         except ImportError:
             return factorised
-        if has_scalar_multigrid():
+        if has_hypre():
             return scalar_multigrid
     return factorised
 

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from multiscale.console import quietly
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -18,11 +19,12 @@ from multiscale.machine import (
 )
 from multiscale.output import terminal
 from multiscale.restart.interruption import ended_if_told
+from multiscale.restart.results_folder import folder_name
 from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from support.packages import optional_packages
+from support.packages import load_wheels_mpi, optional_packages
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
@@ -51,7 +53,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        quiet = terminal.quietly(getattr(choice, "quiet", False))
+        quiet = quietly(getattr(choice, "quiet", False))
         with ended_if_told(), optional_packages(), quiet:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             command(choice, _start_petsc(options), comm)
@@ -84,7 +86,7 @@ def scene_and_folder(
     Args:
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
-        ending: What the folder is called after the scene's name, unless the user names a folder.
+        ending: How the folder's name ends, unless the user names a folder; see `folder_name`.
 
     Returns:
         The scene and the folder, the same on every rank.
@@ -100,7 +102,7 @@ def scene_and_folder(
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
-        return scene, choice.out or Path("results") / f"{scene.name}{ending}"
+        return scene, choice.out or Path("results") / folder_name(scene.name, choice.set, ending)
 
     return on_root(comm, read)
 
@@ -145,6 +147,7 @@ def _start_petsc(options: list[str]) -> list[str]:
     """Start PETSc with the user's options; solver options get the prefix of our solver."""
     if not options:
         return []
+    load_wheels_mpi()
     import petsc4py
 
     prefixed = [

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
@@ -45,6 +45,8 @@ from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
+
+NOT_WITH_FRICTION = "the measure does not know what has slipped under laws"
 
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
@@ -146,6 +148,16 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         self.comm, self._meshes = comm, meshes
+
+    def changed(self, **attributes: Any) -> Self:
+        """Return a coupling on the same bodies, nothing of which is made yet.
+
+        Args:
+            attributes: Those that differ.
+        """
+        other = replace(self, **attributes)
+        other.comm, other._meshes = self.comm, self._meshes
+        return other
 
     @classmethod
     def unstated_cells(cls, scene: Scene) -> Cells:
@@ -578,6 +590,8 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
+        if not bodies and "bodies" in self.__dict__:
+            bodies = self.bodies.made_bodies
         self._meshes = (None, None)
         for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
+from geometry import Friction
 from multiscale.couplings.coupling import Coupling
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -41,6 +42,12 @@ class LawCoupling(Coupling):
         """
 
     @property
+    def law_friction(self) -> Friction | None:
+        """Friction of the laws; None without."""
+        section = self.scene.friction
+        return None if section is None else Friction(coefficient=section.coefficient)
+
+    @property
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
         # finer tables on cells would trace the steps of single ones
@@ -60,8 +67,13 @@ class LawCoupling(Coupling):
         if self.table is None:
             self._prepare_laws()
             with self.clock.phase("laws"):
-                self.table = self._make_table(self.clock.observe)
+                made = self._make_table(self.clock.observe)
+                self.table = made.with_stiffness_ratios(self._stiffness_ratios())
         return self.table
+
+    def _stiffness_ratios(self) -> list[float]:
+        """Return Mindlin's ratio of the bodies for every law."""
+        return [self.materials.stiffness_ratio] * self.patches.count
 
     def _prepare_laws(self) -> None:
         """Make what laws need, in phases of their own."""
@@ -74,3 +86,9 @@ class LawCoupling(Coupling):
         choice = self.newton()
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
         yield "newton", f"{way}: {choice.why}"
+        if self.law_friction is not None:
+            yield (
+                "friction",
+                f"coefficient {self.law_friction.coefficient:g}; the laws are beds of springs with "
+                "a slider each; GMRES, as tangents are unsymmetric",
+            )

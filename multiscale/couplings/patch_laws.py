@@ -27,10 +27,16 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Detail, Observer
+from support.collective import on_root_alone
 
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
 and 8 × 8 patches."""
+_TURNED_OVER = 1.0
+"""Part of the approach, times μ, that laws are made further under friction. On a cube with 3 × 3
+patches that slides as a whole closures needed 0.4 at μ = 0.5."""
+_RESERVE = 0.02
+"""Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
 _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
@@ -39,8 +45,15 @@ class PatchLaws(LawCoupling, MicroCoupling):
     """A coupling with a law for every patch of the surface."""
 
     def _rise(self) -> float:
-        """Return how far loads besides the contact raise the face at most [mm]; collective."""
-        return self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        """Return how much further the face comes than under the contact alone [mm]; collective.
+
+        Other loads raise it. Shear turns a body over, so that one side of it bears more.
+        """
+        rise = self.bodies.largest_preload() if self.scene.loads_bodies else 0.0
+        if self.law_friction is not None:
+            turned = _TURNED_OVER * self.law_friction.coefficient
+            rise += turned * max(self.plane.approach, 0.0)
+        return rise
 
     @property
     def table_rows(self) -> int:
@@ -62,6 +75,8 @@ class PatchLaws(LawCoupling, MicroCoupling):
             return NewtonChoice(True, "the decomposed block is its compliance")
         if self.scene.loads_bodies:
             return NewtonChoice(False, "loads besides the contact deform the mesh")
+        if self.scene.rubs_on_mesh:
+            return NewtonChoice(False, "shear stresses deform the mesh")
         flat = 0 if table is None else sum(law.is_flat for law in table.laws)
         if flat and coupling.newton == "auto" and coupling.interface == "patchwise":
             why = (
@@ -109,7 +124,8 @@ class PatchLaws(LawCoupling, MicroCoupling):
         from macro import LawContactProblem
 
         face = self.bodies.contact_face()
-        problem = LawContactProblem(face, table.together(), mode=self.scene.coupling.interface)
+        mode, friction = self.scene.coupling.interface, self.law_friction
+        problem = LawContactProblem(face, table.together(), mode=mode, friction=friction)
         return EmbeddedLaws(problem, table, face)
 
     def model_behind_laws(self) -> MicroModel:
@@ -160,9 +176,27 @@ class ConsistentCoupling(PatchLaws):
         with self.clock.phase("block"):
             self._model = self.model_on_body()
 
+    def newton(self, table: LawTable | None = None) -> NewtonChoice:
+        """Choose the Newton of the scene; see `PatchLaws.newton`.
+
+        The rows of the laws take the displacements of the mesh by every patch that carries load,
+        and load steps need to know no more of it.
+
+        Args:
+            table: The laws, once made.
+        """
+        choice, coupling = super().newton(table), self.scene.coupling
+        if choice.condensed or coupling.newton != "auto" or coupling.interface != "patchwise":
+            return choice
+        loaded = self.interfering_patches if table is None else len(table.touched)
+        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
+        if deforms or loaded > self.table_rows:
+            return choice
+        return NewtonChoice(True, "the rows of the laws solve the mesh for every loaded patch")
+
     def _make_table(self, observe: Observer | None) -> LawTable:
-        displacements = self._displacements(self.newton().condensed)
-        return consistent_laws(
+        displacements = self._displacements(super().newton().condensed)
+        table = consistent_laws(
             self._model,
             self.patches,
             largest=self._largest_control(),
@@ -174,6 +208,28 @@ class ConsistentCoupling(PatchLaws):
             comm=self.comm,
             observe=observe,
         )
+        return table if self.scene.leak is None else self._with_leak(table)
+
+    def _with_leak(self, table: LawTable) -> LawTable:
+        """Return the laws with the transmissivities of their patches; collective."""
+        from multiscale.laws.flow_rows import patch_transmissivities  # others do without
+
+        assert self.cells is not None, "scenes of summits are refused"
+        assert isinstance(self._model, HalfSpaceModel)
+        model, probe, largest = self._model, self.error_probe(), self._largest_control()
+        coarse = probe.model.resampled((self.cells[0] // 2, self.cells[1] // 2))
+        end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
+        end += _RESERVE * (end - first)
+        flows = patch_transmissivities(
+            (model, probe.on_body(coarse, probe.order)),
+            self.patches,
+            (first, end),
+            largest.tilt,
+            self.comm,
+        )
+        pairs = zip(table.laws, flows, strict=True)
+        laws = tuple(replace(law, transmissivity=flow) for law, flow in pairs)
+        return replace(table, laws=laws)
 
     def _largest_control(self) -> Control:
         """Return the load that laws are made up to: other loads of the body raise its face."""
@@ -190,13 +246,19 @@ class ConsistentCoupling(PatchLaws):
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         """Make what finds load steps from laws; a free plane turns as it did in their rows."""
-        turns = self.load_history.slopes is None and not self.scene.loads_bodies
+        deforms = self.scene.loads_bodies or self.scene.rubs_on_mesh
+        turns = self.load_history.slopes is None and not deforms
         free = table.path is not None and turns
+        whole = super().newton(table).condensed
         if free and self.scene.coupling.interface == "patchwise":
-            return FreePlaneLaws(table, self._displacements(self.newton(table).condensed))
-        return super()._solver_of(table)
+            return FreePlaneLaws(table, self._displacements(whole))
+        if whole or not self.newton(table).condensed:
+            return super()._solver_of(table)
+        return CondensedLaws(table, self.bodies.loaded_compliance(table.touched))
 
     def _law_cycles(self, steps: int, rows: int) -> float:
+        if self.newton().condensed and not super().newton().condensed:
+            return float(_CYCLES_PER_PATCH * self.interfering_patches)
         cycles = super()._law_cycles(steps, rows)
         # a row takes the displacements of the mesh
         return cycles if self.newton().condensed else cycles + 3.0 * rows
@@ -209,6 +271,13 @@ class ConsistentCoupling(PatchLaws):
         else:
             how = " under the load's tilt" if any(tilt) else ""
         return f"all from one solution of the whole surface{how}"
+
+
+def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
+    """Return the approaches at the largest load, and under a millionth of its force [mm]."""
+    end = model.press(largest)
+    slight = Control(force=1e-6 * end.force, tilt=largest.tilt)
+    return end.approach, model.press(slight).approach
 
 
 @dataclass(kw_only=True, eq=False)

@@ -33,8 +33,8 @@ Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
 
 
-_WITHOUT_CELLS = {"isolated", "consistent", "reference", "auto"}
-"""Couplings that know no gaps of the surface's cells."""
+_WITHOUT_GAPS = {"isolated", "reference", "auto"}
+"""Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,11 +46,13 @@ class SceneSections:
     Args:
         accuracy: Allowed relative error of the force. What is stated is kept. Keys that are
             ``"auto"`` or, with an accuracy, not stated (``surface.grid`` of a spectrum,
-            ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws on a mesh,
-            ``block.cells``) get values by a rule from errors that are measured before the run, the
-            same on every machine. Under laws of samples (``law.kind = "representative"``) nothing
-            is chosen. The results say whether the error that is measured in the run keeps the
-            accuracy. Without it, ``auto`` means 2 %.
+            ``micro.model``, ``coupling.kind``, ``patches.grid``, ``refinements`` of bodies on
+            meshes and, under laws on a mesh, ``block.cells``) get values by a rule from errors that
+            are measured before the run, the same on every machine. Under laws of samples
+            (``law.kind = "representative"``) these keys are ``surface.grid`` of a spectrum,
+            ``micro.finite_slopes``, ``element`` and ``refinements`` of bodies, ``cells`` of a
+            block. The results say whether the error that is measured in the run keeps the accuracy.
+            Without it, ``auto`` means 2 %.
         surface: The rough surface.
         counter_surface: Roughness of the other side, which is smooth without this section: heights
             as measured on it, facing up, on the grid of ``[surface]``. It is laid on the surface
@@ -96,9 +98,15 @@ class SceneSections:
     @property
     def decomposed(self) -> bool:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
-        if self.law.representative:
+        if self.law.representative or self.rubs_on_mesh:
             return False
         return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
+
+    @property
+    def rubs_on_mesh(self) -> bool:
+        """Whether laws have friction, whose shear stresses deform the mesh of the body."""
+        by_laws = self.kind in ("consistent", "isolated", "representative")
+        return self.friction is not None and by_laws
 
     @property
     def loads_bodies(self) -> bool:
@@ -209,7 +217,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
             "law.kind = 'representative'",
         )
     other = scene.counter_surface
-    chosen = scene.accuracy is not None and other is None and not scene.law.representative
+    chosen = scene.accuracy is not None and other is None
     maps = [("law.regions", region) for region in scene.law.regions]
     for key, one in [("surface", scene.surface), ("counter_surface", other), *maps]:
         if one is not None and one.lacks_grid and not (chosen and key == "surface"):
@@ -233,7 +241,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         ("counter_surface", scene.counter_surface, {"reference"}, block),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
-        ("leak", scene.leak, _WITHOUT_CELLS, mapped),
+        ("leak", scene.leak, _WITHOUT_GAPS, mapped),
     ):
         if value is not None and scene.kind in kinds:
             others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))
@@ -249,18 +257,11 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
             "coupling.kind = 'consistent'",
         )
-    by_accuracy = scene.accuracy is not None and not scene.law.representative
-    if scene.body is not None and (by_accuracy or "auto" in (coupling.kind, scene.surface.grid)):
-        yield (
-            "accuracy",
-            "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
-            "leave it out, and state them; law.kind = 'representative' says whether it is kept",
-        )
 
 
 def _leak(scene: SceneSections) -> Iterator[Problem]:
     """Yield what does not fit of the flow over a face, between its edges."""
-    leak, second = scene.leak, scene.counter_body
+    leak = scene.leak
     if leak is None:
         return
     over_face = "law.kind = 'representative' on a [body]"
@@ -269,8 +270,6 @@ def _leak(scene: SceneSections) -> Iterator[Problem]:
     if scene.law.representative and not leak.between_edges:
         problem = "is required with law.kind = 'representative': the fluid flows over the face"
         yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-    if scene.law.representative and second is not None and second.mesh is not None:
-        yield "leak", "does not go with a counter-body on a mesh", "a rigid side or a half-space"
 
 
 def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:
@@ -336,24 +335,48 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
         yield f"load.{key}", "needs friction", "friction.coefficient, as in 0.3"
     if not given:
         return
-    if scene.kind not in ("concurrent", "analytic"):
+    if scene.rubs_on_mesh:
+        yield from _friction_on_mesh(scene)
+    elif scene.kind not in ("concurrent", "analytic"):
         kind = f"coupling.kind = '{scene.coupling.kind}'"
-        if scene.law.representative:
-            kind = "law.kind = 'representative'"
         problem = f"does not go with {kind}, which has no tangential tractions"
-        yield "friction", problem, "coupling.kind = 'concurrent' or 'analytic'"
-    if scene.micro.model != "half-space":
+        yield "friction", problem, "another coupling.kind, or laws of samples"
+    elif scene.micro.model != "half-space":
         problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
-        yield "friction", problem, "micro.model = 'half-space'"
-    if not loading.shear_points:
+        yield "friction", problem, "micro.model = 'half-space'; or laws"
+    elif not loading.shear_points:
         yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
     yield from _sliding(scene)
+
+
+def _friction_on_mesh(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what has no tangential displacements, which friction of laws needs."""
+    reason = "but friction of laws needs the mesh of the body"
+    if scene.coupling.newton == "condensed":
+        yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
+    if scene.coupling.compliance == "decomposed":
+        yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
+    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
+    if half_space and scene.kind == "isolated":
+        yield (
+            "friction",
+            "does not go with isolated laws against a half-space",
+            "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
+        )
+    if scene.output.contact in ("last", "all"):
+        yield (
+            "output.contact",
+            "the contact problem behind laws does not know what has slipped under them",
+            "'none' or 'auto'; or coupling.kind = 'concurrent'",
+        )
 
 
 def _sliding(scene: SceneSections) -> Iterator[Problem]:
     """Yield shear forces that friction does not transmit under the prescribed forces."""
     loading, friction = scene.loading, scene.friction
     if friction is None or loading.shear_force is None or loading.force is None:
+        return
+    if scene.loads_bodies:  # bolts press as well
         return
     along = loading.shear_path == "along"
     forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
