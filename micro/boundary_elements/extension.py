@@ -13,6 +13,9 @@ knows: 1 in contact and 0 elsewhere on the finest grid. On the next one they are
 over the four cells below, and 1 at most, so that those of a lone contact fall with the size of the
 cells. On the way back every cell takes what it does not know from the next coarser grid.
 
+A cell that bears its load on a spring of its own, in series with the half-space, moves more than
+the surface does. Its weight on the finest grid is less than 1 (`micro.friction.free_inverse`).
+
 Theory: docs/theory.md, section 4.
 """
 
@@ -31,6 +34,8 @@ _SHARE = 0.32
 """Weight of a coarse cell over the sum of the weights of its four cells. On 33 rough contacts of
 512² cells, 2 to 97 % of which touch, solutions took 17.8 products with 0.4, 16.4 with 0.35, 16.1
 with 0.3 and 17.1 with 0.25."""
+_NONE = 1e-20
+"""Weights up to which a cell knows nothing; quotients of smaller ones are inaccurate."""
 _SMALLEST = 2
 """Cells along the shorter side of the coarsest grid."""
 
@@ -39,21 +44,25 @@ class Extension:
     """Extension of values on some cells to all cells of a period, and its transpose.
 
     Args:
-        cells: The cells.
+        cells: The n cells.
         period: Cells (mx, my) of the period, which holds them.
+        weights: How much each cell knows, from 0 to 1, shape (n,); all 1 when not given.
+
+    Attributes:
+        place: Rows and columns of the cells.
     """
 
-    def __init__(self, cells: Cells, period: tuple[int, int]) -> None:
-        self._place = rows, columns = cells.rows[cells.row], cells.column
+    def __init__(self, cells: Cells, period: tuple[int, int], weights: Array | None = None) -> None:
+        self.place = rows, columns = cells.rows[cells.row], cells.column
         shape = _halved(period)
         self._block = (rows // 2) * shape[1] + columns // 2
-        sums = np.bincount(self._block, minlength=shape[0] * shape[1])
+        sums = np.bincount(self._block, weights, minlength=shape[0] * shape[1])
         weight = sums.reshape(shape).astype(np.float32)
         self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
         self._unknown: list[Field] = []  # of each level but the finest, what it does not know
         while True:
             limited = np.minimum(_SHARE * weight, np.float32(1.0))
-            self._scales.append(np.divide(limited, weight, out=weight, where=weight > 0.0))
+            self._scales.append(np.divide(limited, weight, out=weight, where=weight > _NONE))
             self._unknown.append(np.float32(1.0) - limited)
             if min(shape) <= _SMALLEST:
                 break
@@ -61,14 +70,38 @@ class Extension:
             shape = _halved(shape)
 
     def extended(self, values: Array, out: Field) -> None:
-        """Extend values.
+        """Extend values that the cells know whole.
 
         Args:
             values: Of the cells, shape (n,).
             out: Overwritten by their extension, shape (mx, my).
         """
+        self.interpolated(values, out)
+        out[self.place] = values
+
+    def gathered(self, field: Field) -> Array:
+        """Return the transpose of `extended` times a field.
+
+        Args:
+            field: Shape (mx, my); overwritten.
+
+        Returns:
+            Shape (n,).
+        """
+        own = field[self.place].astype(float)
+        field[self.place] = 0.0
+        own += self.collected(field)
+        return own
+
+    def interpolated(self, weighted: Array, out: Field) -> None:
+        """Interpolate from coarser grids to all cells, those that know values among them.
+
+        Args:
+            weighted: Values of the cells times their weights, shape (n,).
+            out: Overwritten by the interpolation, shape (mx, my).
+        """
         scales = self._scales
-        sums = np.bincount(self._block, values, minlength=scales[0].size)
+        sums = np.bincount(self._block, weighted, minlength=scales[0].size)
         known = [sums.reshape(scales[0].shape).astype(np.float32) * scales[0]]
         for scale in scales[1:]:
             known.append(scale * _sums(known[-1]))
@@ -80,19 +113,16 @@ class Extension:
             finer += mine
             field = finer
         _interpolate(field, out)
-        out[self._place] = values
 
-    def gathered(self, field: Field) -> Array:
-        """Return the transpose of `extended` times a field.
+    def collected(self, field: Field) -> Array:
+        """Return the transpose of `interpolated` times a field.
 
         Args:
-            field: Shape (mx, my); overwritten.
+            field: Shape (mx, my).
 
         Returns:
             Shape (n,).
         """
-        own = field[self._place].astype(float)
-        field[self._place] = 0.0
         levels = [_collected(field)]
         for unknown in self._unknown[:-1]:
             levels.append(_collected(unknown * levels[-1]))
@@ -100,8 +130,7 @@ class Extension:
         for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
             level += _repeated(total, level.shape)
             total = scale * level
-        own += total.ravel()[self._block]
-        return own
+        return np.asarray(total.ravel()[self._block], float)
 
 
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:

