@@ -115,7 +115,7 @@ def load(parts: SceneParts) -> str:
     if parts.zero:
         depth = quantity(parts.zero, "mm", 4)
         text += f", approaches from the {parts.scene.loading.zero}, {depth} below first touch"
-    if history.shear_points:
+    if history.shear_key and not history.stage:
         text += f"; {_shear(history)}"
     if history.force_change is not None:
         text += f", halved where the force changes by more than {history.force_change:.3g}"
@@ -129,13 +129,19 @@ def load(parts: SceneParts) -> str:
 
 def _shear(history: LoadHistory) -> str:
     """Say the shear of a load history."""
-    unit, what = ("N", "a shear force") if history.shear_force else ("mm", "a shift")
-    pairs = (", ".join(quantity(one, unit, 6) for one in pair) for pair in history.shear_points)
-    way = ", ".join(f"({pair})" for pair in pairs)
+    points = history.shear or history.shear_force or ()
+    way = ", ".join(_pair(history, pair) for pair in points)
+    what = "a shift" if history.shear_key == "shear" else "a shear force"
     again = f", {history.shear_cycles} times" * (history.shear_cycles > 1)
     if history.shear_path == "along":
         return f"along with it {what} of {way}"
     return f"then in {history.shear_steps or history.steps} steps each to {what} of {way}{again}"
+
+
+def _pair(history: LoadHistory, pair: tuple[float, float]) -> str:
+    """Say a shear along x and y."""
+    unit = "mm" if history.shear_key == "shear" else "N"
+    return f"({', '.join(quantity(one, unit, 6) for one in pair)})"
 
 
 def stages(parts: SceneParts) -> Iterator[str]:
@@ -155,10 +161,12 @@ def stages(parts: SceneParts) -> Iterator[str]:
         for name, part in (("body", stage.body), ("counter-body", stage.counter_body)):
             if part is not None:
                 loads += body_loads(part, name)
+        for what, pairs in (("shift", stage.shear), ("shear force", stage.shear_force)):
+            loads += [f"{what} to {_pair(parts.scene.loading, pair)}" for pair in pairs or ()]
         cyclic = f", {stage.cycles} times there and back" if stage.cycles else ""
         steps = sum(leg.steps for leg in legs)
-        what = ", ".join(loads) or "nothing changes"
-        yield f"stage {stage.name or index + 1} in {steps}: {what}{cyclic}"
+        change = ", ".join(loads) or "nothing changes"
+        yield f"stage {stage.name or index + 1} in {steps}: {change}{cyclic}"
 
 
 def body_loads(loads: BodyLoads, name: str) -> Iterator[str]:

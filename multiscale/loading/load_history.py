@@ -13,12 +13,11 @@ import numpy as np
 from geometry import Control, InputError
 from geometry.shear_state import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
-from multiscale.loading.stages import Leg, Quantity, Repeats, Stage, legs_of
+from multiscale.loading.stages import Leg, Pairs, Quantity, Repeats, Stage, legs_of, shears_of
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example
 
 Tilt = tuple[Slope, Slope] | Literal["free"]
-Pairs = tuple[tuple[float, float], ...]
 Plane = tuple[float, float]
 """Approach of the plane [mm], and force of the contact [N]."""
 
@@ -47,7 +46,7 @@ class LoadHistory:
             a step that exceeds it is halved. When not given no step is halved.
         shear: Shift of the plane along x and y from where it first touched, or a list of turning
             points [mm]. Exactly one of ``shear`` and ``shear_force`` may be given, with a
-            coefficient of friction.
+            coefficient of friction. A history of stages states it in them.
         shear_force: Shear force on the plane along x and y, or a list of turning points [N].
         shear_path: Whether the plane goes through the points of the shear ``after`` the load has
             come to its end, which then stays, or ``along`` with the load: each of them is then
@@ -107,13 +106,18 @@ class LoadHistory:
 
     def _check_shear(self) -> None:
         """Refuse two shear loads, what belongs to none, and paths that make no sense."""
-        key, points = "shear" if self.shear_force is None else "shear_force", self.shear_points
+        points = self._stated_shear
+        key = "shear" if self.shear_force is None else "shear_force"
         if self.shear is not None and self.shear_force is not None:
             problem, allowed = "is a second shear load", "either 'shear' or 'shear_force'"
             raise InputError(problem, key=key, value=points, allowed=allowed)
         if points and self.stage:
-            problem, allowed = "does not go with stages", "turning points: 'force' or 'approach'"
+            problem, allowed = "does not go beside stages", f"'{key}' of a stage"
             raise InputError(problem, key=key, value=points, allowed=allowed)
+        in_stages = {key for one in self.stage for key in _SHEARS if getattr(one, key) is not None}
+        if len(in_stages) > 1:
+            problem, allowed = "state shifts and shear forces", "either 'shear' or 'shear_force'"
+            raise InputError(problem, key="stage", allowed=allowed)
         along = self.shear_path == "along"
         beside = {"shear_path": along, "shear_steps": self.shear_steps is not None}
         beside["shear_cycles"] = self.shear_cycles > 1
@@ -190,7 +194,7 @@ class LoadHistory:
         ends = pairwise((0.0, *points))
         ways = [Leg(0, self.quantity, start, end, self.steps) for start, end in ends]
         if self.shear_path == "after":
-            count = self.shear_cycles * len(self.shear_points)
+            count = self.shear_cycles * len(self._stated_shear)
             steps = self.shear_steps or self.steps
             ways += [Leg(0, self.quantity, points[-1], points[-1], steps)] * count
         return tuple(ways)
@@ -201,23 +205,36 @@ class LoadHistory:
         return self.approach or self.force or self.pressure or ()
 
     @property
+    def _stated_shear(self) -> Pairs:
+        """Points of the shear as they were stated; none of stages."""
+        return self.shear or self.shear_force or ()
+
+    @cached_property
+    def shear_key(self) -> str:
+        """Whether ``shear`` or ``shear_force`` is prescribed; empty without any."""
+        for one in (self, *self.stage):
+            for key in _SHEARS:
+                if getattr(one, key) is not None:
+                    return key
+        return ""
+
+    @cached_property
     def shear_points(self) -> Pairs:
         """Ends of the legs of the shear, the first of which starts at zero [mm or N]."""
-        return self.shear or self.shear_force or ()
+        if self.stage:
+            return shears_of(self.stage, self.ways, self.shear_key) if self.shear_key else ()
+        cycles = self.shear_cycles if self.shear_path == "after" else self.cycles
+        return cycles * self._stated_shear
 
     def _shear_at(self, time: float) -> ShearControl | None:
         """Return the shear of a load step, counted as in `control_at`; None without any."""
-        if not self.shear_points:
+        points = self.shear_points
+        if not points:
             return None
-        points = (self.shear_cycles * self.cycles) * self.shear_points
-        if self.shear_path == "after":
-            points = self.shear_cycles * self.shear_points
         begins = self._begins[-len(points) - 1 :]
         x, y = np.array([(0.0, 0.0), *points]).T
         pair = float(np.interp(time, begins, x)), float(np.interp(time, begins, y))
-        if self.shear_force is None:
-            return ShearControl(shift=pair)
-        return ShearControl(force=pair)
+        return ShearControl(shift=pair) if self.shear_key == "shear" else ShearControl(force=pair)
 
     @cached_property
     def _begins(self) -> list[int]:
@@ -406,6 +423,7 @@ class LoadHistory:
         return replace(control, approach=control.approach - self.depth)
 
 
+_SHEARS = ("shear", "shear_force")
 _LOADS = {
     "approach": ("mm", False),
     "force": ("N", True),

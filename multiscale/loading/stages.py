@@ -16,6 +16,7 @@ from support.fields import Length, Limits, Pressure, Unit, check_limits
 
 Quantity = Literal["approach", "force"]
 Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
+Pairs = tuple[tuple[float, float], ...]
 _OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
@@ -34,6 +35,10 @@ class Stage:
         pressure: The same as a mean pressure on the contact face.
         hold: Whether the plane stays where it is (``approach``), or under the force that it bears
             (``force``), while loads of the body change.
+        shear: Shift of the plane along x and y at the end of the stage, from where it first touched
+            [mm]. Where no stage before states one it starts from 0; what is not stated stays.
+        shear_force: Shear force on the plane along x and y at the end of the stage, likewise [N].
+            A history states either shifts or shear forces.
         steps: Load steps to the loads of the stage, and back; ``load.steps`` when not given.
         cycles: How often the loads go to those of the stage and back to those before it; they go
             there and stay when not given.
@@ -47,6 +52,8 @@ class Stage:
     force: Annotated[float, Unit("N")] | None = None
     pressure: Pressure | None = None
     hold: Quantity | None = None
+    shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
+    shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
     steps: Repeats | None = None
     cycles: Repeats | None = None
     body: BodyLoads | None = None
@@ -60,6 +67,11 @@ class Stage:
                 f"a stage states {' and '.join(stated)} of the plane",
                 allowed=f"at most one of {', '.join(_OF_PLANE)}",
             )
+        for key in ("shear", "shear_force"):
+            pairs = getattr(self, key)
+            if pairs is not None and len(pairs) != 1:
+                problem, allowed = "has several points", "one pair; a stage for every other one"
+                raise InputError(problem, key=key, value=list(pairs), allowed=allowed)
 
     @property
     def loads_bodies(self) -> bool:
@@ -114,6 +126,26 @@ def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:
             if stage.cycles:
                 yield there._replace(start=end, end=start, there=False)
         value = start if stage.cycles else end
+
+
+def shears_of(stages: Sequence[Stage], legs: Sequence[Leg], key: str) -> Pairs:
+    """Return the shear at the end of every leg of stages.
+
+    Args:
+        stages: The stages.
+        legs: Their legs.
+        key: Which shear they state, ``shear`` or ``shear_force``.
+    """
+    before, now, stage = (0.0, 0.0), (0.0, 0.0), 0
+    ends = []
+    for leg in legs:
+        if leg.stage != stage:
+            before, stage = now, leg.stage
+        stated = getattr(stages[leg.stage], key)
+        there = before if stated is None else stated[0]
+        now = there if leg.there else before
+        ends.append(now)
+    return tuple(ends)
 
 
 def states_of(

@@ -330,9 +330,9 @@ def _micro_models(scene: SceneSections) -> Iterator[Problem]:
 def _friction(scene: SceneSections) -> Iterator[Problem]:
     """Yield friction without shear, shear without friction, and what has no friction."""
     loading, given = scene.loading, scene.friction is not None
-    key = "shear" if loading.shear_force is None else "shear_force"
-    if loading.shear_points and not given:
-        yield f"load.{key}", "needs friction", "friction.coefficient, as in 0.3"
+    if loading.shear_key and not given:
+        place = "load.stage" if loading.stage else f"load.{loading.shear_key}"
+        yield place, "needs friction", "friction.coefficient, as in 0.3"
     if not given:
         return
     if scene.rubs_on_mesh:
@@ -344,7 +344,7 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
     elif scene.micro.model != "half-space":
         problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
         yield "friction", problem, "micro.model = 'half-space'; or laws"
-    elif not loading.shear_points:
+    elif not loading.shear_key:
         yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
     yield from _sliding(scene)
 

@@ -171,6 +171,12 @@ def test_the_plan_says_the_shear():
     assert "then in 3 steps each to a shift of (400 nm, 0 mm), (-400 nm, 100 nm)" in said
 
 
+STAGES = [
+    {"force": 0.9, "steps": 1},
+    {"shear": [4e-4, 0.0], "steps": 2},
+    {"force": 0.5, "steps": 1, "name": "eased"},
+    {"shear": [4e-4, 1e-4], "cycles": 1, "steps": 2},
+]
 SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
 
 
@@ -212,6 +218,22 @@ SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
             "has another number of points than the load",
         ),
         (
+            {"load": {"stage": STAGES, "shear": ["1 um", "0 um"]}},
+            "load.shear",
+            "does not go beside stages",
+        ),
+        ({"load": {"stage": STAGES}, "friction": None}, "load.stage", "needs friction"),
+        (
+            {"load": {"stage": [*STAGES, {"shear_force": [0.1, 0.0]}]}},
+            "load.stage",
+            "state shifts and shear forces",
+        ),
+        (
+            {"load": {"stage": [{"force": 1.0, "shear": [[1e-3, 0.0], [0.0, 0.0]]}]}},
+            "load.stage.0.shear",
+            "has several points",
+        ),
+        (
             {"load": {"force": 1.0, "shear_force": [0.24, 0.18]}},
             "load.shear_force",
             "slides: friction transmits less than 0.3 N under 1 N",
@@ -223,6 +245,29 @@ def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
         scene(**({"load": SHEARED} | changes))
     assert caught.value.key == key
     assert text in str(caught.value)
+
+
+def test_stages_press_then_shear():
+    history = run(scene(load={"stage": STAGES}))
+    assert history.force_N == pytest.approx([0.9, 0.9, 0.9, 0.5, 0.5, 0.5, 0.5, 0.5])
+    assert history.shear_x_mm == pytest.approx([0.0, 2e-4, *6 * [4e-4]])
+    assert history.shear_y_mm == pytest.approx([0.0, 0.0, 0.0, 0.0, 5e-5, 1e-4, 5e-5, 0.0])
+    assert [step.stage for step in history] == [1, 2, 2, 3, 4, 4, 4, 4]
+    # as far as the second stage it is the history that has turning points
+    same = run(scene(load=PATH | {"steps": 1, "shear": PATH["shear"][0], "shear_steps": 2}))
+    for name in ("shear_force_x_N", "dissipated_mJ", "tangential_stiffness_N_per_mm"):
+        assert getattr(history, name)[:3] == pytest.approx(getattr(same, name), rel=1e-9)
+    assert np.hypot(history.shear_force_x_N, history.shear_force_y_N)[3:].max() < 0.3 * 0.5
+    assert (np.diff(history.dissipated_mJ) >= 0.0).all()
+
+
+def test_stages_prescribe_shear_forces_and_say_so():
+    stages = [{"force": 0.9}, {"shear_force": ["0.1 N", "0.05 N"], "steps": 2}]
+    made = scene(load={"stage": stages, "steps": 1})
+    history = run(made)
+    assert history.shear_force_x_N == pytest.approx([0.0, 0.05, 0.1], abs=1e-9)
+    said = dict(make_setup(made).statements())["load"]
+    assert "stage 2 in 2: shear force to (100 mN, 50 mN)" in said
 
 
 def test_a_force_that_slides_ends_the_run_with_what_was_found(tmp_path, capsys):
