@@ -11,10 +11,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.face_frame import FaceFrame
 from geometry.meshes.bisection import (
+    Table,
     Tetrahedra,
     from_hexahedra,
     reentrant_edges,
@@ -164,7 +166,7 @@ class FlatBody:
         made: list[Tetrahedra] = []
         whole = self.whole
 
-        def refine() -> tuple[Array, Array]:
+        def refine() -> tuple[Table, NDArray[np.int32]]:
             """Return the marked facets of the refined mesh, and their tags."""
             assert whole is not None
             made.append(refined(whole, _Sizes(shape, self._hollows)))
@@ -186,7 +188,9 @@ class FlatBody:
         mesh = compat.mesh_from_cells(cells, points, None, self.comm)
         of_cells = self.comm.bcast(of_cells)
         tagged = TaggedMesh(
-            mesh=mesh, facet_tags=facet_tags(mesh, facets, tags), cell_tags=cell_tags(mesh, of_cells)
+            mesh=mesh,
+            facet_tags=facet_tags(mesh, facets, tags),
+            cell_tags=cell_tags(mesh, of_cells),
         )
         quality = move_onto(mesh, surface, self.depth)
         body = MeshedBody(tagged, self.body.materials, self.supports, order=shape.degree)

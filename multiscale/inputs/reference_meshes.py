@@ -268,17 +268,17 @@ def _check_body(scene: Scene) -> None:
         )
 
 
-def mesh_unknowns(shape: Shape, body: BodyFacts) -> int:
+def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
     """Return the degrees of freedom of a mesh; for tetrahedra an estimate from their sizes.
 
     Args:
         shape: What is meshed: a block, or what lies below the rough part of a body's face.
-        body: What is known of the body, whose own mesh the cells are added to.
+        body: What is known of a body from a mesh, which the cells are added to; None of a block.
     """
     if isinstance(shape, BlockShape):
         return block_unknowns(shape)
     nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
-    if not body.on_mesh:
+    if body is None or not body.on_mesh:
         return round(3.0 * nodes * _cubes(shape))
     # a linear mesh has an eighth of the nodes of quadratic displacements
     own = body.unknowns * 8.0 ** (shape.degree - body.degree)
