@@ -17,11 +17,13 @@ from support.packages import LazyPackage
 if TYPE_CHECKING:  # the names that this module has, see `LazyPackage`
     from geometry import (
         Control,
+        Friction,
         InputError,
         NotConverged,
         NotInstalled,
         PatchGrid,
         RigidPlane,
+        ShearControl,
         Spectrum,
         Surface,
         read_surface,

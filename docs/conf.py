@@ -21,7 +21,7 @@ project = "patchlaw"
 author = "the patchlaw project"
 version = release = generated.version()
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
@@ -30,10 +30,19 @@ extensions = [
 ]
 root_doc = "docs/index"
 include_patterns = [
-    "README.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md",
+    "README.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md", "demos/notebooks/*.ipynb",
 ]  # fmt: skip
-exclude_patterns = [".*", "results", "tests", "docs/_build", "docs/_generated"]
+exclude_patterns = [
+    ".*", "results", "tests", "docs/_build", "docs/_generated", "docs/jupyter_execute",
+]  # fmt: skip
 needs_sphinx = "8.2"
+
+# The repository has notebooks as scripts: small, compared line by line, run by the tests. They are
+# executed when the site is made, so that what they show is what this version computes.
+nb_execution_mode = "force"
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "attrs_block"]
 myst_dmath_allow_space = False
@@ -64,6 +73,7 @@ html_copy_source = False
 html_show_sourcelink = False
 
 generated.write(HERE / "_generated")
+generated.write_notebooks(HERE.parent / "demos" / "notebooks")
 
 
 def _link_from_docs(app: Sphinx, path: Path, parent: str, content: list[str]) -> None:

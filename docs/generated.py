@@ -1,4 +1,4 @@
-"""Tables of the site that are made from the project: keys, columns, public names."""
+"""What the site makes from the project: tables of keys, columns, public names; notebooks."""
 
 from __future__ import annotations
 
@@ -35,9 +35,34 @@ def write(folder: Path) -> None:
         **{f"{package}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
-        path = folder / name
-        if not path.is_file() or path.read_text(encoding="utf-8") != text:
-            path.write_text(text, encoding="utf-8")
+        _write(folder / name, text)
+
+
+def write_notebooks(folder: Path) -> None:
+    """Write a notebook beside every script of a folder, with a link to what came of its execution.
+
+    Args:
+        folder: The folder; the scripts are in jupytext's percent format.
+    """
+    import jupytext
+    from nbformat.v4 import new_markdown_cell
+
+    for script in sorted(folder.glob("*.py")):
+        path = script.with_suffix(".ipynb")
+        notebook = jupytext.read(script)
+        links = (
+            f"[The script](path:{script.name}) · {{nb-download}}`executed notebook <{path.name}>`"
+        )
+        notebook.cells.append(new_markdown_cell(links))
+        for number, cell in enumerate(notebook.cells):
+            cell["id"] = f"cell-{number}"  # the same every time, and not drawn
+        _write(path, jupytext.writes(notebook, fmt="ipynb"))
+
+
+def _write(path: Path, text: str) -> None:
+    """Write a file, unless it holds the text already."""
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
 
 
 def _table(heading: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

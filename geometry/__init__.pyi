@@ -29,6 +29,7 @@ from geometry.shear_state import ShearControl as ShearControl
 from geometry.shear_state import ShearState as ShearState
 from geometry.spectrum import Spectrum as Spectrum
 from geometry.spectrum import synthesise as synthesise
+from geometry.spring_bed import Friction as Friction
 from geometry.statistics import PowerSpectrum as PowerSpectrum
 from geometry.statistics import Roughness as Roughness
 from geometry.statistics import power_spectrum as power_spectrum

@@ -17,12 +17,20 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import RigidPlane
 from geometry.shear_state import ShearState
 from support.arrays import Array, Counts, Flags, Indices
+from support.displayed import Displayed, Table
 from support.errors import InputError
 
 _LARGE = (
     "spots x y pressure gap displacement yielding plastic_depth earlier_depth indentation "
     "by_slopes shear"
 ).split()
+
+_DISPLAYED = {
+    "approach": "mm", "force": "N", "mean_pressure": "MPa", "contact_area_fraction": "",
+    "contacts": "", "peak_pressure": "MPa", "mean_separation": "mm", "elastic_energy": "N mm",
+    "plastic_work": "N mm", "iterations": "", "residual": "",
+}  # fmt: skip
+"""What a printed state shows, with the units."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,8 +113,8 @@ class Start:
         return Start(plane=self.plane, values=values, by_slopes=by_slopes)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContactState:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ContactState(Displayed):
     """A rough surface in contact with a rigid plane, and its sums over N patches.
 
     Fields are given at points: the centres of nx × ny cells, or n points anywhere. A number that is
@@ -184,6 +192,17 @@ class ContactState:
     indentation: Array | None = None
     shear: ShearState | None = None
     by_slopes: Array | None = None
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return force and approach in a line, and a table of all numbers that are known."""
+        line = f"ContactState: {self.force:.6g} N at an approach of {1e3 * self.approach:.4g} µm"
+        known = {name: getattr(self, name) for name in _DISPLAYED}
+        rows = [
+            (f"{name} [{unit}]" if unit else name, f"{known[name]:.6g}")
+            for name, unit in _DISPLAYED.items()
+            if not np.isnan(known[name])
+        ]
+        return line, (("", "value"), rows)
 
     @property
     def approach(self) -> float:

@@ -95,6 +95,11 @@ class MaterialPair:
         return float(np.average([body.poisson_ratio for body in bodies], weights=weights))
 
     @property
+    def stiffness_ratio(self) -> float:
+        """Mindlin's ratio of the normal to the tangential stiffness of contacts of the pair."""
+        return mindlin_ratio(self.tangential_poisson_ratio)
+
+    @property
     def dundurs_beta(self) -> float:
         """Dundurs' β: pressures displace the two surfaces by different amounts along each other.
 
@@ -108,6 +113,18 @@ class MaterialPair:
         if other is not None:
             along -= (1.0 - 2.0 * other.poisson_ratio) / other.shear_modulus
         return 0.25 * along * self.contact_modulus
+
+
+def mindlin_ratio(poisson_ratio: float) -> float:
+    """Return (2 − ν)/(2 (1 − ν)), the ratio of normal to tangential stiffness of a contact.
+
+    Args:
+        poisson_ratio: ν, of two bodies that of `MaterialPair.tangential_poisson_ratio`.
+
+    Source:
+        Johnson, Contact Mechanics (1985), eq. 7.43.
+    """
+    return (2.0 - poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
 
 
 def von_mises(stress: Array) -> Array:

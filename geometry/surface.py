@@ -13,11 +13,12 @@ from numpy.typing import ArrayLike
 from geometry.interpolant import Interpolant, cell_centres
 from support.arrays import Array
 from support.checks import LARGEST, frozen_array, is_level, positive_lengths
+from support.displayed import Displayed, Table
 from support.errors import InputError
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Surface(Displayed):
     """Heights at the centres of nx × ny equal cells of a rectangle.
 
     The sample [ix, iy] lies at x = (ix + ½) Lx/nx, y = (iy + ½) Ly/ny.
@@ -44,6 +45,18 @@ class Surface:
     def __post_init__(self) -> None:
         object.__setattr__(self, "lengths", positive_lengths(self.lengths, "the surface"))
         object.__setattr__(self, "heights", _checked_heights(self.heights))
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return grid and size in a line, and a table of what is known of the heights."""
+        line = "Surface of {} × {} heights on {:.6g} × {:.6g} mm".format(*self.grid, *self.lengths)
+        rows = [
+            ("spacing", "{:.4g} × {:.4g} µm".format(*(1e3 * side for side in self.spacing))),
+            ("rms height", f"{1e3 * self.heights.std():.4g} µm"),
+            ("lowest to highest", f"{1e3 * np.ptp(self.heights):.4g} µm"),
+            ("periodic", "yes" if self.periodic else "no"),
+            *((("source", self.source),) if self.source else ()),
+        ]
+        return line, (("", "heights"), rows)
 
     @property
     def grid(self) -> tuple[int, int]:

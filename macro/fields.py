@@ -40,12 +40,14 @@ class FieldStep(NamedTuple):
         displacement: This rank's owned displacements, dof by dof [mm].
         pressures: The contact pressures.
         body_state: Position among the states of the body's loads.
+        further: Other functions on the mesh that are written with them.
     """
 
     number: int
     displacement: Array
     pressures: Pressures
     body_state: float = 0.0
+    further: Sequence[Any] = ()
 
 
 def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep]) -> None:
@@ -73,7 +75,7 @@ def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep])
             moved, pressure = body.function(step.displacement), step.pressures
             write_vtx(step.number, moved)
             shown = [] if pressure is None else [_facet_pressures(face, pressure)]
-            yield step.number, [*_of_body(body, moved, step.body_state), *shown]
+            yield step.number, [*_of_body(body, moved, step.body_state), *shown, *step.further]
 
     with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())

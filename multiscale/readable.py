@@ -122,6 +122,39 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
+def span(values: Iterable[float], unit: str, digits: int = 4) -> str:
+    """Return the range of a quantity in one unit, such as ``5 to 20 N``.
+
+    Args:
+        values: The magnitudes in ``unit``; those that are not finite do not count.
+        unit: A key of the prefixes, such as mm, N or MPa.
+        digits: Significant digits.
+    """
+    known = [value for value in values if math.isfinite(value)]
+    if not known:
+        return "unknown"
+    name, size = usual_unit(known, unit)
+    ends = dict.fromkeys(number(end / size, digits) for end in (min(known), max(known)))
+    return f"{' to '.join(ends)} {name}"
+
+
+def column(heading: str, values: Iterable[float], unit: str, digits: int = 4) -> list[str]:
+    """Return a column of a table, its heading first: numbers in the unit that suits them.
+
+    Args:
+        heading: Its heading, which the unit is added to.
+        values: The magnitudes in ``unit``; what is not finite is shown as unknown.
+        unit: A key of the prefixes, such as mm, N or MPa; "%" shows shares in per cent.
+        digits: Significant digits.
+    """
+    numbers = list(values)
+    name, size = {"%": ("%", 0.01)}.get(unit, (unit, 1.0))
+    if unit in SCALED_UNITS:
+        name, size = usual_unit(numbers, unit)
+    shown = (number(one / size, digits) if math.isfinite(one) else "–" for one in numbers)
+    return [f"{heading} [{name}]", *shown]
+
+
 def measured(value: float, error: float | None, unit: str, digits: int = 4) -> str:
     """Return a quantity with its error in one unit, such as ``0.5899 ± 0.0007 µm``.
 

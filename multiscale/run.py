@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, nullcontext
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
@@ -28,6 +28,7 @@ from multiscale.observers.step_observers import (
     StiffnessObserver,
     WorkObserver,
 )
+from multiscale.progress import run_progress
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.notes import energy_notes, verdict, yielding_notes
@@ -70,6 +71,7 @@ class Run:
         self.position = LoadPosition()
         self._start: Any = None
         self._notes: list[str] = []
+        self._leak: StepObserver | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
@@ -88,7 +90,8 @@ class Run:
 
             self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
         if self.scene.leak is not None:
-            self._observers.append(self._leak_observer(self.scene.leak))
+            self._leak = self._leak_observer(self.scene.leak)
+            self._observers.append(self._leak)
         if self.scene.friction is not None:
             from multiscale.observers.friction import FrictionObserver  # others do without
 
@@ -96,12 +99,17 @@ class Run:
         self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
 
     def _leak_observer(self, section: LeakSection) -> StepObserver:
-        """Return what adds the leak to load steps: through gaps of cells, or over a face."""
+        """Return what adds the leak to load steps: through gaps, patches, or over a face."""
         if section.between_edges:
             from multiscale.observers.face_leak import FaceLeakObserver
 
             coupling: Any = self.coupling
             return FaceLeakObserver(coupling, section)
+        if self.coupling.has_laws:
+            from multiscale.observers.patch_leak import PatchLeakObserver
+
+            laws: Any = self.coupling
+            return PatchLeakObserver(laws, section)
         from multiscale.observers.leak import LeakObserver
 
         return LeakObserver(self.coupling, section, self._has_unloaded)
@@ -154,6 +162,11 @@ class Run:
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
         return tuple(self._contacts.records)
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
+        return getattr(self._leak, "map", None)
 
     def _has_unloaded(self) -> bool:
         """Tell whether the load was larger at an earlier load step."""
@@ -285,7 +298,11 @@ class Run:
 
 @optional_packages()
 def run(
-    scene: Scene, comm: Any = None, *, observe: Callable[[LoadStep], None] | None = None
+    scene: Scene,
+    comm: Any = None,
+    *,
+    observe: Callable[[LoadStep], None] | None = None,
+    progress: bool = False,
 ) -> History:
     """Run a scene from surface to history; nothing is written.
 
@@ -293,6 +310,7 @@ def run(
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
         observe: Called with every accepted load step.
+        progress: Whether what the run is at is shown, in the terminal or below a notebook's cell.
 
     Returns:
         The history, the same on every rank.
@@ -305,14 +323,17 @@ def run(
     Note:
         Collective.
     """
-    whole = Run(scene, comm)
-    try:
-        for step in whole.load_steps():
-            if observe is not None:
-                observe(step)
-        return whole.history()
-    except NotConverged as error:
-        error.history = whole.history()
-        raise
-    finally:
-        whole.close()
+    with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
+        advance, at = shown
+        whole = Run(scene, comm)
+        whole.clock.observe = at
+        try:
+            for step in whole.load_steps():
+                for tell in filter(None, (advance, observe)):
+                    tell(step)
+            return whole.history()
+        except NotConverged as error:
+            error.history = whole.history()
+            raise
+        finally:
+            whole.close()

@@ -234,6 +234,36 @@ class ContactForces:
         samples.array[:] = self.pressure(self.closure(displacement))
         self._sampling.operator.mult(samples, load)
 
+    def write_lines(
+        self,
+        displacement: PETSc.Vec,
+        closure: Array,
+        pressure: Array,
+        stiffness: Array,
+        load: PETSc.Vec,
+    ) -> None:
+        """Write the forces on laws that are lines, and move the derivative to these.
+
+        Args:
+            displacement: u [mm].
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            pressure: Their pressures on the lines [MPa].
+            stiffness: Their stiffnesses [MPa/mm].
+            load: Receives the nodal forces [N].
+        """
+        samples = self._sampling.values
+        samples.array[:] = pressure
+        self._sampling.operator.mult(samples, load)
+        self.linearise(stiffness)
+
+    def write_last_shear(self, load: PETSc.Vec) -> None:
+        """Write the forces by the shear stresses of the latest load step, none without friction.
+
+        Args:
+            load: Receives the nodal forces [N].
+        """
+        load.set(0.0)
+
     def update(self, displacement: PETSc.Vec) -> None:
         """Move the derivative to a displacement."""
         self.linearise(self.stiffness(self.closure(displacement)))
@@ -249,6 +279,11 @@ class ContactForces:
         both = np.empty(2)
         self.comm.Allreduce(own, both, op=MPI.MAX)
         return bool(both[0] > _MOVED * both[1])
+
+    @property
+    def normal_slope(self) -> Array:
+        """p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵]."""
+        return self.slope
 
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
         """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.
@@ -276,7 +311,7 @@ class ContactForces:
         Args:
             stretch: What this rank's samples close in by, times their weights, shape (n,) [mm³].
         """
-        return self._change(stretch, self.slope, self._border)
+        return self._change(stretch, self.normal_slope, self._border)
 
     def _change(self, stretch: Array, slope: Array, border: Array) -> Array:
         pressure = slope * stretch
@@ -403,7 +438,10 @@ class ContactTangent:
         self._add_contacts(x, y)
 
     def multTranspose(self, shell: PETSc.Mat, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write the product of the transpose with x; the part of contact is symmetric."""
+        """Write the product of the transpose with x; the part of contact is symmetric.
+
+        With friction it is not, and PETSc's solvers that need a transpose do not converge.
+        """
         shell.query(_MATRIX).multTranspose(x, y)
         self._add_contacts(x, y)
 

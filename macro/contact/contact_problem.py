@@ -12,7 +12,7 @@ from macro import compat
 from macro.contact.equations import UserEquations
 from macro.contact.interface import Interface
 from macro.contact.newton import Newton, NewtonReport
-from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS
+from macro.linear_solvers.options import ALGEBRAIC_DEFAULTS, UNSYMMETRIC
 from macro.linear_solvers.selection import algebraic_options
 from support.arrays import Array
 from support.errors import InputError, NotConverged
@@ -39,7 +39,9 @@ class ContactProblem:
     The tangent is exact: that of F, assembled, plus that of the interfaces, which is applied
     without being assembled. F's own is assembled anew when a function or constant in it has
     changed, so that linear materials keep matrix and preconditioner. Steps towards prescribed
-    values that the initial guess misses are part of Newton's first step.
+    values that the initial guess misses are part of Newton's first step. Interfaces with friction
+    make the tangent unsymmetric, so that GMRES is the default; they take every solution for the end
+    of a load step (`Interface.accept`).
 
     Args:
         residual: F(u; v) as UFL: internal less external virtual work, in N and mm.
@@ -94,6 +96,8 @@ class ContactProblem:
         usual = _FACTORISED if self._equations.matrix.getSize()[0] <= _SMALL else _multigrid(space)
         # multigrid smooths with the shell otherwise, whose tangent moves on
         options = {**usual, "pc_use_amat": False}
+        if any(interface.rubs for interface in self.interfaces):
+            options |= UNSYMMETRIC
         self._newton = Newton(self._equations, options=options, given=petsc_options, method="gmres")
 
     def solve(self) -> int:
@@ -104,8 +108,8 @@ class ContactProblem:
 
         Raises:
             NotConverged: With the name of the reason and a remedy; the displacement is what it was
-                before. Also when a closure is beyond the table of a law (``LAW_RANGE``); then the
-                displacement is the solution on the tangents of the laws.
+                before, and what slipped. Also when a closure is beyond the table of a law
+                (``LAW_RANGE``); then the displacement is the solution on the tangents of the laws.
         """
         equations = self._equations
         compat.collect_garbage(equations.comm)
@@ -126,6 +130,8 @@ class ContactProblem:
             interface.evaluate(self.displacement)
         for interface in self.interfaces:
             self._check_range(interface, self.report.iterations)
+        for interface in self.interfaces:
+            interface.accept(self.displacement)
         return self.report.iterations
 
     def reaction(self) -> Array:

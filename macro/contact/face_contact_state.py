@@ -35,6 +35,26 @@ class NodalContact(NamedTuple):
     region: NDArray[np.intp]
 
 
+class FaceShear(NamedTuple):
+    """Shear of a face with friction.
+
+    Attributes:
+        shift: Shift of the plane along the axes of the face [mm].
+        force: Shear force on the plane along them [N].
+        dissipated: Energy lost to friction since the start [N mm].
+        sample_stress: Shear stresses on the body at this rank's samples of laws, shape (n, 2)
+            [MPa].
+        stick_closure: Closures at which as much area is in contact as sticks at these samples,
+            shape (n,) [mm].
+    """
+
+    shift: tuple[float, float]
+    force: tuple[float, float]
+    dissipated: float
+    sample_stress: Array
+    stick_closure: Array
+
+
 def _no_numbers() -> Array:
     return np.empty(0)
 
@@ -73,6 +93,7 @@ class FaceContactState:
         mean_separation: Mean gap between the plane and the meshed roughness [mm].
         peak_pressure: Largest nodal pressure [MPa].
         nodal: Contact of this rank's nodes of meshed roughness.
+        shear: Shear of a face with friction; None without.
     """
 
     plane: RigidPlane
@@ -97,6 +118,7 @@ class FaceContactState:
     mean_separation: float = np.nan
     peak_pressure: float = np.nan
     nodal: NodalContact | None = None
+    shear: FaceShear | None = None
 
     @property
     def approach(self) -> float:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from macro import compat
-from macro.contact.loaded_face import ContactFace, LoadedFace, normal_rows
+from macro.contact.loaded_face import ContactFace, LoadedFace, Mode, directed_rows
 from macro.contact.sampling import Sampling
 from macro.elastic_body import ElasticBody
 from macro.linear_solvers.joint import joint_solver
@@ -213,7 +213,7 @@ class FacePair(ContactFace):
     def pointwise(self) -> Sampling:
         """Laws at the quadrature points of the first face that lie on the second."""
         one = self.first.pointwise
-        _, depth, kept = self._counter_rows
+        depth, kept = self._counter_points.depth, self.on_both
         names = ("weight", "x", "y", "depth", "patch")
         own = replace(one, **{name: getattr(one, name)[kept] for name in names})
         operator = PETSc.Mat().createTranspose(self.points_by_dofs)
@@ -222,18 +222,46 @@ class FacePair(ContactFace):
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:
         """−w φ n of the displacements of both at every common point, (points, dofs) [mm²]."""
-        rows, _, kept = self._counter_rows
-        own = _local_rows(self.first.points_by_dofs)[kept]
+        return self._of_both(self.first.points_by_dofs, -self.second.facets.outward[None])
+
+    @cached_property
+    def points_in_all_directions(self) -> PETSc.Mat:
+        """The same along the normal and both axes, as of one face, (3 points, dofs) [mm²]."""
+        first = self.first.points_in_all_directions
+        return self._of_both(first, self.second.facets.directions)
+
+    def in_all_directions(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of stresses on both faces; see `LoadedFace.in_all_directions`."""
+        if mode == "pointwise":
+            return PETSc.Mat().createTranspose(self.points_in_all_directions)
+        return joined([[face.in_all_directions(mode)] for face in (self.first, self.second)])
+
+    def _of_both(self, first: PETSc.Mat, directions: Array) -> PETSc.Mat:
+        """Return the rows of common points for the displacements of both.
+
+        Args:
+            first: Rows of all points of the first face, k for each.
+            directions: Directions of the k rows on the second face, shape (k, 3).
+        """
+        kept, found = self.on_both, self._counter_points
+        own = _local_rows(first)[np.repeat(kept, len(directions))]
+        rows = directed_rows(
+            found.values[kept],
+            found.nodes[kept],
+            found.values[kept] != 0.0,
+            directions,
+            self.second.space.dofmap.index_map.size_global,
+        )
         parts = [
-            distributed(points_by_dofs, face.body.owned_dofs, self.comm)
-            for points_by_dofs, face in ((own, self.first), (rows[kept], self.second))
+            distributed(part, face.body.owned_dofs, self.comm)
+            for part, face in ((own, self.first), (rows, self.second))
         ]
         return joined([parts])
 
     @property
     def on_both(self) -> NDArray[np.bool_]:
         """Which of this rank's quadrature points of the first face lie on the second one, too."""
-        return self._counter_rows[2]
+        return self._counter_points.on_both
 
     def pull_moments(self, state: float) -> tuple[float, float]:
         """Return the moments of what pulls the first body; see `LoadedFace.pull_moments`."""
@@ -251,8 +279,8 @@ class FacePair(ContactFace):
         return load
 
     @cached_property
-    def _counter_rows(self) -> tuple[csr_matrix, Array, NDArray[np.bool_]]:
-        """The counter-body's −w φ n at this rank's points, its depths, and which points it has."""
+    def _counter_points(self) -> _CounterPoints:
+        """Where this rank's points of the first face lie on the second."""
         points, space = self.first.quadrature, self.second.space
         own, index_map = self.second.facets, space.dofmap.index_map
         cells = compat.cell_nodes(space)[own.cell]
@@ -270,14 +298,24 @@ class FacePair(ContactFace):
             compat.lagrange_degree(space),
             whole.pull_back(facet, local),
         )
-        rows = normal_rows(
-            points.weight[:, None] * values,
-            nodes[facet],
-            values != 0.0,
-            own.outward,
-            index_map.size_global,
-        )
-        return rows, whole.depths(facet, local), on_both
+        depth = whole.depths(facet, local)
+        return _CounterPoints(points.weight[:, None] * values, nodes[facet], depth, on_both)
+
+
+class _CounterPoints(NamedTuple):
+    """This rank's n points of the first face on the second one.
+
+    Attributes:
+        values: w φ of the m nodes of the cell there, shape (n, m) [mm²].
+        nodes: Global numbers of these nodes, shape (n, m).
+        depth: Depths of the second face, shape (n,) [mm].
+        on_both: Which points lie on it.
+    """
+
+    values: Array
+    nodes: NDArray[np.int64]
+    depth: Array
+    on_both: NDArray[np.bool_]
 
 
 def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Array]:

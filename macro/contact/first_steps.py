@@ -68,9 +68,8 @@ class FirstSteps:
         own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            self._forces.linearise(lines.stiffness)
+            self._linearise(displacement, lines)
             self._follow()
-            self._write_linear_residual(displacement, lines)
             solver.setTolerances(rtol=_TOLERANCE)
             solver.solve(self._residual, step)
             if solver.reason < 0:
@@ -98,11 +97,10 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _write_linear_residual(self, displacement: PETSc.Vec, lines: Lines) -> None:
-        """Write the residual K u − B p with pressures p of linearised laws."""
-        samples, matrix = self._sampling.values, self._equilibrium.matrix
-        pressure = lines.at(self._closure_on(lines, displacement))
-        samples.array[:] = pressure
-        self._sampling.operator.mult(samples, self._load)
+    def _linearise(self, displacement: PETSc.Vec, lines: Lines) -> None:
+        """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
+        matrix, forces = self._equilibrium.matrix, self._forces
+        closure = self._closure_on(lines, displacement)
+        forces.write_lines(displacement, closure, lines.at(closure), lines.stiffness, self._load)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -113,7 +113,8 @@ class DisplacementBasis:
     def write_guess(self, into: PETSc.Vec) -> Lines:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
-        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution.
+        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution. Shear
+        stresses stay those of that solution.
 
         Returns:
             The lines of the next step from there.
@@ -123,8 +124,9 @@ class DisplacementBasis:
         pressure = y @ self._pressures
         closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
         lines = law_lines(forces, closure, pressure, stiffness)
+        sheared = self._work_of_shear()
         for _ in range(_STEPS):
-            change = self._step(y, lines)
+            change = self._step(y, lines, sheared)
             y = y - change
             closure = self._closure_on(lines, y)
             lines = law_lines(forces, closure, lines.at(closure), stiffness)
@@ -140,7 +142,13 @@ class DisplacementBasis:
         displaced = (y @ self._sampled) / self._sampling.weight
         return self._equilibrium.forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _step(self, y: Array, lines: Lines) -> Array:
+    def _work_of_shear(self) -> Array:
+        """Return the work of the latest shear stresses along the basis, shape (k,)."""
+        load = self._equilibrium.matrix.createVecLeft()
+        self._equilibrium.forces.write_last_shear(load)
+        return np.asarray(self._sum(np.array([load.array_r @ each for each in self.vectors])))
+
+    def _step(self, y: Array, lines: Lines, sheared: Array) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
         forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
         pressure = lines.at(self._closure_on(lines, y))
@@ -151,7 +159,7 @@ class DisplacementBasis:
         ])  # fmt: skip
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
-        return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
+        return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y - sheared + parts[0])
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

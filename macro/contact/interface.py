@@ -17,13 +17,21 @@ from petsc4py import PETSc
 from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.spring_bed import Friction
 from macro import compat
-from macro.contact.contact_forces import ContactForces, ContactLaw, ContactTangent
-from macro.contact.face_contact_state import FaceContactState
-from macro.contact.interface_parts import InterfaceLaws, chosen_face, laws_on_face
+from macro.contact.contact_forces import ContactLaw, ContactTangent
+from macro.contact.face_contact_state import FaceContactState, FaceShear
+from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
+from macro.contact.frictional_forces import FrictionalForces, SliderRecord, contact_forces
+from macro.contact.interface_parts import (
+    InterfaceLaws,
+    chosen_face,
+    given_facets,
+    laws_on_face,
+)
 from macro.contact.loaded_face import LoadedFace, Mode
 from macro.contact.sampling import by_patch, crown_depth
-from macro.linear_solvers.node_matrices import free_unknowns, springs_at
+from macro.linear_solvers.node_matrices import coupled_springs_at, free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
 from support.arrays import Array
 from support.collective import together
@@ -68,6 +76,10 @@ class Interface:
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
             mesh [mm]; None: none.
         names: Number of every named face, where the tags know no names.
+        friction: Coefficient of friction μ, or a `Friction`; None: none. The plane shifts along the
+            axes of the face as the indenter's ``Control(shear=ShearControl(shift=…))`` or
+            ``ShearControl(force=…)`` says; without any it stays. What slips is remembered from load
+            step to load step, see `accept`.
 
     Attributes:
         frame: Coordinates of the face.
@@ -111,8 +123,10 @@ class Interface:
         bcs: Sequence[Any] = (),
         crown: Callable[[Array, Array], Array] | None = None,
         names: Mapping[str, Any] | None = None,
+        friction: float | Friction | None = None,
     ) -> None:
-        self.space = space
+        self._friction = _friction(friction)
+        self.space, self._tags = space, (facet_tags, names)
         face = chosen_face(space, facet_tags, tag, names, frame)
         compat.collect_garbage(self.comm)  # of interfaces before this one
         chosen = laws_on_face(laws, patches, mode, face.lower, face.lengths)
@@ -130,7 +144,7 @@ class Interface:
         self._face = LoadedFace(SimpleNamespace(space=self.space), facets, chosen.patches)
         self.sampling = sampling = self._face.sampling(chosen.mode)
         gap = together(self.comm, lambda: sampling.below(self._crown))
-        self.forces = ContactForces(self._face, sampling, chosen.laws, gap)
+        self.forces = contact_forces(self._face, chosen.mode, chosen.laws, gap, self._friction)
         for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
             values = evaluate(-gap)
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
@@ -158,13 +172,22 @@ class Interface:
                 value=indenter,
                 allowed="RigidPlane(approach=…) or Control(force=…)",
             )
+        if isinstance(indenter, Control) and indenter.shear and self._friction is None:
+            raise InputError(
+                "the plane shears an interface without friction",
+                key="friction",
+                value=str(indenter.shear),
+                allowed="Interface(…, friction=0.3); or a Control without shear",
+            )
         self.forces.prescribe(_prescribed(indenter, self.patches.middle), self.forces.plane)
         self._indenter = indenter
 
     @property
     def assembles(self) -> bool:
         """Whether `add_tangent` gives the whole tangent: pointwise laws, the plane not free."""
-        return self.mode == "pointwise" and not self.forces.control.free.any()
+        control = self.forces.control
+        shifts = control.shear is not None and control.shear.force is not None
+        return self.mode == "pointwise" and not (control.free.any() or shifts)
 
     @property
     def quadrature_degree(self) -> int:
@@ -233,7 +256,12 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        self.add_springs(self.forces.slope, matrix)
+        if self.rubs is None:
+            self.add_springs(self.forces.slope, matrix)
+            return
+        added = coupled_springs_at(self._points_by_free, self.rubs.tangents)
+        matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        added.destroy()
 
     def tangent(self, matrix: PETSc.Mat) -> PETSc.Mat:
         """Return a PETSc shell that applies a matrix plus the derivative of `add_residual`.
@@ -256,7 +284,7 @@ class Interface:
         Args:
             x: A vector.
             y: What it is added to.
-            known: Slopes p'/w of this rank's samples whose part y has already, shape (n,).
+            known: Slopes of this rank's samples, as ``forces.slope``, whose part y has already.
         """
         self._add_product(partial(self.forces.add_product, known=known), x, y)
 
@@ -265,7 +293,12 @@ class Interface:
         self._add_product(partial(self.forces.add_springs_product, slope), x, y)
 
     def add_springs(self, slope: Array, matrix: PETSc.Mat) -> None:
-        """Add springs of given slopes, shape (n,), at the points of pointwise laws to a matrix."""
+        """Add springs of slopes, as ``forces.slope``, at the points of pointwise laws to a matrix.
+
+        Args:
+            slope: The slopes [N/mm⁵].
+            matrix: The matrix; assembled before and afterwards.
+        """
         added = springs_at(self._points_by_free, slope)
         matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         added.destroy()
@@ -290,9 +323,88 @@ class Interface:
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
-        closure = self.forces.closure(self._vector(x))
-        self._state = self.forces.state(closure, contact_area=self._contact_area(closure))
+        vector = self._vector(x)
+        closure, shear = self.forces.closure(vector), None
+        if self.rubs is not None:
+            shear = self.rubs.shear_state(closure, vector)
+        area = self._contact_area(closure)
+        self._state = self.forces.state(closure, contact_area=area, shear=shear)
         return self._state
+
+    # --- friction
+
+    @property
+    def rubs(self) -> FrictionalForces | None:
+        """The forces of the laws where they have friction; None without."""
+        return self.forces if isinstance(self.forces, FrictionalForces) else None
+
+    def accept(self, x: Any) -> None:
+        """Take displacements for the end of a load step: what has slipped until then is slip.
+
+        `ContactProblem` does so when it has converged. Solvers of your own do it once for every
+        load step that counts; a step that is repeated or taken back starts from the last one that
+        was accepted. Without friction nothing remembers load steps.
+
+        Args:
+            x: Displacements, as a Function or a vector of PETSc [mm].
+        """
+        if self.rubs is not None:
+            vector = self._vector(x)
+            self.rubs.accept(self.forces.closure(vector), vector)
+
+    @property
+    def slip_record(self) -> SliderRecord:
+        """What the accepted load steps left behind of friction, on any number of ranks.
+
+        Set it to go on from there: to take load steps back, or in another run.
+
+        Raises:
+            InputError: Without friction; when it is set, where it is that of another face.
+        """
+        return self._rubbing().record()
+
+    @slip_record.setter
+    def slip_record(self, record: SliderRecord) -> None:
+        self._rubbing().restore(record)
+
+    @property
+    def shear_force(self) -> Array:
+        """Shear force on the plane along the axes of the face, shape (2,) [N]."""
+        return np.array(self._sheared().force)
+
+    @property
+    def shift(self) -> Array:
+        """Shift of the plane along the axes of the face, shape (2,) [mm]."""
+        return np.array(self._sheared().shift)
+
+    @property
+    def shear_stress(self) -> Array:
+        """Shear stresses on the body at this rank's samples, shape (n, 2) [MPa]."""
+        return self._sheared().sample_stress
+
+    @property
+    def dissipated(self) -> float:
+        """Energy lost to friction since the start [N mm]."""
+        return self._sheared().dissipated
+
+    @property
+    def slip_area(self) -> float | None:
+        """Real contact area that slips [mm²]; None where a law does not know its area; collective.
+
+        What sticks is the area of the law at the closure where it is as stiff as what sticks.
+        """
+        sticks = self._contact_area(self._sheared().stick_closure)
+        return None if sticks is None or self.area is None else self.area - sticks
+
+    def _sheared(self) -> FaceShear:
+        self._rubbing()
+        assert self.state.shear is not None
+        return self.state.shear
+
+    def _rubbing(self) -> FrictionalForces:
+        if self.rubs is None:
+            raise InputError("the interface has no friction", key="friction", allowed="a number")
+        return self.rubs
 
     @property
     def state(self) -> FaceContactState:
@@ -329,6 +441,45 @@ class Interface:
 
         together(self.comm, check)
 
+    def leak(
+        self,
+        inlet: int | str | NDArray[Any],
+        outlet: int | str | NDArray[Any],
+        *,
+        viscosity: float,
+        pressures: tuple[float, float],
+    ) -> FaceLeak:
+        """Return what leaks over the face at the latest `evaluate`, from edge to edge.
+
+        Reynolds' equation on the face with the transmissivity of its laws, which have it where they
+        were made with ``leak=True``. Other edges are walls. Fluid pressure does not move the face.
+
+        Args:
+            inlet: The face of the body, as `tag`, that shares with the contact face the edge where
+                the fluid enters.
+            outlet: That where it leaves.
+            viscosity: Dynamic viscosity of the fluid [MPa s]; that of water is 1e-9.
+            pressures: Fluid pressures at inlet and outlet [MPa].
+
+        Returns:
+            Flow rate, balance, and the fluid pressure as a function on the mesh. With laws per
+            patch the transmissivity is uniform on every patch.
+
+        Raises:
+            InputError: When a law has no ``transmissivities``, the patches do not cover the face,
+                or inlet and outlet do not share an edge with it.
+            NotConverged: When what enters and leaves the nodes of the mesh does not balance.
+        """
+        tags, names = self._tags
+        mesh, points = self.space.mesh, self._face.quadrature
+        closure = self.state.patch_closure[points.patch]
+        if self.mode == "pointwise":
+            closure = self.closure
+        values = together(self.comm, lambda: transmissivities_of(self.laws, points.patch, closure))
+        inside, outside = (given_facets(mesh, tags, one, names)[0] for one in (inlet, outlet))
+        face = LeakingFace(mesh, self._face.facets, points, (inside, outside))
+        return face_leak(face, values, viscosity, pressures)
+
     @property
     def points(self) -> Array:
         """Places of this rank's samples in coordinates of the face, shape (n, 2) [mm]."""
@@ -336,8 +487,12 @@ class Interface:
 
     @cached_property
     def _points_by_free(self) -> PETSc.Mat:
-        """The rows w φ n of the points for unconstrained unknowns, shape (points, unknowns)."""
-        rows = self._face.points_by_dofs
+        """The rows w φ n of the points for unconstrained unknowns, shape (points, unknowns).
+
+        With friction there are three rows for every point: along both axes as well.
+        """
+        face, rubs = self._face, self.rubs is not None
+        rows = face.points_in_all_directions if rubs else face.points_by_dofs
         if self._free is None:
             return rows
         rows = rows.copy()
@@ -357,6 +512,19 @@ class Interface:
                 allowed=f"{self._load.getSize()} unknowns",
             )
         return vector
+
+
+def _friction(friction: float | Friction | None) -> Friction | None:
+    """Return what a coefficient of friction, or a record, says."""
+    if friction is None or isinstance(friction, Friction):
+        return friction
+    if isinstance(friction, bool) or not isinstance(friction, int | float | np.number):
+        allowed = "a coefficient such as 0.3, or Friction(coefficient=…, poisson_ratio=…)"
+        raise InputError("is no friction", key="friction", value=friction, allowed=allowed)
+    try:
+        return Friction(coefficient=float(friction))
+    except InputError as error:
+        raise InputError(error.problem, key="friction", value=friction) from None
 
 
 def _area_fraction(law: Any, closure: Array) -> Array:

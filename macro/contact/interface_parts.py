@@ -86,14 +86,7 @@ def chosen_face(
     """
     check_space(space)
     mesh = space.mesh
-    mesh.topology.create_connectivity(2, 3)
-    if isinstance(tag, str | int | np.integer) and not isinstance(tag, bool):
-        tagged, name = _tagged(mesh, tags, names), str(tag)
-        number = tagged.facet_tag(tag if isinstance(tag, str) else int(tag))
-        given = np.asarray(tagged.facet_tags.find(number))
-    else:
-        given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
-    facets = _on_all_ranks(mesh, given)
+    facets, name = given_facets(mesh, tags, tag, names)
     marked = dmesh.meshtags(mesh, 2, facets, np.ones(len(facets), np.int32))
     plane = planar_face(TaggedMesh(mesh=mesh, facet_tags=marked), 1, name=name)
     if frame is None:
@@ -109,6 +102,30 @@ def chosen_face(
     corner, other = bounding_box(placed.corners.reshape(-1, 2), mesh.comm)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
     return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
+
+
+def given_facets(
+    mesh: Any, tags: Any, tag: int | str | NDArray[Any], names: Mapping[str, Any] | None = None
+) -> tuple[NDArray[np.int32], str]:
+    """Return this rank's facets of a face, also those that other ranks give, and its name.
+
+    Args:
+        mesh: The mesh.
+        tags: As for `chosen_face`, as all others.
+        tag: Number or name of the face, or facets.
+        names: Numbers of the named faces.
+
+    Raises:
+        InputError: On all ranks, when there is no such face.
+    """
+    mesh.topology.create_connectivity(2, 3)
+    if isinstance(tag, str | int | np.integer) and not isinstance(tag, bool):
+        tagged, name = _tagged(mesh, tags, names), str(tag)
+        number = tagged.facet_tag(tag if isinstance(tag, str) else int(tag))
+        given = np.asarray(tagged.facet_tags.find(number))
+    else:
+        given, name = together(mesh.comm, lambda: facet_indices(mesh, tag)), "given by its facets"
+    return _on_all_ranks(mesh, given), name
 
 
 def _tagged(mesh: Any, tags: Any, names: Mapping[str, Any] | None) -> TaggedMesh:

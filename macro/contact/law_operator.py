@@ -34,13 +34,20 @@ class LawsAtPoints:
         points: The points, shape (m, q, 3): q on each of m facets [mm].
 
     Raises:
-        InputError: When the interface is patchwise.
+        InputError: When the interface is patchwise, or has friction.
     """
 
     def __init__(self, interface: Interface, points: Array) -> None:
         if interface.mode != "pointwise":
             raise InputError(
                 "an external operator holds at points", value=interface.mode, allowed="pointwise"
+            )
+        if interface.rubs is not None:
+            raise InputError(
+                "an external operator knows pressures alone",
+                key="friction",
+                value=interface.rubs.friction.coefficient,
+                allowed="no friction; or Interface.add_residual and ContactProblem",
             )
         self._interface = interface
         self._shape = np.shape(points)[:2]

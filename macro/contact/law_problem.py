@@ -15,16 +15,19 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.spring_bed import Friction
 from macro import compat
-from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
+from macro.contact.contact_forces import ContactLaw, ContactLaws
 from macro.contact.equations import Equilibrium
-from macro.contact.face_contact_state import FaceContactState
+from macro.contact.face_contact_state import FaceContactState, FaceShear
 from macro.contact.first_steps import FirstSteps
+from macro.contact.frictional_forces import FrictionalForces, SliderMemory, contact_forces
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
+from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
 from support.errors import InputError
@@ -35,6 +38,9 @@ Indices = NDArray[np.intp]
 
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
+
+_STIFFNESS = 1e-6
+"""Relative residual of the tangential stiffness."""
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
@@ -87,6 +93,8 @@ class LawContactProblem:
             ``"pointwise"``: the law holds at every quadrature point.
         crown: Depth of the face below its plane at points (x, y) of the plane, beside that of the
             mesh, such as of a crowned face [mm]; None: none.
+        friction: Friction of the face, whose sliders move on with every load step that converges;
+            None: none. Tangents are unsymmetric with it, and GMRES solves for them.
 
     Raises:
         InputError: When there is not one law per patch, or no such mode.
@@ -102,6 +110,7 @@ class LawContactProblem:
         mode: Mode = "patchwise",
         *,
         crown: Callable[[Array, Array], Array] | None = None,
+        friction: Friction | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -111,12 +120,13 @@ class LawContactProblem:
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
         self._preload: Array | None = None
-        self.forces = ContactForces(face, sampling, laws, self._undeformed_gap)
+        self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, body.solver
         )
-        self.newton = Newton(self.equilibrium, self._preconditioner)
+        options = None if friction is None else UNSYMMETRIC
+        self.newton = Newton(self.equilibrium, self._preconditioner, options)
         update = self._preconditioner.update
         self._first_steps = FirstSteps(self.equilibrium, sampling, update)
         condensed = " or, on a very soft body, coupling.newton = 'condensed'"
@@ -149,6 +159,7 @@ class LawContactProblem:
         residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self._closure, body = self.forces.closure(solution), equilibrium.body
+        shear = self._accepted(solution)
         self.basis.add(solution, self.forces.pressure(self._closure))
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
@@ -159,9 +170,61 @@ class LawContactProblem:
             linear_iterations=started + spent + report.linear_iterations,
             residuals=np.concatenate([residuals, report.residuals]),
             reason=report.reason,
+            shear=shear,
         )
         compat.collect_garbage(solution.comm)
         return state
+
+    def _accepted(self, solution: PETSc.Vec) -> FaceShear | None:
+        """Move sliders on to a solution, and return its shear; None without friction."""
+        forces = self.forces
+        if not isinstance(forces, FrictionalForces):
+            return None
+        shear = forces.shear_state(self._closure, solution)
+        self._sticking = forces.respond(self._closure, solution)
+        forces.accept(self._closure, solution)
+        return shear
+
+    @property
+    def memory(self) -> SliderMemory | None:
+        """What the load steps so far left behind of friction; set it to take load steps back."""
+        return self.forces.memory if isinstance(self.forces, FrictionalForces) else None
+
+    @memory.setter
+    def memory(self, memory: SliderMemory | None) -> None:
+        if isinstance(self.forces, FrictionalForces) and memory is not None:
+            self.forces.memory = memory
+
+    def tangential_stiffness(self) -> tuple[float, int]:
+        """Return the derivative of the shear force along the plane's shift, body included [N/mm].
+
+        The shift changes on in the direction of its last change. Springs that stick follow it,
+        those that slip keep their stresses, and pressures stay as they are.
+
+        Returns:
+            The derivative, and the linear iterations that it took.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+
+        Note:
+            Collective; one linear solve.
+        """
+        forces, equilibrium = self.forces, self.equilibrium
+        assert isinstance(forces, FrictionalForces)
+        found, ahead = self._sticking, forces.memory.direction
+        forces.linearise_sticking(found)
+        self._preconditioner.update()
+        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        stress = found.stuck[:, None] * ahead
+        forces.write_stresses(np.zeros(len(stress)), stress, load)
+        solver = self.newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=_STIFFNESS)
+        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        relaxed = found.stuck[:, None] * forces.along(moved)
+        compat.collect_garbage(load.comm)
+        return float(forces.total(stress - relaxed) @ ahead), iterations
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -239,6 +302,8 @@ class LawContactProblem:
             moved = body.stiffness.createVecRight()
             moved.array[:] = self._preload
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
+            if isinstance(self.forces, FrictionalForces):
+                self.forces.preload = self.forces.along(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""
@@ -317,6 +382,7 @@ class ContactPreconditioner:
     def __init__(self, equilibrium: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
         self._equilibrium, self._face, self._alone = equilibrium, face, solver
         self._knows_laws = face is not None and equilibrium.body.lattice is None
+        self._rubs = isinstance(equilibrium.forces, FrictionalForces)
         self._with_laws: PETSc.KSP | None = None
         self._stiffened: Stiffened | None = None
         self._slope = np.zeros_like(equilibrium.forces.slope)
@@ -333,7 +399,9 @@ class ContactPreconditioner:
             self._with_laws.destroy()
             self._with_laws = self._stiffened = None
         if forces.comm.allreduce(slope.any(), op=MPI.LOR):
-            springs = springs_at(self._face.points_by_dofs, slope)
+            face = self._face
+            points = face.points_in_all_directions if self._rubs else face.points_by_dofs
+            springs = springs_at(points, slope)
             self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
             self._with_laws = body.solver_of(self._stiffened)
         compat.collect_garbage(body.stiffness.comm)

@@ -14,7 +14,7 @@ import numpy as np
 from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, identity, kron
 
 from geometry.meshes.block import require_inside
 from geometry.patches import PatchGrid
@@ -66,6 +66,7 @@ class ContactFace:
         areas: Areas of the patches, shape (N,) [mm²].
         patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
         pointwise: Laws at quadrature points.
+        in_all_directions: The operator of pressures and shear stresses at the samples of a mode.
         pull_moments: Moments of what pulls the body, by the state of its loads.
 
     Note:
@@ -78,6 +79,7 @@ class ContactFace:
     areas: Any
     patchwise: Any
     pointwise: Any
+    in_all_directions: Any
     pull_moments: Any
 
     def load(self, pressures: Array) -> PETSc.Vec:
@@ -248,14 +250,8 @@ class LoadedFace(ContactFace):
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches, which are distributed over the ranks."""
-        points, comm = self.quadrature, self.comm
-        count = self.patches.count
-        member = csr_matrix(
-            (np.ones(len(points.x)), points.patch, np.arange(len(points.x) + 1)),
-            shape=(len(points.x), count),
-        )
-        columns = count // comm.size + (comm.rank < count % comm.size)
-        operator = self.points_by_dofs.transposeMatMult(distributed(member, columns, comm))
+        member = distributed(self._members, self._own_patches, self.comm)
+        operator = self.points_by_dofs.transposeMatMult(member)
         own = np.arange(*operator.getOwnershipRangeColumn())
         x, y, depth = (mean[own] for mean in self._means)
         return Sampling(
@@ -268,19 +264,51 @@ class LoadedFace(ContactFace):
             count=self.patches.count,
         )
 
+    @property
+    def _members(self) -> csr_matrix:
+        """Which patch every point of this rank is on, a row with a 1 for each."""
+        points = self.quadrature
+        count = len(points.x)
+        return csr_matrix(
+            (np.ones(count), points.patch, np.arange(count + 1)), shape=(count, self.patches.count)
+        )
+
+    @property
+    def _own_patches(self) -> int:
+        """Number of patches whose mean closures this rank has."""
+        count, comm = self.patches.count, self.comm
+        return count // comm.size + (comm.rank < count % comm.size)
+
     @cached_property
     def points_by_dofs(self) -> PETSc.Mat:
         """−w φ n of the displacements at every point, shape (points, dofs) [mm²]."""
+        return self._rows(-self.facets.outward[None])
+
+    @cached_property
+    def points_in_all_directions(self) -> PETSc.Mat:
+        """Displacements times w φ along −n, e1, e2 at every point, (3 points, dofs) [mm²]."""
+        return self._rows(self.facets.directions)
+
+    def in_all_directions(self, mode: Mode) -> PETSc.Mat:
+        """Return the operator of stresses (p, τx, τy) at the samples of a mode, (dofs, 3 n) [mm²].
+
+        It writes the nodal load by pressures and by shear stresses along the axes of the face;
+        three columns for every sample, the first of which is that of `Sampling.operator`.
+        """
+        points = self.points_in_all_directions
+        if mode == "pointwise":
+            return PETSc.Mat().createTranspose(points)
+        each = kron(self._members, identity(3), format="csr")
+        return points.transposeMatMult(distributed(each, 3 * self._own_patches, self.comm))
+
+    def _rows(self, directions: Array) -> PETSc.Mat:
+        """Return w φ of the displacements along directions at every point, (k points, dofs)."""
         points, nodes = self.quadrature, self.space.dofmap.index_map
         used = points.values != 0.0  # excludes nodes that are not on the facet
         numbers = np.zeros(used.shape, dtype=np.int64)
         numbers[used] = nodes.local_to_global(points.nodes[used])
-        rows = normal_rows(
-            points.weight[:, None] * points.values,
-            numbers,
-            used,
-            self.facets.outward,
-            nodes.size_global,
+        rows = directed_rows(
+            points.weight[:, None] * points.values, numbers, used, directions, nodes.size_global
         )
         return distributed(rows, 3 * nodes.size_local, self.comm)
 
@@ -296,27 +324,32 @@ class LoadedFace(ContactFace):
         return x, y, means[2]
 
 
-def normal_rows(
+def directed_rows(
     weights: Array,
     numbers: NDArray[np.int64],
     used: NDArray[np.bool_],
-    outward: Array,
+    directions: Array,
     nodes: int,
 ) -> csr_matrix:
-    """Return −w φ n for the three displacements of every node, shape (points, 3 nodes) [mm²].
+    """Return w φ d for the three displacements of every node, shape (k points, 3 nodes) [mm²].
 
     Args:
         weights: w φ at every point for the nodes of its cell, shape (points, m) [mm²].
         numbers: Global numbers of these nodes, shape (points, m).
         used: Which of them take part, shape (points, m).
-        outward: Normal n out of the body, shape (3,).
+        directions: k unit vectors d, each of which has a row at every point, shape (k, 3).
         nodes: Number of all nodes.
     """
-    axes = np.flatnonzero(np.abs(outward) > 1e-14)
-    columns = (3 * numbers[used][:, None] + axes).ravel()
-    starts = len(axes) * np.concatenate([[0], np.cumsum(used.sum(axis=1))])
-    entries = (-weights[used][:, None] * outward[axes]).ravel()
-    return csr_matrix((entries, columns, starts), shape=(len(weights), 3 * nodes))
+    count = len(directions)
+    of_point = np.repeat(np.arange(len(weights)), used.sum(axis=1))
+    axes = np.abs(directions) > 1e-14
+    row, column, entry = [], [], []
+    for k, axis in np.argwhere(axes):
+        row.append(count * of_point + k)
+        column.append(3 * numbers[used] + axis)
+        entry.append(weights[used] * directions[k, axis])
+    shape = (count * len(weights), 3 * nodes)
+    return csr_matrix((np.concatenate(entry), (np.concatenate(row), np.concatenate(column))), shape)
 
 
 def patch_compliance_matrix(face: ContactFace) -> Array:

@@ -180,6 +180,30 @@ def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:
     return springs
 
 
+def coupled_springs_at(points: PETSc.Mat, tangents: Array) -> PETSc.Mat:
+    """Return the stiffness Bᵀ C B of springs at points that couple their directions.
+
+    Args:
+        points: B, rows of weighted basis functions, k for every point [mm²].
+        tangents: C of this rank's points, shape (n, k, k) [N/mm⁵].
+
+    Note:
+        Collective.
+    """
+    count, width = len(tangents), tangents.shape[1]
+    first = points.getOwnershipRange()[0]
+    column = first + width * np.repeat(np.arange(count), width)[:, None] + np.arange(width)
+    starts = width * np.arange(width * count + 1, dtype=PETSc.IntType)
+    pattern = (starts, column.ravel().astype(PETSc.IntType), tangents.ravel())
+    size = ((width * count, None), (width * count, None))
+    coupling = PETSc.Mat().createAIJ(size, csr=pattern, comm=points.comm)
+    coupled = coupling.matMult(points)
+    springs = points.transposeMatMult(coupled)
+    for part in (coupling, coupled):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return springs
+
+
 class Stiffened:
     """The sum K + S of the stiffness of a body, or of several, and that of springs at few nodes.
 

@@ -26,6 +26,9 @@ KRYLOV_DEFAULTS: Mapping[str, object] = {
 }
 """Conjugate gradients, whatever the preconditioner."""
 
+UNSYMMETRIC: Mapping[str, object] = {"ksp_type": "gmres", "ksp_gmres_restart": 100}
+"""For tangents of friction, which are unsymmetric where closures change."""
+
 ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,

@@ -67,6 +67,16 @@ class ContactFacets:
     depth: Array
 
     @property
+    def directions(self) -> Array:
+        """Where the body is loaded to by a pressure and by shear stresses, shape (3, 3).
+
+        Into the body and along both axes of the frame; of a counter-body against these, as it bears
+        the opposite stresses.
+        """
+        side = 1.0 if self.outward @ self.frame.normal > 0.0 else -1.0
+        return np.stack([-self.outward, *(side * self.frame.axes[:2])])
+
+    @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
         triangles, facet = facet_triangles(self.corners)

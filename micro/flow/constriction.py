@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from micro.flow.network import Network
-from micro.flow.potential_flow import NetworkFlow
 from support.arrays import Array
+from support.network import Network
+from support.network_flow import NetworkFlow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

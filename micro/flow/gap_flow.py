@@ -18,10 +18,10 @@ from functools import cached_property
 import numpy as np
 
 from micro.flow.constriction import Constriction, critical_constriction
-from micro.flow.network import Network
-from micro.flow.potential_flow import NetworkFlow, Preconditioner, factorised, network_flow
 from support.arrays import Array
 from support.errors import InputError
+from support.network import Network
+from support.network_flow import NetworkFlow, Preconditioner, factorised, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
@@ -157,7 +157,11 @@ def gap_flow(
 
 
 def cell_network(
-    conductivity: Array, lengths: tuple[float, float], *, periodic: bool = False
+    conductivity: Array,
+    lengths: tuple[float, float],
+    *,
+    across: Array | None = None,
+    periodic: bool = False,
 ) -> Network:
     """Return the network of the cells of a map, whose inlet is at x = 0 and outlet at x = Lx.
 
@@ -167,6 +171,7 @@ def cell_network(
         conductivity: Conductivity of the cells, 0 where closed, shape (nx, ny). That of a gap is
             g³ [mm³].
         lengths: Sides of the map [mm].
+        across: Their conductivity along y, where it is another one than along x.
         periodic: Whether the map continues over the sides y = 0 and y = Ly.
     """
     nx, ny = conductivity.shape
@@ -178,13 +183,19 @@ def cell_network(
     tail = np.concatenate([inlet, cells.ravel(), below.ravel()])
     head = np.concatenate([cells[0], cells[1:].ravel(), outlet, above.ravel()])
     width = (lengths[1] / ny) / (lengths[0] / nx)
-    widths = np.repeat([width, 1.0 / width], [cells.size + ny, below.size])
     # half of a link between two cells lies in each of them; those to a side end there
-    resistance = np.zeros(cells.size + 2)
-    with np.errstate(divide="ignore"):
-        resistance[: cells.size] = 0.5 / conductivity.ravel()
-    links = resistance[tail] + resistance[head]
+    along_x = np.repeat([True, False], [cells.size + ny, below.size])
+    links = np.empty(len(tail))
+    for part, one in (
+        (along_x, conductivity),
+        (~along_x, conductivity if across is None else across),
+    ):
+        resistance = np.zeros(cells.size + 2)
+        with np.errstate(divide="ignore"):
+            resistance[: cells.size] = 0.5 / one.ravel()
+        links[part] = resistance[tail[part]] + resistance[head[part]]
     is_open = np.isfinite(links)
+    widths = np.where(along_x, width, 1.0 / width)
     return Network(
         count=cells.size,
         tail=tail[is_open],

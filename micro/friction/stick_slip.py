@@ -123,13 +123,15 @@ class StickSlip:
         motion: Shift of all cells where the force is prescribed, shape (2,) [mm].
         slip: Slip of the cells in this step as the tractions have it, shape (2, n) [mm].
         slipping: Which cells slip, shape (n,).
-        residual: Largest violation of the conditions over the largest shift.
+        residual: Largest violation of the conditions over the largest shift or displacement so
+            far, so that tractions which end at zero have one that does.
     """
 
     def __init__(self, problem: TractionProblem, start: Array) -> None:
         self.problem = problem
         self._set = np.zeros(len(problem.bound), bool)
         self._cautious = False  # since a step has raised the energy
+        self._scale = 0.0
         tractions = problem.admissible(start)
         if tractions is None:
             tractions = problem.admissible(np.zeros_like(start))
@@ -159,7 +161,7 @@ class StickSlip:
         self._outward = np.where(self.slipping, outward, 0.0)
         self._left = slip - self._outward * self._normal
         shifted = np.abs(problem.shift + self.motion[:, None]).max(initial=0.0)
-        self._scale = max(float(shifted), float(np.abs(moved).max(initial=0.0)))
+        self._scale = max(self._scale, float(shifted), float(np.abs(moved).max(initial=0.0)))
         largest = float(np.abs(self._left).max(initial=0.0))
         self.residual = largest / self._scale if self._scale > 0.0 else 0.0
 

@@ -14,7 +14,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -355,6 +355,7 @@ def write_displaced(
     face: LoadedFace | FacePair,
     states: Mapping[int, tuple[Array, float]],
     pressures: Callable[[int, bool], Pressures],
+    further: Callable[[int], Sequence[Any]] = lambda number: (),
 ) -> None:
     """Write the fields of bodies whose displacements are known.
 
@@ -364,6 +365,7 @@ def write_displaced(
         states: By number of the load step this rank's displacements [mm], and the position among
             the states of the bodies' loads.
         pressures: What is shown as pressure, by load step and whether it is on the counter-body.
+        further: Other functions on the mesh of the first body, by load step.
 
     Note:
         Collective.
@@ -373,7 +375,8 @@ def write_displaced(
     def halves(counter: bool) -> Iterator[FieldStep]:
         for number, (moved, loads) in sorted(states.items()):
             own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
-            yield FieldStep(number, own, pressures(number, counter), loads)
+            more = () if counter else further(number)
+            yield FieldStep(number, own, pressures(number, counter), loads, more)
 
     _write(path, face, lambda one: halves(one is getattr(face, "second", None)))
 

@@ -14,6 +14,7 @@ from multiscale.cli.words import COMPARE_ENDING
 from multiscale.figures.files import Drawing, Pictures, file_kinds, pictures_of, write_pictures
 from multiscale.output import terminal
 from multiscale.output.results import write_records
+from multiscale.progress import following
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
@@ -39,7 +40,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
     with locked(folder, comm):
-        with terminal.following(comm) as (begun, ended):
+        with following(comm) as (begun, ended):
 
             def observe(one: Configuration, result: CaseResult) -> None:
                 phases = result.measured.get("phases", {})

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from multiscale.cli.words import command_parser
-from multiscale.output import terminal
+from multiscale.console import speaks
 from multiscale.scene.keys import scene_keys
 
 _KEY_OPTIONS = ("--set", "--vary")
@@ -22,7 +22,7 @@ def print_completion(choice: argparse.Namespace, options: list[str], comm: Any) 
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    if terminal.speaks(comm):
+    if speaks(comm):
         print(completion(choice.shell))
 
 

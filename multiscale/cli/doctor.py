@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from multiscale import doctor
+from multiscale.console import colours, speaks
 from multiscale.doctor import Check, CheckResult, examine
 from multiscale.output import terminal
 from support.errors import InputError
@@ -43,9 +44,9 @@ def examine_machine(choice: argparse.Namespace, options: list[str], comm: Any) -
     results = {}
     for topic, result in examine(comm, CHECKS):
         results[topic] = result
-        if terminal.speaks(comm) and not choice.json:
+        if speaks(comm) and not choice.json:
             show(topic, result)
-    if terminal.speaks(comm) and choice.json:
+    if speaks(comm) and choice.json:
         listed = [{"topic": topic} | asdict(result) for topic, result in results.items()]
         print(json.dumps(listed, indent=2))
     if failed := [topic for topic, result in results.items() if result.state == "fail"]:
@@ -71,7 +72,7 @@ def show(topic: str, result: CheckResult) -> None:
         topic: What was checked.
         result: The result.
     """
-    console = Console(highlight=False, soft_wrap=True, color_system=terminal.colours())
+    console = Console(highlight=False, soft_wrap=True, color_system=colours())
     colour = _COLOUR[result.state]
     console.print(f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]{escape(result.text)}")
     if result.remedy:

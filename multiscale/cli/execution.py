@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from multiscale.console import quietly
 from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
@@ -51,7 +52,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         if isinstance(choice, str):
             raise InputError(choice, key="command line")
         module, _, function = choice.function.partition(".")
-        quiet = terminal.quietly(getattr(choice, "quiet", False))
+        quiet = quietly(getattr(choice, "quiet", False))
         with ended_if_told(), optional_packages(), quiet:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
             command(choice, _start_petsc(options), comm)

@@ -8,6 +8,7 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from multiscale.console import speaks
 from multiscale.output import terminal
 from multiscale.scene.keys import Key, scene_keys, scene_schema
 from support.errors import InputError
@@ -21,7 +22,7 @@ def print_schema(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    if terminal.speaks(comm):
+    if speaks(comm):
         print(json.dumps(scene_schema(), indent=2))
 
 

@@ -21,6 +21,7 @@ from multiscale.laws.law_file import write_laws
 from multiscale.observers.conductance import conducts_of
 from multiscale.output import terminal
 from multiscale.output.results import surface_drawing
+from multiscale.progress import counting, following
 from multiscale.restart.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
@@ -43,8 +44,8 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
         terminal.show_plan(comm, run.coupling)
-        with terminal.following(comm) as (begun, _):
-            run.clock.observe = terminal.counting(begun)
+        with following(comm) as (begun, _):
+            run.clock.observe = counting(begun)
             run.make_laws()
         table = run.laws
         assert table is not None

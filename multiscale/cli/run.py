@@ -10,6 +10,7 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import RunFigures, write_results
+from multiscale.progress import following, run_progress
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (
@@ -44,7 +45,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     terminal.open_page(comm, sorted(folder.glob("report.html")))
                 return
             with RunFigures(scene, comm) as figures:
-                with terminal.following(comm) as (begun, _):
+                with following(comm) as (begun, _):
                     begun("setting up the problem")
                     run = Run(scene, comm, None if kept is None else kept.resolved)
                 if kept is not None:
@@ -93,7 +94,7 @@ def _make_load_steps(
 ) -> PatchlawError | None:
     """Make the load steps with their checkpoints; return what ended them early, on all ranks."""
     load_history = run.scene.loading
-    with terminal.progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
+    with run_progress(run.comm, load_history, len(run.steps)) as (advance, run.clock.observe):
         try:
             if run.coupling.has_laws:
                 run.make_laws()

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -16,9 +14,10 @@ from multiscale.cli.words import SWEEP_ENDING
 from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.output import terminal
 from multiscale.output.results import write_records
+from multiscale.progress import case_progress
 from multiscale.restart.results_folder import locked
-from multiscale.studies.cases import Case, sweep_cases, values_from_text
-from multiscale.studies.running import JOURNAL, CaseResult, part_name
+from multiscale.studies.cases import sweep_cases, values_from_text
+from multiscale.studies.running import JOURNAL, part_name
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
@@ -45,16 +44,7 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
         ranks = parts * place_in(comm)[1]
         terminal.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
-        pace, last = terminal.Pace(math.ceil(cases / ranks)), time.monotonic()
-        with terminal.following(comm) as (begun, ended):
-
-            def observe(case: Case, result: CaseResult) -> None:
-                nonlocal last
-                spent, last = time.monotonic() - last, time.monotonic()
-                begun(f"case {case.number} is done{pace.left(spent)}")
-                if result.failure:
-                    ended(f"case {case.number}: {result.failure}")
-
+        with case_progress(comm, cases, parts) as observe:
             done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
         files = on_root(comm, lambda: _write(folder, done, scene.output.figures))
     for text in _summary(done):

@@ -60,8 +60,13 @@ class LawCoupling(Coupling):
         if self.table is None:
             self._prepare_laws()
             with self.clock.phase("laws"):
-                self.table = self._make_table(self.clock.observe)
+                made = self._make_table(self.clock.observe)
+                self.table = made.with_stiffness_ratios(self._stiffness_ratios())
         return self.table
+
+    def _stiffness_ratios(self) -> list[float]:
+        """Return Mindlin's ratio of the bodies for every law."""
+        return [self.materials.stiffness_ratio] * self.patches.count
 
     def _prepare_laws(self) -> None:
         """Make what laws need, in phases of their own."""

@@ -27,10 +27,13 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Detail, Observer
+from support.collective import on_root_alone
 
 _CYCLES_PER_PATCH = 11
 """Multigrid cycles that the compliance of one patch takes, measured on the paper's cube with 4 × 4
 and 8 × 8 patches."""
+_RESERVE = 0.02
+"""Way that rows of transmissivities go beyond the largest load, relative to the way to it."""
 _UNLESS_FLAT = "; should a patch turn out to be flat, condensed all the same"
 
 
@@ -162,7 +165,7 @@ class ConsistentCoupling(PatchLaws):
 
     def _make_table(self, observe: Observer | None) -> LawTable:
         displacements = self._displacements(self.newton().condensed)
-        return consistent_laws(
+        table = consistent_laws(
             self._model,
             self.patches,
             largest=self._largest_control(),
@@ -174,6 +177,28 @@ class ConsistentCoupling(PatchLaws):
             comm=self.comm,
             observe=observe,
         )
+        return table if self.scene.leak is None else self._with_leak(table)
+
+    def _with_leak(self, table: LawTable) -> LawTable:
+        """Return the laws with the transmissivities of their patches; collective."""
+        from multiscale.laws.flow_rows import patch_transmissivities  # others do without
+
+        assert self.cells is not None, "scenes of summits are refused"
+        assert isinstance(self._model, HalfSpaceModel)
+        model, probe, largest = self._model, self.error_probe(), self._largest_control()
+        coarse = probe.model.resampled((self.cells[0] // 2, self.cells[1] // 2))
+        end, first = on_root_alone(self.comm, lambda: _ends(model, largest))
+        end += _RESERVE * (end - first)
+        flows = patch_transmissivities(
+            (model, probe.on_body(coarse, probe.order)),
+            self.patches,
+            (first, end),
+            largest.tilt,
+            self.comm,
+        )
+        pairs = zip(table.laws, flows, strict=True)
+        laws = tuple(replace(law, transmissivity=flow) for law, flow in pairs)
+        return replace(table, laws=laws)
 
     def _largest_control(self) -> Control:
         """Return the load that laws are made up to: other loads of the body raise its face."""
@@ -209,6 +234,13 @@ class ConsistentCoupling(PatchLaws):
         else:
             how = " under the load's tilt" if any(tilt) else ""
         return f"all from one solution of the whole surface{how}"
+
+
+def _ends(model: MicroModel, largest: Control) -> tuple[float, float]:
+    """Return the approaches at the largest load, and under a millionth of its force [mm]."""
+    end = model.press(largest)
+    slight = Control(force=1e-6 * end.force, tilt=largest.tilt)
+    return end.approach, model.press(slight).approach
 
 
 @dataclass(kw_only=True, eq=False)

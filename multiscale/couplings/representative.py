@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -63,10 +63,12 @@ class RepresentativeCoupling(LawCoupling):
     Attributes:
         samples: The samples of every region of the face.
         micro: Micro model of the first sample, the periodic half-space.
+        further_fields: Make functions on the mesh that are written with the other fields.
     """
 
     samples: tuple[RegionSamples, ...]
     micro: HalfSpaceModel
+    further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
     _extensions: list[str] = field(default_factory=list, init=False)
 
     @classmethod
@@ -225,6 +227,7 @@ class RepresentativeCoupling(LawCoupling):
             most_rows=MOST_ROWS,
             make_model=lambda sample: models[id(sample)],
             before=before,
+            leak=self.scene.leak is not None,
             comm=self.comm,
             observe=observe,
         )
@@ -242,6 +245,9 @@ class RepresentativeCoupling(LawCoupling):
         if not self.finite_slopes:
             return model
         return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
+
+    def _stiffness_ratios(self) -> list[float]:
+        return [region.materials.stiffness_ratio for region in self.samples]
 
     def _largest_loads(self) -> tuple[float, float | None]:
         """Return the largest local pressure that laws are made for [MPa], and closure [mm].
@@ -287,7 +293,9 @@ class RepresentativeCoupling(LawCoupling):
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         face = self.bodies.contact_face()
-        return ExtendedLaws(partial(self._problem, face), table, face, self._longer)
+        solver = ExtendedLaws(partial(self._problem, face), table, face, self._longer)
+        solver.further_fields = self.further_fields
+        return solver
 
     def _problem(self, face: LoadedFace | FacePair, table: LawTable) -> LawContactProblem:
         """Return a face with laws at its points."""
@@ -300,7 +308,7 @@ class RepresentativeCoupling(LawCoupling):
         longer = self._make_table(None, before=table)
         if longer is table:
             return None
-        self.table = longer
+        self.table = longer = longer.with_stiffness_ratios(self._stiffness_ratios())
         self._extensions.append(
             f"the laws were extended to {number(longer.largest_pressure)} MPa, which a load step "
             "needed"

@@ -30,10 +30,13 @@ CSV_COLUMNS = (
 )  # fmt: skip
 """Columns of ``laws.csv`` after those that say where the law holds: ix and iy, or the region.
 
-Conductances per area follow where they are asked for.
+Conductances per area follow where they are asked for, and `FLOW_COLUMNS` where a leak is.
 Laws of regions have the scatter of pressures between their samples as a last column.
 """
+FLOW_COLUMNS = "transmissivity_x_mm3", "transmissivity_y_mm3"
+"""Columns of ``laws.csv`` where laws know what leaks through their gaps."""
 _STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
+_SEPARATION = CSV_COLUMNS.index("separation_mm")
 
 
 def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
@@ -52,13 +55,23 @@ def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None
     regions = isinstance(table.patches, Regions)
     where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
     names = () if conducts is None else tuple(conducts(np.zeros(1)))
-    writer.writerow((*where, *CSV_COLUMNS, *names, *scatter))
+    leaks = all(law.transmissivity is not None for law in table.laws)
+    flows = FLOW_COLUMNS if leaks else ()
+    writer.writerow((*where, *CSV_COLUMNS, *names, *flows, *scatter))
     for place, law in zip(places(table), table.laws, strict=True):
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
             conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
-            writer.writerow((*place.cells, *row, *map(float, conductances), *more))
+            further = [float(one) for one in conductances]
+            further += _flows_of(law, row[_SEPARATION]) if leaks else []
+            writer.writerow((*place.cells, *row, *further, *more))
     return text.getvalue()
+
+
+def _flows_of(law: PatchLaw, separation: float) -> list[float]:
+    """Return the transmissivities of a law at a separation; none where it does not know them."""
+    flow = law.transmissivity
+    return [] if flow is None else flow.at(np.array([separation]))[0].tolist()
 
 
 def _rows_of(law: PatchLaw, tolerance: float) -> Iterator[tuple[float, ...]]:

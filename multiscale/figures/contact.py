@@ -32,7 +32,7 @@ from multiscale.figures.style import (
     styled,
 )
 from multiscale.figures.surface import draw_surface
-from multiscale.readable import quantity, usual_unit
+from multiscale.readable import number, quantity, usual_unit
 
 
 def load_text(step: Any) -> str:
@@ -70,7 +70,7 @@ def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
     figure, (sizes, shares) = _maps(record, scales, 1)
     _draw_sizes(sizes, record)
     more = "contact that bears more"
-    _draw_shares(shares, record.pressure_MPa, ("contact pressure", "MPa"), more)
+    _draw_shares(shares, record.pressure_MPa, "contact pressure", scales.pressure_unit, more)
     return figure
 
 
@@ -99,7 +99,8 @@ def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, l
         depths, shares, *others = others
         _draw_depths(depths, record, scales.depth)
         deeper = "yielded area that is deeper"
-        _draw_shares(shares, record.plastic_depth_mm, ("plastic depth", "mm"), deeper)
+        unit = usual_unit([scales.depth], "mm")
+        _draw_shares(shares, record.plastic_depth_mm, "plastic depth", unit, deeper)
     return figure, others
 
 
@@ -118,15 +119,15 @@ def draw_contact(axes: Any, record: Any, scales: ContactScales | None = None) ->
         axes.set_title("contact pressure")
         return
     if record.pressure_MPa is None:
-        _draw_spots(axes, record, scales.spot)
+        _draw_spots(axes, record, scales)
         return
-    unit, size = usual_unit([scales.pressure], "MPa")
+    unit, size = scales.pressure_unit
     shown = np.ma.masked_less_equal(np.asarray(record.pressure_MPa) / size, 0.0)
     scale = Normalize(0.0, scales.pressure / size)
     image = _draw_field(axes, record, shown, PRESSURES, scale, largest=True)
     colour_bar(image, axes, f"contact pressure [{unit}]", extend="max")
-    peak = quantity(float(np.max(record.pressure_MPa)), "MPa", 3)
-    axes.set_title(f"contact pressure, at most {peak}")
+    peak = number(float(np.max(record.pressure_MPa)) / size, 3)
+    axes.set_title(f"contact pressure, at most {peak} {unit}")
 
 
 def _draw_gaps(axes: Any, record: Any, top: float) -> None:
@@ -151,7 +152,7 @@ def _draw_depths(axes: Any, record: Any, top: float) -> None:
     shown = np.ma.masked_less_equal(depth / size, 0.0)
     image = _draw_field(axes, record, shown, DEPTHS, Normalize(0.0, top / size), largest=True)
     colour_bar(image, axes, f"plastic depth [{unit}]")
-    axes.set_title(f"plastic depth, at most {quantity(float(depth.max()), 'mm', 3)}")
+    axes.set_title(f"plastic depth, at most {number(float(depth.max()) / size, 3)} {unit}")
 
 
 def _draw_field(
@@ -179,7 +180,7 @@ def _draw_field(
     return axes.tripcolor(mesh, facecolors=filled, rasterized=True, **look)
 
 
-def _draw_spots(axes: Any, record: Any, top: float) -> None:
+def _draw_spots(axes: Any, record: Any, scales: ContactScales) -> None:
     unit = map_axes(axes, record.lengths_mm)
     diameter = 2.0 * unit * np.sqrt(record.area_mm2 / np.pi)
     many = len(diameter) > 500  # whose outlines would hide their colours
@@ -188,9 +189,9 @@ def _draw_spots(axes: Any, record: Any, top: float) -> None:
         offset_transform=axes.transData, cmap=PRESSURES, lw=0.0 if many else 0.3, edgecolor="0.3",
         rasterized=many,
     )  # fmt: skip
-    name, size = usual_unit([top], "MPa")
+    name, size = scales.pressure_unit
     spots.set_array(record.peak_pressure_MPa / size)
-    spots.set_clim(0.0, top / size or 1.0)
+    spots.set_clim(0.0, scales.spot / size or 1.0)
     axes.add_collection(spots)
     colour_bar(spots, axes, f"largest pressure of the spot [{name}]")
     axes.set_title("spots, as circles of their areas")
@@ -212,11 +213,9 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 
-def _draw_shares(axes: Any, values: Any, quantity_and_unit: tuple[str, str], share: str) -> None:
+def _draw_shares(axes: Any, values: Any, text: str, unit: tuple[str, float], share: str) -> None:
     """Draw which share of the points with a value above zero has more than each value."""
-    text, unit = quantity_and_unit
-    known = np.asarray(values)[np.asarray(values) > 0.0]
-    name, size = usual_unit([float(np.max(known, initial=0.0))], unit)
+    known, (name, size) = np.asarray(values)[np.asarray(values) > 0.0], unit
     axes.set(xlabel=f"{text} [{name}]", ylabel=f"{share} [%]", title=f"{text}s, by share")
     if not known.size:
         axes.set(xticks=[], yticks=[])

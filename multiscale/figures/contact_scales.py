@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from multiscale.readable import usual_unit
+
 _MOST = 0.99
 """Share of the loaded cells within the scale of pressures: few cells carry the largest ones."""
 
@@ -25,6 +27,11 @@ class ContactScales(NamedTuple):
     gap: float
     depth: float
     spot: float
+
+    @property
+    def pressure_unit(self) -> tuple[str, float]:
+        """The unit of all pressures in a figure, and its size: that which suits the largest."""
+        return usual_unit([self.pressure, self.spot], "MPa")
 
     @classmethod
     def of(cls, records: Iterable[Any]) -> ContactScales:

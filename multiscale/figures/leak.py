@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 
 from micro.flow.gap_flow import GapFlow
 from multiscale.figures.maps import coarsened, colour_bar, map_axes
@@ -30,12 +32,14 @@ _CONTACT = "0.5"
 """Grey of what is in contact."""
 _FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="fluid")
 """Colours of fluid pressures, on which flow lines are seen."""
-_COLOURS = {"x_": BLUE, "y_": ORANGE, "": BLUE}
-"""Colours of curves by what stands for the way of the flow in names of columns."""
+_COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
+"""Colours of curves by the way of the flow."""
 
 
 @styled()
-def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figure:
+def leak_figure(
+    history: Any, record: Any, section: Any, periodic: bool, fluid: Any = None
+) -> Figure:
     """Draw the flow at the last recorded load step, and the leak at all of them.
 
     Args:
@@ -44,12 +48,17 @@ def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figu
             the curves alone.
         section: A `multiscale.scene.leak.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
+        fluid: A `multiscale.observers.face_leak.FluidMap` of the last load step; None draws the
+            curve alone.
     """
-    ways = [""] if section.between_edges else [f"{one}_" for one in section.directions]
-    shown = section.directions if record is not None and any(ways) else ()
+    over_face = section.between_edges
+    ways = ["face"] if over_face else list(section.directions)
+    if over_face and fluid is not None:
+        return _face_figure(history, section, fluid)
+    shown = section.directions if record is not None and not over_face else ()
     title = f"flow at load step {record.step}" if shown else ""
     rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
-    columns, width = (2, FULL_WIDTH) if any(ways) else (1, ONE_COLUMN)
+    columns, width = (1, ONE_COLUMN) if over_face else (2, FULL_WIDTH)
     bars = range(len(shown))
     figure, axes = panels(rows, columns, height, width=width, bars=bars, title=title)
     for place, direction in zip(axes, shown, strict=False):
@@ -60,6 +69,35 @@ def leak_figure(history: Any, record: Any, section: Any, periodic: bool) -> Figu
     _draw_leak(axes[len(shown)], history, ways)
     if len(axes) > len(shown) + 1:
         _draw_factors(axes[-1], history, ways)
+    return figure
+
+
+def _face_figure(history: Any, section: Any, fluid: Any) -> Figure:
+    """Draw the fluid pressure on a contact face at the last load step, and the leak at all."""
+    triangles, pressure = fluid.triangles, fluid.pressure_MPa
+    figure, (left, right) = panels(1, 2, 3.2, bars=[0])
+    lower, upper = (each(triangles, axis=(0, 1)) for each in (np.min, np.max))
+    scale = map_axes(left, tuple(upper))
+    left.set(
+        xlim=scale * np.array([lower[0], upper[0]]), ylim=scale * np.array([lower[1], upper[1]])
+    )
+    wet = ~np.isnan(pressure).any(axis=1)
+    dry = PolyCollection(scale * triangles[~wet], facecolor=_CONTACT, edgecolor="none")
+    left.add_collection(dry)
+    name, unit = usual_unit(list(section.pressures), "MPa")
+    first, second = sorted(one / unit for one in section.pressures)
+    if wet.any():
+        places, numbers = scale * triangles[wet].reshape(-1, 2), np.arange(3 * wet.sum())
+        net = Triangulation(*places.T, numbers.reshape(-1, 3))
+        values = pressure[wet].ravel() / unit
+        look = {"cmap": "Blues", "vmin": first, "vmax": second, "shading": "gouraud"}
+        image = left.tripcolor(net, values, rasterized=True, **look)
+        colour_bar(image, left, f"fluid pressure [{name}]")
+        levels = np.linspace(first, second, 9)[1:-1]
+        left.tricontour(net, values, levels, colors=INK, linewidths=0.5)
+    step = history.steps[-1]
+    left.set_title(f"fluid at load step {step.step}")
+    _draw_leak(right, history, ["face"])
     return figure
 
 
@@ -122,14 +160,14 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
     """Draw the leak over the mean pressure, with error bars; closed load steps at the bottom."""
     pressure = history.mean_pressure_MPa
     for way in ways:
-        rate = np.abs(getattr(history, f"leak_{way}mm3_per_s"))
-        error = np.nan_to_num(getattr(history, f"leak_error_{way}mm3_per_s"))
+        rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
+        error = np.nan_to_num(error)
         leaks = rate > 0.0
         look: dict[str, Any] = {"color": _COLOURS[way]}
         low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
         axes.errorbar(
             pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt="o-", ms=3.0, lw=1.2,
-            elinewidth=0.8, label=f"along {way[:1]}", **look,
+            elinewidth=0.8, label=f"along {way}", **look,
         )  # fmt: skip
         closed = ~leaks & ~np.isnan(rate)
         axes.plot(
@@ -143,11 +181,18 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         axes.legend()
 
 
+def _values(history: Any, way: str, part: str) -> Any:
+    """Return a part of the leaks along a way at all load steps; NaN where it is not known."""
+    leaks = [step.leak(way) for step in history]
+    values = [None if leak is None else getattr(leak, part) for leak in leaks]
+    return np.array(values, float)
+
+
 def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
     """Draw the flow factors over the mean pressure."""
     pressure = history.mean_pressure_MPa
     for way in ways:
-        factor = getattr(history, f"flow_factor_{way[0]}")
+        factor = _values(history, way, "flow_factor")
         leaks = factor > 0.0
         axes.plot(pressure[leaks], factor[leaks], "o-", ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from numpy.typing import NDArray
 
@@ -150,20 +151,23 @@ def draw_face(axes: Any, points: NDArray[np.float64]) -> None:
     x, y, pressure = points[:: -(-len(points) // 40_000)].T
     lengths = float(np.ptp(x)), float(np.ptp(y))
     scale = map_axes(axes, lengths)
-    axes.set(xlim=(scale * x.min(), scale * x.max()), ylim=(scale * y.min(), scale * y.max()))
-    inches = axes.bbox.width / axes.figure.dpi
-    size = (1.1 * 72.0 * inches) ** 2 / len(x)  # squares that cover a face as long as the axes
-    look: dict[str, Any] = {"marker": "s", "lw": 0, "rasterized": True, "clip_on": False}
+    half = scale * 0.55 * np.sqrt(lengths[0] * lengths[1] / len(x))  # they cover a rectangle
+    places = scale * np.column_stack([x, y])
+    low, high = places.min(axis=0) - half, places.max(axis=0) + half
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
+    corners = half * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    look: dict[str, Any] = {"lw": 0, "rasterized": True}
     loaded = pressure > 0.0
-    axes.scatter(scale * x[~loaded], scale * y[~loaded], size, color="0.92", **look)
+    squares = places[:, None] + corners
+    axes.add_collection(PolyCollection(squares[~loaded], facecolors="0.92", **look))
     if not loaded.any():
         say(axes, "no contact")
         return
-    place = scale * x[loaded], scale * y[loaded]
     name, unit = usual_unit([float(pressure.max())], "MPa")
-    dots = axes.scatter(*place, size, pressure[loaded] / unit, cmap=PRESSURES, **look)
-    dots.set_clim(0.0, float(pressure.max()) / unit or 1.0)
-    colour_bar(dots, axes, f"contact pressure [{name}]")
+    drawn = PolyCollection(squares[loaded], array=pressure[loaded] / unit, cmap=PRESSURES, **look)
+    drawn.set_clim(0.0, float(pressure.max()) / unit or 1.0)
+    axes.add_collection(drawn)
+    colour_bar(drawn, axes, f"contact pressure [{name}]")
 
 
 def place_colours(shares: Array) -> Array:

@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 11.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +33,8 @@ class EmbeddedLaws(LawSolver):
 
     Attributes:
         face: The patches on its contact face.
+        further_fields: Return functions on the mesh of the first body, at a load step just solved,
+            that are written with the other fields; collective.
     """
 
     on_mesh = True
@@ -41,6 +43,7 @@ class EmbeddedLaws(LawSolver):
         self, problem: LawContactProblem, table: LawTable, face: LoadedFace | FacePair
     ) -> None:
         super().__init__(table)
+        self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
         self._last: FaceContactState | None = None
         self._body_state = 0.0
@@ -100,7 +103,8 @@ class EmbeddedLaws(LawSolver):
         """Return this rank's displacements, and the pressures of patches or at its points."""
         of_patches = isinstance(self.table.patches, PatchGrid)
         shown = step.patches.pressure_MPa if of_patches else self.point_pressures
-        return (self.displacement, step.body_state), shown
+        further = [make(step) for make in self.further_fields]
+        return (self.displacement, step.body_state), shown, further
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
@@ -113,7 +117,7 @@ class EmbeddedLaws(LawSolver):
             return None if counter else shown
 
         moved = {number: state[0] for number, state in states.items()}
-        write_displaced(path, self.face, moved, pressures)
+        write_displaced(path, self.face, moved, pressures, lambda number: states[number][2])
 
     @property
     def meshed_bodies(self) -> list[Any]:

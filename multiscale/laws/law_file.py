@@ -20,6 +20,7 @@ from geometry import InputError, PatchGrid, Regions
 from multiscale.laws.law_table import LawTable, part_key
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
+from multiscale.laws.transmissivity import Transmissivity
 from multiscale.removed import refuse_removed_laws
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
 from support.packages import optional_packages
@@ -35,7 +36,9 @@ _SCALARS = {
     "warned_from": "warning_pressure",
     "repaired": "repaired",
 }
-_PATH = "path"
+_FLOW = "transmissivity"
+_FLOW_UNITS = {"hydraulic_gap": "mm", "on_half": "mm", "scatter": "mm^3"}
+_PATH, _SPRINGS = "path", "springs"
 _PATH_UNITS = {"approach": "mm", "tilt": "1", "force": "N", "moment": "N mm"}
 
 
@@ -57,8 +60,10 @@ def law_bytes(table: LawTable) -> bytes:
     """Return the content of a law file.
 
     It has a group ``patch_IX_IY`` per patch, or ``region_I`` per region, with a dataset per column,
-    and a group for the path of the plane where there is one. A checksum stands before the content;
-    see `support.checked_store`.
+    and a group for the path of the plane where there is one. In a law the group ``springs`` has the
+    springs of `PatchLaw.springs` where the tangential stiffness is known, and ``transmissivity``
+    what leaks over the mean separation where a leak was asked for. A checksum stands before the
+    content; see `support.checked_store`.
 
     Args:
         table: The laws.
@@ -86,12 +91,32 @@ def law_bytes(table: LawTable) -> bytes:
                 group.attrs[name] = getattr(law, attribute)
             if np.isfinite(law.sample_area):
                 group.attrs["sample_area_mm2"] = law.sample_area
+            if law.transmissivity is not None:
+                _write_transmissivity(group.create_group(_FLOW), law.transmissivity)
+            if np.isfinite(law.stiffness_ratio):
+                group.attrs["stiffness_ratio"] = law.stiffness_ratio
+                _write_springs(group, law)
         if table.path is not None:
             group = file.create_group(_PATH)
             for name, unit in _PATH_UNITS.items():
                 group.create_dataset(name, data=getattr(table.path, name)).attrs["unit"] = unit
 
     return hdf5_bytes(fill)
+
+
+def _write_springs(group: Any, law: PatchLaw) -> None:
+    """Write the springs of a law under friction, which follow from its rows, for other programs."""
+    if law.is_flat:
+        return
+    bed, springs = law.springs, group.create_group(_SPRINGS)
+    springs.attrs["error"] = bed.error
+    for name, (values, unit) in {
+        "first_touch": (bed.start, "mm"),
+        "last_touch": (bed.start + bed.width, "mm"),
+        "normal_stiffness": (bed.stiffness, "MPa/mm"),
+        "tangential_stiffness": (bed.stiffness / law.stiffness_ratio, "MPa/mm"),
+    }.items():
+        springs.create_dataset(name, data=values).attrs["unit"] = unit
 
 
 def read_laws(path: str | Path | BinaryIO) -> LawTable:
@@ -172,7 +197,24 @@ def _law(group: Any) -> PatchLaw:
     }
     scalars = {attribute: float(group.attrs[name]) for name, attribute in _SCALARS.items()}
     scalars["sample_area"] = float(group.attrs.get("sample_area_mm2", np.nan))
-    return PatchLaw(rows=LawRows(**found), **scalars)
+    scalars["stiffness_ratio"] = float(group.attrs.get("stiffness_ratio", np.nan))
+    flow = _transmissivity(group[_FLOW]) if _FLOW in group else None
+    return PatchLaw(rows=LawRows(**found), transmissivity=flow, **scalars)
+
+
+def _write_transmissivity(group: Any, flow: Transmissivity) -> None:
+    group.create_dataset("separation", data=flow.separation).attrs["unit"] = "mm"
+    for name, unit in _FLOW_UNITS.items():
+        for axis, values in zip("xy", getattr(flow, name).T, strict=True):
+            group.create_dataset(f"{name}_{axis}", data=values).attrs["unit"] = unit
+
+
+def _transmissivity(group: Any) -> Transmissivity:
+    columns = {
+        name: np.stack([_numbers(group[f"{name}_{axis}"]) for axis in "xy"], axis=1)
+        for name in _FLOW_UNITS
+    }
+    return Transmissivity(separation=_numbers(group["separation"]), **columns)
 
 
 def hdf5_bytes(fill: Callable[[Any], None]) -> bytes:

@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +15,8 @@ from geometry import InputError, PatchGrid, Regions
 from geometry.zero import FIRST_TOUCH
 from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import PlanePath
-from multiscale.readable import Caution, Detail, number, percent, quantity
+from multiscale.readable import Caution, Detail, column, number, percent, quantity
+from support.displayed import Displayed, Table, of_columns, spread
 
 Array = NDArray[np.float64]
 
@@ -26,8 +27,8 @@ _SCATTER_AT = 0.02, 0.1, 0.5  # of the largest pressure of a law; faces carry le
 _REPORTED_REPAIR = 1e-6  # smaller repairs are rounding and the tolerance of the micro model
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class LawTable:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class LawTable(Displayed):
     """The laws of all patches of an interface, or of all regions of a face.
 
     Attributes:
@@ -63,6 +64,32 @@ class LawTable:
     def together(self) -> PatchLaws:
         """Return the laws as one, which evaluates them together."""
         return PatchLaws(self.laws)
+
+    def with_stiffness_ratios(self, ratios: Sequence[float]) -> LawTable:
+        """Return the laws with Mindlin's ratios of the bodies, which friction takes.
+
+        Args:
+            ratios: One for every law, see `MaterialPair.stiffness_ratio`.
+        """
+        pairs = zip(self.laws, ratios, strict=True)
+        return replace(self, laws=tuple(replace(law, stiffness_ratio=r) for law, r in pairs))
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what the laws are in a line, and a table of the ranges of some of them."""
+        places = spread(len(self.laws), 60)
+        laws = [self.laws[place] for place in places]
+        table = of_columns(
+            [_part(self.patches), *(_part(self.patches, place) for place in places)],
+            ["rows", *(str(len(law.rows)) for law in laws)],
+            column("first touch", (law.first_touch for law in laws), "mm"),
+            column("to closure", (law.range[1] for law in laws), "mm"),
+            column("pressure there", (_last(law, "pressure") for law in laws), "MPa"),
+            column("area there", (_last(law, "contact_area_fraction") for law in laws), "%"),
+            column("error", (law.interpolation_error for law in laws), "%", 2),
+        )
+        made = ", ".join(filter(None, map(self.made_by.get, ("coupling", "model"))))
+        count = len(self.laws)
+        return f"LawTable of {count} law{'s' * (count > 1)} in {self.rows} rows: {made}", table
 
     @property
     def rows(self) -> int:
@@ -131,6 +158,18 @@ class LawTable:
             )
         if isinstance(self.patches, Regions):
             yield from filter(None, map(_scatter_note, self.patches.names, self.laws))
+
+
+def _last(law: PatchLaw, name: str) -> float:
+    """Return a column of a law at the end of its range, 0 of a patch that stays open."""
+    return float(getattr(law.rows, name)[law.rising_rows - 1]) if len(law.rows) else 0.0
+
+
+def _part(patches: PatchGrid | Regions, index: int | None = None) -> str:
+    """Return what a table calls a patch or region, without an index the heading of the column."""
+    if isinstance(patches, Regions):
+        return "region" if index is None else patches.names[index]
+    return "patch" if index is None else ", ".join(map(str, patches.unravel(index)))
 
 
 def part_key(patches: PatchGrid | Regions, index: int) -> str:

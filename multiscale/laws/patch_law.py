@@ -14,8 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from geometry import InputError
+from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
+from multiscale.laws.transmissivity import Transmissivity
+from multiscale.readable import column, span
+from support.displayed import Displayed, Table, of_columns, spread
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -24,8 +28,8 @@ _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PatchLaw:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class PatchLaw(Displayed):
     """Mean pressure, contact area and contacts of one patch: a contact law of `macro`.
 
     The closure c is the rigid approach at the patch minus the macroscopic displacement of its
@@ -52,6 +56,9 @@ class PatchLaw:
             its range of validity [MPa]; infinite when it never did.
         repaired: Largest change that made falling rows rise, see `LawRows.rising`.
         sample_area: Nominal area that contacts are counted on [mm²]; NaN where that is the patch.
+        stiffness_ratio: Mindlin's ratio of the normal to the tangential stiffness of the bodies,
+            which friction takes; NaN where it is not known.
+        transmissivity: What a fluid finds between the gaps; None where no leak was asked for.
 
     Raises:
         InputError: When the rows are no law.
@@ -65,6 +72,8 @@ class PatchLaw:
     warning_pressure: float = np.inf
     repaired: float = 0.0
     sample_area: float = float("nan")
+    stiffness_ratio: float = float("nan")
+    transmissivity: Transmissivity | None = None
 
     @classmethod
     def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
@@ -91,6 +100,23 @@ class PatchLaw:
             raise InputError("a patch law needs a pressure without tension")
         if len(self.rows) and self.rows.pressure[0] != 0.0:
             raise InputError("a patch law starts at zero pressure", value=self.rows.pressure[0])
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return the range of the law in a line, and a table of some of its rows."""
+        if self.is_open:
+            return "PatchLaw of a patch that stays open", ((), ())
+        rows = self.rows[np.array(spread(len(self.rows), 12))]
+        line = (
+            f"PatchLaw in {len(self.rows)} rows: pressure {span(self.rows.pressure, 'MPa')} at "
+            f"closures {span(self.rows.closure, 'mm')}"
+        )
+        return line, of_columns(
+            column("closure", rows.closure, "mm"),
+            column("pressure", rows.pressure, "MPa"),
+            column("stiffness", self.along(rows.approach).stiffness, "MPa/mm"),
+            column("area", rows.contact_area_fraction, "%"),
+            ["contacts", *map(str, rows.contacts)],
+        )
 
     @property
     def is_open(self) -> bool:
@@ -159,6 +185,11 @@ class PatchLaw:
         """Return the derivative of `pressure` over the closure [MPa/mm]."""
         return self.at(closure, extend=True).stiffness
 
+    @cached_property
+    def springs(self) -> SpringBed:
+        """The springs behind the law, which give its shear stresses under friction."""
+        return springs_of(self.pressure, self.stiffness, *self.range)
+
     def pressure_scatter(self, closure: ArrayLike) -> Array:
         """Return the standard deviation of the pressure among the samples of the law [MPa].
 
@@ -170,6 +201,22 @@ class PatchLaw:
             return np.zeros(closures.shape)
         rows = self.rows[: self.rising_rows]
         return np.interp(closures, rows.closure, rows.pressure_scatter, left=0.0)
+
+    def transmissivities(self, closure: ArrayLike) -> Array:
+        """Return the transmissivities along x and y at closures, shape (n, 2) [mm³].
+
+        Args:
+            closure: Closures, shape (n,) [mm]; beyond the rows the tangents continue.
+
+        Raises:
+            InputError: When the law knows none.
+        """
+        if self.transmissivity is None:
+            raise InputError(
+                "the law has no transmissivity",
+                allowed="a law made with leak = True, or in a scene with [leak]",
+            )
+        return self.transmissivity.at(self.at(closure, extend=True).separation)
 
     def shifted(self, distance: float) -> PatchLaw:
         """Return the law with approach and closure counted from a plane that is higher.
@@ -224,12 +271,13 @@ class PatchLaws:
         laws: The laws, in the order of the flat patch index.
 
     Attributes:
+        laws: The laws.
         first_touch: Closures at first touch, infinite where there is nothing to touch, (N,) [mm].
         end: Local approaches up to which the laws are valid, shape (N,) [mm].
     """
 
     def __init__(self, laws: Sequence[PatchLaw]) -> None:
-        self._laws = tuple(laws)
+        self.laws = tuple(laws)
         self._index = np.arange(len(laws))
         self._curves = LawCurves.packed([law.curves for law in laws])
         self.first_touch = np.array([law.first_touch for law in laws])
@@ -239,7 +287,7 @@ class PatchLaws:
         )
 
     def __len__(self) -> int:
-        return len(self._laws)
+        return len(self.laws)
 
     def along(self, approach: Array) -> LawPoint:
         """Return what the laws give at local approaches, shape (N,) [mm]."""
@@ -260,7 +308,7 @@ class PatchLaws:
             beyond = closure > _with_rounding(self._ends)[patch]
             if beyond.any():
                 of_one = patch == patch[beyond][0]
-                self._laws[patch[beyond][0]].check_range(closure[of_one])
+                self.laws[patch[beyond][0]].check_range(closure[of_one])
         return self._rising.at_closure(patch, closure)
 
     def pressures(self, patch: Indices, closure: Array) -> Array:
@@ -273,11 +321,11 @@ class PatchLaws:
 
     @cached_property
     def _ends(self) -> Array:
-        return np.array([law.range[1] for law in self._laws])
+        return np.array([law.range[1] for law in self.laws])
 
     @cached_property
     def _rising(self) -> LawCurves:
-        return LawCurves.packed([law.rising_curves for law in self._laws])
+        return LawCurves.packed([law.rising_curves for law in self.laws])
 
 
 def repaired_law(law: PatchLaw) -> PatchLaw:

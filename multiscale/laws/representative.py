@@ -6,6 +6,7 @@ Theory: docs/theory.md, section 10.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,7 @@ def representative_law(
     most_rows: int = MOST_ROWS,
     make_model: MakeModel | None = None,
     before: PatchLaw | None = None,
+    leak: bool = False,
     comm: Any = None,
     observe: Observer | None = None,
 ) -> PatchLaw:
@@ -56,6 +58,7 @@ def representative_law(
         make_model: Makes the model of a sample; by default the periodic half-space.
         before: A law of the same samples that ends too early: its rows are kept, and only what lies
             beyond them is solved.
+        leak: Whether it also tells the transmissivity of the gaps, for a leak.
         comm: MPI communicator, whose ranks share samples and rows. The law does not depend on
             their number.
         observe: Called as rows are solved.
@@ -96,7 +99,22 @@ def representative_law(
         comm=comm,
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
-    return face.law(Limit(*given), tolerance, most_rows, before)
+    law = face.law(Limit(*given), tolerance, most_rows, before)
+    return _with_leak(law, face, before) if leak else law
+
+
+def _with_leak(law: PatchLaw, face: PeriodicSamples, before: PatchLaw | None) -> PatchLaw:
+    """Return a law with the transmissivity of its samples; collective."""
+    if before is not None and before.transmissivity is not None:
+        return replace(law, transmissivity=before.transmissivity)
+    from multiscale.laws.flow_rows import sample_transmissivity  # other laws do without
+
+    flow = sample_transmissivity(
+        [sample.model for sample in face.samples],
+        lambda separation: law.pressure(law.initial_separation - separation),
+        face.comm,
+    )
+    return replace(law, transmissivity=flow)
 
 
 def representative_laws(

@@ -1,46 +1,62 @@
-"""Transmissivity of a rough face over its mean separation, from periodic samples.
-
-What a separation lets through along x and along y is found from the gaps of the samples under a
-plane there, on their cells and on half as many a side, whose difference is the error.
+"""Transmissivity of a rough face over its mean separation, as a law of it has it.
 
 Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from geometry import Control
-from micro import HalfSpaceModel
-from multiscale.gap_flows import flow_solver, solved_gap_flow
 from support.arrays import Array
-from support.collective import shared
+from support.errors import InputError
 
-_ROWS = 25
-"""Separations from first touch to 0; those after the first that is closed are left out."""
-_FEWEST_CELLS = 16
-"""Cells along a side below which half of them are not tried."""
+CAUSES = "grid", "rows", "samples"
+"""Causes of the error of a leak under laws."""
+_OF_ROWS = 3.0
+"""Error by the rows over the change where every second one is left out."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Transmissivity:
-    """Transmissivity along x and y over the mean separation, the mean of some samples.
+    """Transmissivity T along x and y over the mean separation.
 
-    Between rows the hydraulic gap T^(1/3) is interpolated monotonically. Beyond first touch it
-    grows as the separation.
+    Between rows the hydraulic gap T^(1/3) is interpolated monotonically (PCHIP). Beyond the last
+    row it grows as the separation, and below the first one it stays.
 
     Attributes:
         separation: Mean separations, rising, shape (m,) [mm].
         hydraulic_gap: T^(1/3) along x and y, 0 where closed, shape (m, 2) [mm].
+        on_half: The same with half as many cells a side, shape (m, 2) [mm].
+        scatter: Standard deviation of T among the samples of a law at the same mean pressure,
+            shape (m, 2) [mm³]; 0 of one.
+
+    Raises:
+        InputError: When the columns do not fit each other, or separations do not rise.
     """
 
     separation: Array
     hydraulic_gap: Array
+    on_half: Array
+    scatter: Array
+
+    def __post_init__(self) -> None:
+        count = len(self.separation)
+        for one in fields(self):
+            values, shape = getattr(self, one.name), (count, 2)[: 1 + (one.name != "separation")]
+            if not count or values.shape != shape or not np.isfinite(values).all():
+                raise InputError(
+                    f"a transmissivity needs a finite {one.name}",
+                    value=values.shape,
+                    allowed=f"{shape}",
+                )
+            if (values < 0.0).any():
+                raise InputError(f"a transmissivity needs a {one.name} ≥ 0")
+        if (np.diff(self.separation) <= 0.0).any():
+            raise InputError("a transmissivity needs separations that rise")
 
     def at(self, separation: Array) -> Array:
         """Return the transmissivities along x and y at mean separations, shape (n, 2) [mm³].
@@ -48,76 +64,34 @@ class Transmissivity:
         Args:
             separation: Mean separations, shape (n,) [mm].
         """
-        first, last = self.separation[[0, -1]]
-        within = np.clip(separation, first, last)
-        gap = PchipInterpolator(self.separation, self.hydraulic_gap)(within)
-        return np.asarray((gap + np.maximum(separation - last, 0.0)[:, None]) ** 3)
+        return self._interpolated(separation, self.separation, self.hydraulic_gap)
 
+    def varied(self, cause: str, separation: Array, samples: float = 0.0) -> Array:
+        """Return the transmissivities with one cause of error varied, shape (n, 2) [mm³].
 
-def transmissivities(
-    models: Sequence[HalfSpaceModel], comm: Any = None
-) -> tuple[Transmissivity, Transmissivity]:
-    """Tabulate the transmissivity of periodic samples, on their cells and on half as many a side.
+        Args:
+            cause: One of `CAUSES`: half of the cells; rows left out; what the mean of the samples
+                may be too low by.
+            separation: Mean separations, shape (n,) [mm].
+            samples: Error of the mean of samples over the standard deviation among them.
+        """
+        if cause == "grid":
+            return self._interpolated(separation, self.separation, self.on_half)
+        if cause == "samples":
+            scatter = [np.interp(separation, self.separation, one) for one in self.scatter.T]
+            return self.at(separation) + samples * np.stack(scatter, axis=1)
+        closed = int((self.hydraulic_gap.max(axis=1) == 0.0).sum())
+        kept = np.ones(len(self.separation), bool)
+        kept[closed:-1:2] = False  # beginning with the last open one, next to closing
+        fewer = self._interpolated(separation, self.separation[kept], self.hydraulic_gap[kept])
+        whole = self.at(separation)
+        return np.asarray(whole + _OF_ROWS * (fewer - whole))
 
-    Args:
-        models: The periodic models of the samples, which count by their areas.
-        comm: MPI communicator, whose ranks share the samples; None for this process alone.
-
-    Returns:
-        The transmissivity, and that on half the cells; the same on every rank.
-
-    Raises:
-        NotConverged: When a contact problem or a flow cannot be solved.
-
-    Note:
-        Collective.
-    """
-    flow_solver(max(model.surface.heights.size for model in models))  # PETSc starts on all ranks
-    largest = max(_separation(model, model.first_touch) for model in models)
-    separations = largest * np.linspace(1.0, 0.0, _ROWS) ** 2
-    grids = [grid for model in models for grid in (model.surface.grid, _half(model.surface.grid))]
-    own = [model for model in models for _ in (0, 1)]
-    rows = shared(comm, len(grids), lambda k: _rows(own[k], grids[k], separations))
-    weights = [model.surface.area for model in models]
-    fine, coarse = (np.average(rows[k::2], axis=0, weights=weights) for k in (0, 1))
-    return _table(separations, fine), _table(separations, coarse)
-
-
-def _table(separations: Array, found: Array) -> Transmissivity:
-    """Return the table of transmissivities at separations that fall, one closed row at most."""
-    is_open = found.max(axis=1) > 0.0
-    kept = slice(0, int(is_open.sum()) + 1)
-    return Transmissivity(
-        separation=separations[kept][::-1].copy(), hydraulic_gap=np.cbrt(found[kept][::-1])
-    )
-
-
-def _half(grid: tuple[int, int]) -> tuple[int, int]:
-    """Return half of the cells along both sides where that leaves enough."""
-    return grid if min(grid) < _FEWEST_CELLS else (grid[0] // 2, grid[1] // 2)
-
-
-def _separation(model: HalfSpaceModel, approach: float) -> float:
-    """Return the mean separation of a periodic sample at an approach [mm]."""
-    return model.reference_height - model.surface.mean_height - approach
-
-
-def _rows(model: HalfSpaceModel, grid: tuple[int, int], separations: Array) -> Array:
-    """Return T along x and y at separations that fall, shape (m, 2) [mm³]."""
-    if grid != model.surface.grid:
-        model = model.resampled(grid)
-    found, start = np.zeros((len(separations), 2)), None
-    for row, separation in enumerate(separations[:-1]):  # the last one is full contact
-        approach = _separation(model, 0.0) - float(separation)
-        if approach <= model.first_touch:
-            gap = separation + model.surface.mean_height - model.surface.heights
-            gap = np.maximum(gap, 0.0)
-        else:
-            state = model.press(Control(approach=approach), start=start)
-            start, gap = state.guess, state.open_gap
-        for axis, direction in enumerate("xy"):
-            flow = solved_gap_flow(gap, model.surface.lengths, direction, periodic=True)
-            found[row, axis] = flow.transmissivity
-        if not found[row].any():
-            break
-    return found
+    @staticmethod
+    def _interpolated(separation: Array, rows: Array, gaps: Array) -> Array:
+        first, last = rows[[0, -1]]
+        within, beyond = np.clip(separation, first, last), np.maximum(separation - last, 0.0)
+        if len(rows) == 1:
+            return np.asarray((gaps + beyond[:, None]) ** 3)
+        gap: Any = PchipInterpolator(rows, gaps)(within)
+        return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import Control, PatchGrid, Regions
+from multiscale.loading.leak import Leak
+from multiscale.readable import measured, number
 from support.arrays import Array
+from support.displayed import Displayed, Table
 
 _SAME = 1e-6
 """Relative change below which the forces, or approaches, of two load steps count as the same."""
@@ -34,8 +37,8 @@ class PatchState:
     stiffness_MPa_per_mm: Array | None = None
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class LoadStep:
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class LoadStep(Displayed):
     """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
 
     Attributes:
@@ -95,21 +98,7 @@ class LoadStep:
         tangential_stiffness_N_per_mm: Derivative of the shear force along the shift, in the
             direction of its last change [N/mm]; None where it was not found.
         dissipated_mJ: Energy lost to friction since the start [mJ].
-        leak_x_mm3_per_s: Flow rate from the side x = 0 to the opposite one; 0 where the gap is
-            closed, None where the scene asks for none [mm³/s].
-        leak_error_x_mm3_per_s: What it differs by on half as many cells a side; None where that was
-            not measured [mm³/s].
-        transmissivity_x_mm3: Transmissivity T = 12 η Q L/(W ΔP) of the gap along x [mm³].
-        constriction_x_fraction: Part of the flow through the channel of the narrowest constriction;
-            None where nothing flows.
-        leak_y_mm3_per_s: Flow rate along y [mm³/s].
-        leak_error_y_mm3_per_s: Its error [mm³/s].
-        transmissivity_y_mm3: Transmissivity along y [mm³].
-        constriction_y_fraction: Part of the flow along y through its narrowest constriction.
-        leak_mm3_per_s: Flow rate over a contact face from the inlet to the outlet; 0 where the gap
-            is closed, None where the scene asks for none [mm³/s].
-        leak_error_mm3_per_s: What it differs by with gaps of samples on half as many cells a side
-            [mm³/s].
+        leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
         stage: Number of the stage, from 1; None where the load history has none.
         body_state: Position among the states of the bodies' loads, see `geometry.Control`.
@@ -154,20 +143,25 @@ class LoadStep:
     slip_area_fraction: float | None = None
     tangential_stiffness_N_per_mm: float | None = None
     dissipated_mJ: float | None = None
-    leak_x_mm3_per_s: float | None = None
-    leak_error_x_mm3_per_s: float | None = None
-    transmissivity_x_mm3: float | None = None
-    constriction_x_fraction: float | None = None
-    leak_y_mm3_per_s: float | None = None
-    leak_error_y_mm3_per_s: float | None = None
-    transmissivity_y_mm3: float | None = None
-    constriction_y_fraction: float | None = None
-    leak_mm3_per_s: float | None = None
-    leak_error_mm3_per_s: float | None = None
+    leaks: tuple[Leak, ...] = ()
     zero_mm: float = 0.0
     stage: int | None = None
     body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return approach and force in a line, and a table of all numbers that are known."""
+        line = (
+            f"LoadStep {self.step}: {measured(self.approach_mm, self.approach_error_mm, 'mm')}, "
+            f"{measured(self.force_N, self.force_error_N, 'N')}"
+        )
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        rows = [
+            (name, number(value, 6) if isinstance(value, float) else str(value))
+            for name, value in values
+            if isinstance(value, float | int | str) and value != ""
+        ]
+        return line, (("", "value"), rows)
 
     @classmethod
     def of_patches(
@@ -268,41 +262,13 @@ class LoadStep:
         """Approach counted from first touch [mm]; None where `approach_mm` counts from there."""
         return self.approach_mm + self.zero_mm if self.zero_mm else None
 
-    @property
-    def hydraulic_gap_x_mm(self) -> float | None:
-        """Gap between parallel plates that lets as much through along x, T^(1/3) [mm]."""
-        return _hydraulic_gap(self.transmissivity_x_mm3)
+    def leak(self, way: str) -> Leak | None:
+        """Return what leaks along a way; None where that is not known.
 
-    @property
-    def hydraulic_gap_y_mm(self) -> float | None:
-        """Gap between parallel plates that lets as much through along y, T^(1/3) [mm]."""
-        return _hydraulic_gap(self.transmissivity_y_mm3)
-
-    @property
-    def flow_factor_x(self) -> float | None:
-        """Flow factor T/ḡ³ along x of the mean separation ḡ."""
-        return self._flow_factor(self.transmissivity_x_mm3)
-
-    @property
-    def flow_factor_y(self) -> float | None:
-        """Flow factor T/ḡ³ along y of the mean separation ḡ."""
-        return self._flow_factor(self.transmissivity_y_mm3)
-
-    @property
-    def percolates_x(self) -> int | None:
-        """1 where an open path leads through the gap along x, 0 where it is closed."""
-        return _percolates(self.transmissivity_x_mm3)
-
-    @property
-    def percolates_y(self) -> int | None:
-        """1 where an open path leads through the gap along y, 0 where it is closed."""
-        return _percolates(self.transmissivity_y_mm3)
-
-    def _flow_factor(self, transmissivity: float | None) -> float | None:
-        """Return the flow factor; None where it is not known or there is no gap."""
-        if transmissivity is None or not self.mean_separation_mm > 0.0:
-            return None
-        return transmissivity / self.mean_separation_mm**3
+        Args:
+            way: A key of `multiscale.loading.leak.WAYS`.
+        """
+        return next((one for one in self.leaks if one.way == way), None)
 
     @property
     def tilt_x(self) -> float:
@@ -323,11 +289,3 @@ class LoadStep:
     def moment_y_N_mm(self) -> float:
         """First moment of the forces along y [N mm]."""
         return self.moment_N_mm[1]
-
-
-def _hydraulic_gap(transmissivity: float | None) -> float | None:
-    return None if transmissivity is None else float(np.cbrt(transmissivity))
-
-
-def _percolates(transmissivity: float | None) -> int | None:
-    return None if transmissivity is None else int(transmissivity > 0.0)

@@ -1,7 +1,9 @@
 """The leak over the contact face of a body, between two of its edges, under laws of samples.
 
-At every point of the face the law of the samples tells the mean separation, and their gaps under a
-plane at that separation the transmissivity. The flow over the face is a problem of two dimensions.
+At every point of the face the law of the samples tells the mean separation and, from their gaps
+under a plane at that separation, the transmissivity. The flow over the face is a problem of two
+dimensions. It is solved again with each cause of its error varied: gaps on half as many cells, the
+transmissivity from half of its rows, and the mean of the samples as much too low as it may be.
 
 Theory: docs/theory.md, section 16.
 """
@@ -10,26 +12,37 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from micro.flow.triangle_flow import TriangleFace
-from multiscale.laws.transmissivity import Transmissivity, transmissivities
+from multiscale.law_errors import mean_error
+from multiscale.laws.transmissivity import CAUSES, Transmissivity
+from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.results.leak_notes import leak_notes
 from multiscale.scene.leak import LeakSection
 from support.arrays import Array
-from support.collective import on_root
 from support.errors import InputError
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro.contact.face_leak import LeakingFace
     from multiscale.couplings.representative import RepresentativeCoupling
-    from multiscale.inputs.bodies import SceneBody
 
-_ON_FACE = 1e-6
-"""Distance from the plane of the face, over its longer side, of nodes that lie on it."""
+
+class FluidMap(NamedTuple):
+    """The fluid on the triangles of a contact face.
+
+    Attributes:
+        triangles: Corners of the triangles in the frame of the face, shape (n, 3, 2) [mm].
+        pressure_MPa: Fluid pressures at the corners, NaN where no fluid comes, (n, 3) [MPa].
+        leaving_mm3_per_s: Part of the flow rate that leaves from each triangle, (n,) [mm³/s].
+    """
+
+    triangles: Array
+    pressure_MPa: Array
+    leaving_mm3_per_s: Array
 
 
 class FaceLeakObserver(StepObserver):
@@ -51,78 +64,97 @@ class FaceLeakObserver(StepObserver):
     def __init__(self, coupling: RepresentativeCoupling, section: LeakSection) -> None:
         super().__init__(coupling)
         self._section = section
-        self._tables: list[tuple[Transmissivity, Transmissivity]] = []
+        self._face: LeakingFace | None = None
+        self._known: tuple[int, Any] | None = None
         first = coupling.bodies.first
         assert first is not None, "scenes without a body on a mesh are refused"
+        tagged = first.body.mesh
         try:
-            edges = [_places(first, getattr(section, key), key) for key in ("inlet", "outlet")]
-            corners, self._facet = _triangles(first)
-            self._face = TriangleFace(corners, *edges)  # the same on all ranks
+            tags = [
+                tagged.facet_tag(getattr(section, key), key=f"leak.{key}")
+                for key in ("inlet", "outlet")
+            ]
         except InputError as error:
-            raise error.located(key="leak", file=coupling.scene.file) from None
+            raise error.located(file=coupling.scene.file) from None
+        self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
+        self._errors = [mean_error(region.surfaces) for region in coupling.samples]
+        self._causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
+        self._leaking()  # refuses edges that do not fit before anything is solved
+        coupling.further_fields.append(self.fluid_pressure)
+
+    def _leaking(self) -> LeakingFace:
+        """Return the contact face with its edges."""
+        from macro.contact.face_leak import LeakingFace
+
+        if self._face is None:
+            coupling = self._coupling
+            whole: Any = coupling.bodies.contact_face()
+            first = getattr(whole, "first", whole)
+            known = getattr(whole, "on_both", None)
+            mesh, points = first.space.mesh, first.quadrature
+            try:
+                self._face = LeakingFace(mesh, first.facets, points, self._edges, known)
+            except InputError as error:
+                raise error.located(key="leak", file=coupling.scene.file) from None
+        return self._face
 
     def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
-        """Return the load step with its leak and its error."""
+        """Return the load step with its leak and, where errors are measured, their error."""
         coupling, section = self._coupling, self._section
-        with coupling.clock.phase("leak"):
-            if not self._tables:
-                models = coupling.periodic_models
-                self._tables = [transmissivities(one, coupling.comm) for one in models]
-            found = [self._of_triangles(which) for which in (0, 1)]
-            fine, coarse = on_root(
-                coupling.comm, lambda: [self._face.flow(one).total for one in found]
-            )
         scale = section.drop / (12.0 * section.viscosity_MPa_s)
-        return replace(
-            step,
-            leak_mm3_per_s=scale * fine,
-            leak_error_mm3_per_s=abs(scale * (fine - coarse)),
+        with coupling.clock.phase("leak"):
+            flow = self._flow_at(step)
+            leak = Leak(way="face", rate=scale * flow.total)
+            if coupling.scene.output.check != "none":
+                others = {cause: self._flow(cause).total for cause in self._causes}
+                errors = {one: abs(scale * (x - flow.total)) for one, x in others.items()}
+                leak = leak.with_errors(errors)
+        return replace(step, leaks=(leak,))
+
+    def fluid_pressure(self, step: LoadStep) -> Any:
+        """Return the fluid pressure at a load step just solved, as a function on the mesh [MPa]."""
+        flow = self._flow_at(step)
+        return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
+
+    @property
+    def map(self) -> FluidMap | None:
+        """The fluid on the face at the load step solved last; None where there is none."""
+        if self._known is None:
+            return None
+        section, flow = self._section, self._known[1]
+        return FluidMap(
+            triangles=self._leaking().triangles,
+            pressure_MPa=section.pressures[1] + flow.pressure * section.drop,
+            leaving_mm3_per_s=flow.leaving * section.drop / (12.0 * section.viscosity_MPa_s),
         )
 
-    def _of_triangles(self, which: int) -> Array:
-        """Return the transmissivities of all triangles of the face, shape (n, 2) [mm³].
+    def _flow_at(self, step: LoadStep) -> Any:
+        """Return the flow at the load step solved last, solved once."""
+        if self._known is None or self._known[0] != step.step:
+            self._known = step.step, self._flow(None)
+        return self._known[1]
 
-        Args:
-            which: 0 for those on the cells of the samples, 1 for those on half as many a side.
-        """
+    def _flow(self, cause: str | None) -> Any:
+        """Return the flow over the face, with a cause of its error varied."""
         solver: Any = self._coupling.solver
-        face, separation = solver.face, solver.point_separations
-        points, facets = face.quadrature, face.facets
+        patch, separation = solver.face.sampling("pointwise").patch, solver.point_separations
         values = np.zeros((len(separation), 2))
-        for region, tables in enumerate(self._tables):
-            inside = points.patch == region
-            values[inside] = tables[which].at(separation[inside])
-        order = np.argsort(facets.cell)
-        facet = order[np.searchsorted(facets.cell, points.cell, sorter=order)]
-        count = len(facets.cell)
-        area = np.bincount(facet, points.weight, minlength=count)
-        sums = [np.bincount(facet, points.weight * one, minlength=count) for one in values.T]
-        own = np.stack(sums, axis=1) / area[:, None]
-        return np.concatenate(face.comm.allgather(own))[self._facet]
+        for region, (law, error) in enumerate(zip(solver.table.laws, self._errors, strict=True)):
+            inside = patch == region
+            values[inside] = _transmissivity(law.transmissivity, cause, separation[inside], error)
+        known = getattr(solver.face, "on_both", None)
+        if known is not None:
+            whole = np.zeros((len(known), 2))
+            whole[known], values = values, whole
+        return self._leaking().flow(values)
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the leak."""
         yield from leak_notes(steps)
 
 
-def _places(body: SceneBody, name: str | int, key: str) -> Array:
-    """Return where the nodes of a face of a body lie in the plane of the contact face, (n, 2) [mm].
-
-    Those beside the plane are left out.
-    """
-    from macro.mesh.facets import facet_nodes
-
-    tagged = body.body.mesh
-    tag = tagged.facet_tag(name, key=f"leak.{key}")
-    points = tagged.mesh.geometry.x[facet_nodes(tagged.mesh, tagged.facet_tags.find(tag)).corners]
-    points = np.concatenate(tagged.comm.allgather(points.reshape(-1, 3)))
-    on_face = np.abs(body.frame.height(points)) < _ON_FACE * max(body.facts.lengths)
-    return np.asarray(body.frame.in_plane(points[on_face]))
-
-
-def _triangles(body: SceneBody) -> tuple[Array, Any]:
-    """Return the triangles of the contact face of all ranks, (n, 3, 2) [mm], and their facets."""
-    from macro.mesh.contact_face import facet_triangles
-
-    own = body.facets[0].joined(body.facets[1:]).corners
-    return facet_triangles(np.concatenate(body.body.mesh.comm.allgather(own)))
+def _transmissivity(
+    law: Transmissivity, cause: str | None, separation: Array, error: float
+) -> Array:
+    """Return what a law lets through at separations, with a cause of error varied."""
+    return law.at(separation) if cause is None else law.varied(cause, separation, error)

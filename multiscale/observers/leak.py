@@ -16,11 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.gap_flows import flow_solver, solved_gap_flow
+from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.results.leak_notes import leak_notes
@@ -56,22 +56,27 @@ class LeakObserver(StepObserver):
         coupling = self._coupling
         with coupling.clock.phase("leak"):
             found = on_root_alone(coupling.comm, lambda: self._found(coupling.solver.gaps))
-            step = replace(step, **found)
+            step = replace(step, leaks=found)
             return self._with_errors(step) if self._measures() else step
 
-    def _found(self, gap: Array | None) -> dict[str, Any]:
-        """Return the columns of a load step with a map of gaps."""
+    def _found(self, gap: Array | None) -> tuple[Leak, ...]:
+        """Return the leaks through a map of gaps."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
-        section = self._section
-        columns: dict[str, Any] = {}
+        section, surface = self._section, self._coupling.surface
         periodic = self._coupling.scene.surface.periodic
-        for axis in section.directions:
-            flow = solved_gap_flow(gap, self._coupling.surface.lengths, axis, periodic=periodic)
-            columns[f"leak_{axis}_mm3_per_s"] = flow.rate(section.drop, section.viscosity_MPa_s)
-            columns[f"transmissivity_{axis}_mm3"] = flow.transmissivity
-            if flow.constriction is not None:
-                columns[f"constriction_{axis}_fraction"] = flow.constriction.share
-        return columns
+        leaks = []
+        for way in section.directions:
+            flow = solved_gap_flow(gap, surface.lengths, way, periodic=periodic)
+            leaks.append(
+                Leak(
+                    way=way,
+                    rate=flow.rate(section.drop, section.viscosity_MPa_s),
+                    transmissivity=flow.transmissivity,
+                    flow_factor=flow.flow_factor if flow.gap.any() else None,
+                    constriction=flow.constriction.share if flow.constriction else None,
+                )
+            )
+        return tuple(leaks)
 
     def _measures(self) -> bool:
         """Tell whether the error of a load step is measured; where it cannot be, note why."""
@@ -92,12 +97,13 @@ class LeakObserver(StepObserver):
         except NotConverged as error:
             self._notes[f"error of the leak at load step {step.step} not measured: {error}"] = None
             return step
-        names = {axis: f"leak_{axis}_mm3_per_s" for axis in self._section.directions}
-        errors: dict[str, Any] = {
-            f"leak_error_{axis}_mm3_per_s": abs(getattr(step, name) - found[name])
-            for axis, name in names.items()
-        }
-        return replace(step, **errors)
+        leaks = zip(step.leaks, found, strict=True)
+        return replace(
+            step,
+            leaks=tuple(
+                one.with_errors({"grid": abs(one.rate - half.rate)}) for one, half in leaks
+            ),
+        )
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the leak."""

@@ -11,12 +11,13 @@ import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
+from multiscale.loading.leak import WAYS
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.html_page import filled
-from multiscale.results.leak_notes import WAYS, known_leaks, leak_text
+from multiscale.results.leak_notes import leak_text
 from multiscale.run import Run
 
 PAPER = (
@@ -168,8 +169,8 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
     for way, where in WAYS.items():
-        if known_leaks([last], way):
-            yield f"leak {where}", leak_text(last, way), ""
+        if (leak := last.leak(way)) is not None:
+            yield f"leak {where}", leak_text(leak), ""
     for name, (text, unit) in _MORE.items():
         if value := getattr(last, name):
             yield text, quantity(value, unit), ""

@@ -281,7 +281,8 @@ class RunFigures:
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
         if run.scene.leak is not None:
             gaps = run.contacts[-1] if run.contacts else None
-            about = history, gaps, run.scene.leak, run.scene.surface.periodic
+            section, periodic = run.scene.leak, run.scene.surface.periodic
+            about = history, gaps, section, periodic, run.fluid
             figures["leak"] = "leak.leak_figure", about
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))

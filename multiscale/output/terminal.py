@@ -1,84 +1,26 @@
-"""Lines, tables and progress bars in the terminal; only rank 0 prints."""
+"""Lines and tables in the terminal; only rank 0 prints."""
 
 from __future__ import annotations
 
-import os
 import webbrowser
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from multiscale.console import console_of, is_quiet, speaks
 from multiscale.machine import cores_statement, peak_memory
-from multiscale.readable import Caution, Observer, duration, quantity
+from multiscale.readable import Caution, duration
 from support.errors import PatchlawError
 
 if TYPE_CHECKING:
     from multiscale.couplings.coupling import Coupling
-    from multiscale.loading.load_history import LoadHistory
-    from multiscale.loading.load_step import LoadStep
     from multiscale.results.history import History
 
 TABLE_WIDTH = 100
 """Characters of a line that tables take at least, in a log file too."""
-
-_QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
-
-
-@contextmanager
-def quietly(quiet: bool) -> Iterator[None]:
-    """Print nothing but errors and cautions, which go to the error stream.
-
-    Args:
-        quiet: Whether it is so; otherwise nothing changes.
-    """
-    token = _QUIET.set(quiet)
-    try:
-        yield
-    finally:
-        _QUIET.reset(token)
-
-
-def speaks(comm: Any) -> bool:
-    """Tell whether this process prints and writes files.
-
-    Args:
-        comm: MPI communicator, or None.
-    """
-    return comm is None or comm.rank == 0
-
-
-def colours() -> Literal["auto"] | None:
-    """Return which colours a console of rich has: none, nor bold letters, with ``NO_COLOR``."""
-    return None if os.environ.get("NO_COLOR") else "auto"
-
-
-def _console(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Console:
-    """Return a console that is silent on all ranks but the first.
-
-    Lines for tables are cut at the width of the terminal; all others stay whole, so that they can
-    be searched and copied.
-
-    Args:
-        comm: MPI communicator, or None.
-        least_width: Least width of tables; 0 for a console without tables.
-        stderr: Whether it prints to the error stream.
-    """
-    console = Console(
-        stderr=stderr,
-        soft_wrap=not least_width,
-        highlight=False,
-        quiet=not speaks(comm) or (_QUIET.get() and not stderr),
-        color_system=colours(),
-    )
-    if least_width:
-        console.width = max(console.width, least_width)
-    return console
 
 
 def complain(comm: Any, error: PatchlawError) -> None:
@@ -89,7 +31,7 @@ def complain(comm: Any, error: PatchlawError) -> None:
         error: The error.
     """
     line = escape(" ".join(str(error).splitlines()))
-    _console(comm, stderr=True).print(f"[bold red]patchlaw:[/] {line}")
+    console_of(comm, stderr=True).print(f"[bold red]patchlaw:[/] {line}")
 
 
 def say(comm: Any, text: str) -> None:
@@ -99,7 +41,7 @@ def say(comm: Any, text: str) -> None:
         comm: MPI communicator, or None.
         text: The line.
     """
-    _console(comm).print(escape(text))
+    console_of(comm).print(escape(text))
 
 
 def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
@@ -110,7 +52,7 @@ def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[s
         pairs: Topics and sentences.
         warnings: Sentences that a user should not miss.
     """
-    console = _console(comm, least_width=TABLE_WIDTH)
+    console = console_of(comm, least_width=TABLE_WIDTH)
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     for topic, sentence in pairs:
         table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
@@ -152,98 +94,7 @@ def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
     total = duration(sum(seconds.values()))
     phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
     text = f"took {total}: {phases}; memory {peak_memory() / 1e6:.0f} MB"
-    _console(comm, least_width=TABLE_WIDTH).print(text, markup=False)
-
-
-def counting(show: Callable[[str], None]) -> Observer:
-    """Return an observer of a run that shows what it is at, as a text.
-
-    Args:
-        show: Takes the text.
-    """
-    return lambda what, done, most: show(f"{what}: {done} of at most {most}" if most else what)
-
-
-def _tenths(comm: Any) -> Observer:
-    """Return an observer that prints a line when a tenth more of something is done."""
-    shown: dict[str, int] = {}
-
-    def observe(what: str, done: int, most: int) -> None:
-        tenth = 10 * done // most if most else 0
-        if most and tenth > shown.get(what, 0):
-            shown[what] = tenth
-            say(comm, f"{what}: {done} of at most {most}")
-
-    return observe
-
-
-class Pace:
-    """The pace of a task, which tells how long the rest of it will take.
-
-    Args:
-        parts: Its parts, such as load steps; 0 where their number is not known.
-    """
-
-    def __init__(self, parts: int) -> None:
-        self._parts, self._done, self._spent = parts, 0, 0.0
-
-    def left(self, spent: float) -> str:
-        """Count a part that is done, and say how long the rest will take, where that is known.
-
-        Args:
-            spent: Time that the part took [s].
-        """
-        self._done, self._spent = self._done + 1, self._spent + spent
-        rest = self._parts - self._done
-        return f"; about {duration(rest * self._spent / self._done)} left" if rest > 0 else ""
-
-
-@contextmanager
-def following(comm: Any) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
-    """Show which part of a long task is under way, and print a line on every part that is done.
-
-    Args:
-        comm: MPI communicator, or None.
-
-    Yields:
-        The functions to call with the part that begins, and with a line on the part that ended.
-    """
-    console = _console(comm)
-    if comm is not None:  # mpirun passes a terminal on that takes no moving lines
-        yield lambda text: None, lambda text: console.print(escape(text))
-        return
-    with console.status("") as status:
-        yield (
-            lambda text: status.update(escape(text)),
-            lambda text: console.print(escape(text)),
-        )
-
-
-@contextmanager
-def progress(
-    comm: Any, load_history: LoadHistory, done: int = 0
-) -> Iterator[tuple[Callable[[LoadStep], None], Observer]]:
-    """Show the progress of a run: what it is at, or under ``mpirun`` a line for each load step.
-
-    Args:
-        comm: MPI communicator, or None.
-        load_history: The load steps to come.
-        done: Number of load steps that were accepted before.
-
-    Yields:
-        The functions to call with every load step, and with what the run is at before and beside.
-    """
-    # Halved load steps make the total unknown.
-    steps = None if load_history.force_change else load_history.count
-    pace, total = Pace(0 if steps is None else steps - done), "" if steps is None else f"/{steps}"
-    with following(comm) as (begun, ended):
-        show = begun if comm is None else ended
-
-        def advance(step: LoadStep) -> None:
-            reached = f"{quantity(step.approach_mm, 'mm', 3)}, {quantity(step.force_N, 'N')}"
-            show(f"load step {step.step}{total}: {reached}{pace.left(step.wall_s)}")
-
-        yield advance, counting(begun) if comm is None else _tenths(comm)
+    console_of(comm, least_width=TABLE_WIDTH).print(text, markup=False)
 
 
 def show_history(comm: Any, history: History) -> None:
@@ -257,12 +108,12 @@ def show_history(comm: Any, history: History) -> None:
         return
     header, rows = history.table(most=60)
     # A reference has one more column.
-    console = _console(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
+    console = console_of(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
     console.print(_table([name.replace(" [", "\n[") for name in header], rows))
-    if _QUIET.get():
-        console = _console(comm, stderr=True)
+    if is_quiet():
+        console = console_of(comm, stderr=True)
     for note in history.notes:
-        if _QUIET.get() and not isinstance(note, Caution):
+        if is_quiet() and not isinstance(note, Caution):
             continue
         label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
         console.print(f"{label} {escape(note)}")
@@ -275,7 +126,7 @@ def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) 
         comm: MPI communicator, or None.
         table: Its headings and rows.
     """
-    _console(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
+    console_of(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
 
 
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0) -> Table:

@@ -18,6 +18,7 @@ from geometry.shear_state import ShearState
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
+from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
 from multiscale.results.contact_record import ContactRecord
@@ -169,7 +170,7 @@ def read_steps(path: Path, mark: Mark) -> tuple[LoadStep, ...]:
         return ()
     steps = []
     with suppress(InputError):
-        for step, here in unsealed(path.read_bytes()[: mark.size], (LoadStep, PatchState)):
+        for step, here in unsealed(path.read_bytes()[: mark.size], (LoadStep, PatchState, Leak)):
             steps.append(step)
             if here == mark:
                 return tuple(steps)

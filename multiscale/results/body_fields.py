@@ -11,8 +11,10 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from multiscale.readable import number
 from multiscale.results.data_frames import dataset
 from support.arrays import Array
+from support.displayed import Displayed, Table
 from support.errors import InputError
 from support.packages import optional_packages
 
@@ -25,8 +27,8 @@ _NAMES = {
 """Attributes of `BodyFields` by the names that the files have."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class BodyFields:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class BodyFields(Displayed):
     """Fields of a body on n vertices and m cells at some load steps, which are the first axis.
 
     Attributes:
@@ -50,6 +52,21 @@ class BodyFields:
     stress_MPa: Array
     von_mises_MPa: Array
     pressure_MPa: Array | None = None
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what this is in a line, and a table of the fields with their ranges."""
+        steps = ", ".join(map(str, self.step))
+        line = (
+            f"BodyFields of load step{'s' * (len(self.step) > 1)} {steps}: "
+            f"{len(self.points_mm)} vertices, {len(self.cells)} cells ({self.cell_type})"
+        )
+        fields = {name: getattr(self, name) for name in ("points_mm", *_NAMES.values())}
+        rows = [
+            (name, " × ".join(map(str, one.shape)), number(one.min()), number(one.max()))
+            for name, one in fields.items()
+            if one is not None
+        ]
+        return line, (("field", "shape", "least", "largest"), rows)
 
     def to_xarray(self) -> Any:
         """Return the fields as an xarray dataset; dimensions are step, point, cell, axis, other.

@@ -13,20 +13,24 @@ from numpy.typing import NDArray
 
 from multiscale.figures import by_matplotlib
 from multiscale.figures.contact_scales import ContactScales
+from multiscale.readable import column
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
 from multiscale.results.data_frames import data_frame, dataset
 from multiscale.results.reading import csv_rows, read_history, result_of_a_run
 from support.arrays import Array
 from support.checked_store import check_hdf5
+from support.displayed import Displayed, Table, of_columns, spread
 from support.errors import InputError
 from support.packages import optional_packages
 
 _MAPS = FIELDS[2:]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ContactHistory(Sequence[ContactRecord]):
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ContactHistory(Displayed, Sequence[ContactRecord]):
     """The contacts of n load steps, one record each; arrays have the load steps as first axis.
+
+    An index gives a record, a slice the contacts of these load steps alone.
 
     Attributes:
         records: The contacts, by load step.
@@ -41,7 +45,8 @@ class ContactHistory(Sequence[ContactRecord]):
         return iter(self.records)
 
     def __getitem__(self, index: Any) -> Any:
-        return self.records[index]
+        found = self.records[index]
+        return ContactHistory(records=found) if isinstance(index, slice) else found
 
     def at(self, step: int) -> ContactRecord:
         """Return the contact of a load step.
@@ -169,6 +174,21 @@ class ContactHistory(Sequence[ContactRecord]):
             dimensions = ("step", *dict.fromkeys(axes))
             values |= {name: (dimensions, getattr(self, name)) for name in maps}
         return dataset(values, coordinates, {"units": "mm, N, MPa"})
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what this is in a line, and a table of the load steps."""
+        shown = [self.records[place] for place in spread(len(self), 60)]
+        peaks = [float(one.peak_pressure_MPa.max(initial=0.0)) for one in shown]
+        table = of_columns(
+            ["step", *(str(one.step) for one in shown)],
+            column("approach", (one.approach_mm for one in shown), "mm"),
+            column("force", (one.force_N for one in shown), "N"),
+            ["spots", *(str(len(one.spots)) for one in shown)],
+            column("peak pressure", peaks, "MPa"),
+        )
+        maps = [name for name in _MAPS if self.has(name)]
+        of = f"; maps: {', '.join(maps)}" if maps else ""
+        return f"ContactHistory of {len(self)} load step{'s' * (len(self) != 1)}{of}", table
 
     def plot(self, step: int) -> Any:
         """Draw the contact of a load step; all load steps have the same colour scales.

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from geometry.contact_state import ContactState
 from multiscale.figures import by_matplotlib
 from multiscale.loading.load_step import LoadStep
+from multiscale.readable import column, measured, number
+from support.displayed import Displayed, Table, of_columns
 
 Array = NDArray[np.float64]
 
@@ -26,8 +28,8 @@ FIELDS = (
 with friction."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ContactRecord:
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)
+class ContactRecord(Displayed):
     """The contact of all m spots at one load step, the largest force first.
 
     Attributes:
@@ -134,8 +136,26 @@ class ContactRecord:
 
     def rows(self) -> Iterator[tuple]:
         """Yield the rows of ``contacts.csv``."""
-        for number, spot in enumerate(self.spots.tolist(), 1):
-            yield (self.step, number, *spot)
+        for place, spot in enumerate(self.spots.tolist(), 1):
+            yield (self.step, place, *spot)
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what this is in a line, and a table of the spots that carry most."""
+        count, most = len(self.spots), self.spots[:20]
+        line = (
+            f"ContactRecord of load step {self.step}: {count} spot{'s' * (count != 1)} at "
+            f"{measured(self.approach_mm, None, 'mm')}, {measured(self.force_N, None, 'N')}"
+            f"{f'; the {len(most)} that carry most' if len(most) < count else ''}"
+        )
+        x, y, area, force, peak = most.T
+        return line, of_columns(
+            ["spot", *map(str, range(1, len(most) + 1))],
+            ["x [mm]", *(number(one, 4) for one in x)],
+            ["y [mm]", *(number(one, 4) for one in y)],
+            column("area", area, "mm²"),
+            column("force", force, "N"),
+            column("peak pressure", peak, "MPa"),
+        )
 
     def plot(self) -> Any:
         """Draw pressures, gaps, plastic depths and the sizes of the spots.

@@ -48,6 +48,14 @@ class Estimate:
     error: Array
     rate: Array
 
+    def at(self, steps: slice) -> Estimate:
+        """Return the values at some load steps alone.
+
+        Args:
+            steps: Their places.
+        """
+        return Estimate(value=self.value[steps], error=self.error[steps], rate=self.rate[steps])
+
 
 def extrapolated(values: ArrayLike, sizes: ArrayLike, order: float | None = None) -> Estimate:
     """Extrapolate results of meshes of falling size (Richardson).

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, overload
+from dataclasses import dataclass, field, replace
+from typing import Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +13,15 @@ from geometry.patches import PatchGrid, Regions
 from multiscale.figures import by_matplotlib
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import SCALED_UNITS, Caution, usual_unit, with_error
+from multiscale.readable import Caution, span
+from multiscale.results.column import Column
 from multiscale.results.contact_record import ContactRecord
-from multiscale.results.data_frames import data_frame
-from multiscale.results.html_page import Table, table_html
+from multiscale.results.data_frames import data_frame, dataset
+from multiscale.results.leak_columns import leak_columns
 from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
+from support.displayed import Displayed, Table
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -28,90 +31,14 @@ PATCH_STIFFNESS = "stiffness_MPa_per_mm"
 """Column of the derivative dp/dc of a patch's law."""
 
 
-@dataclass(eq=False)
-class Column:
-    """A column of ``history.csv``, declared as an attribute of `History`.
-
-    Of a history it is the array of the values at all load steps; what was not measured is NaN.
-
-    Args:
-        meaning: What the column holds; with the unit it is the column's documentation.
-        unit: Unit of the values; empty for plain numbers.
-        heading: Heading in the tables of reports, terminals and notebooks; empty for a column
-            that stands in the file alone.
-        digits: Significant digits in those tables.
-        error: Name of the load step's attribute that holds the error of the value; shown beside
-            it. Empty for none.
-        table: The table that the column stands in: ``"curve"``, ``"more"`` for what some runs
-            alone know, ``"solver"``.
-
-    Attributes:
-        name: Name of the column and of the attribute of `History`.
-    """
-
-    meaning: str
-    unit: str = ""
-    _: KW_ONLY
-    heading: str = ""
-    digits: int = 4
-    error: str = ""
-    table: str = "curve"
-    name: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.__doc__ = f"{self.meaning} [{self.unit}]." if self.unit else f"{self.meaning}."
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
-
-    @overload
-    def __get__(self, history: None, owner: type) -> Column: ...
-
-    @overload
-    def __get__(self, history: History, owner: type) -> NDArray[Any]: ...
-
-    def __get__(self, history: History | None, owner: type) -> Column | NDArray[Any]:
-        if history is None:
-            return self
-        values = [self.of(step) for step in history.steps]
-        return np.array([np.nan if value is None else value for value in values])
-
-    def of(self, step: LoadStep) -> Any:
-        """Return the value of a load step, its attribute of this name; None if not measured."""
-        return getattr(step, self.name)
-
-    def shown(self, steps: Sequence[LoadStep]) -> tuple[str, list[str]]:
-        """Return the heading with the unit that suits all load steps, and the value of each.
-
-        Shares are shown in per cent, and values with their errors.
-
-        Args:
-            steps: The load steps.
-        """
-        values = [self.of(step) for step in steps]
-        errors = [getattr(step, self.error, None) or 0.0 for step in steps]
-        known = [value for value in values if value is not None]
-        name, size = self.unit, 1.0
-        if self.name.endswith("_fraction"):
-            name, size = "%", 0.01
-        elif self.unit in SCALED_UNITS:
-            name, size = usual_unit(known, self.unit)
-        texts = [
-            "–"
-            if value is None
-            else with_error(value / size, error / size, self.digits)
-            if isinstance(value, float)
-            else str(value)
-            for value, error in zip(values, errors, strict=True)
-        ]
-        return f"{self.heading} [{name}]" if name else self.heading, texts
-
-
-@dataclass(frozen=True, kw_only=True)
-class History:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class History(Displayed):
     """All load steps of a run; every column of ``history.csv`` is an attribute, as an array.
 
-    A new column is one more `Column` in this class, behind those that are there.
+    ``history[-1]`` is a `LoadStep`, ``history[2:5]`` the history of these load steps alone.
+    Printed, or in a notebook, a history is a table. A new column is one more `Column` in this
+    class, behind those that are there. Those of the leak are
+    `multiscale.results.leak_columns.leak_columns`.
 
     Attributes:
         steps: The load steps.
@@ -121,6 +48,7 @@ class History:
         accuracy: Whether the accuracy that was asked for is kept; None where none was.
         reference: Results of all meshes of a reference; None with other couplings.
         contact_records: The contacts of those load steps that the scene asks for.
+        before: Of a part of a history the load step before the first of the part, if there is one.
     """
 
     step = Column("Number of the load step, from 1", heading="step")
@@ -215,49 +143,6 @@ class History:
     dissipated_mJ = Column(
         "Energy lost to friction", "mJ", heading="lost to friction", table="more"
     )
-    leak_x_mm3_per_s = Column(
-        "Flow rate of the leak along x, 0 where the gap is closed", "mm³/s",
-        heading="leak along x", table="more", error="leak_error_x_mm3_per_s",
-    )  # fmt: skip
-    leak_error_x_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
-    transmissivity_x_mm3 = Column("Transmissivity T of the gap along x", "mm³")
-    hydraulic_gap_x_mm = Column(
-        "Hydraulic gap along x, T^(1/3)", "mm", heading="hydraulic gap along x", table="more"
-    )
-    flow_factor_x = Column(
-        "Flow factor along x, T over the cube of the mean separation",
-        heading="flow factor along x", table="more",
-    )  # fmt: skip
-    constriction_x_fraction = Column(
-        "Part of the leak along x through the channel of the narrowest constriction",
-        heading="narrowest channel along x", table="more",
-    )  # fmt: skip
-    percolates_x = Column("1 where an open path leads along x, 0 where the gap is closed")
-    leak_y_mm3_per_s = Column(
-        "Flow rate of the leak along y, 0 where the gap is closed", "mm³/s",
-        heading="leak along y", table="more", error="leak_error_y_mm3_per_s",
-    )  # fmt: skip
-    leak_error_y_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
-    transmissivity_y_mm3 = Column("Transmissivity T of the gap along y", "mm³")
-    hydraulic_gap_y_mm = Column(
-        "Hydraulic gap along y, T^(1/3)", "mm", heading="hydraulic gap along y", table="more"
-    )
-    flow_factor_y = Column(
-        "Flow factor along y, T over the cube of the mean separation",
-        heading="flow factor along y", table="more",
-    )  # fmt: skip
-    constriction_y_fraction = Column(
-        "Part of the leak along y through the channel of the narrowest constriction",
-        heading="narrowest channel along y", table="more",
-    )  # fmt: skip
-    percolates_y = Column("1 where an open path leads along y, 0 where the gap is closed")
-
-    leak_mm3_per_s = Column(
-        "Flow rate of the leak over the contact face, 0 where the gap is closed", "mm³/s",
-        heading="leak", table="more", error="leak_error_mm3_per_s",
-    )  # fmt: skip
-    leak_error_mm3_per_s = Column("What it differs by on half as many cells a side", "mm³/s")
-
     stage = Column(
         "Number of the stage, where the load history has stages", heading="stage", table="more"
     )
@@ -269,12 +154,35 @@ class History:
     accuracy: AccuracyVerdict | None = None
     reference: ReferenceRecord | None = None
     contact_records: tuple[ContactRecord, ...] = ()
+    before: LoadStep | None = None
 
     def __len__(self) -> int:
         return len(self.steps)
 
     def __iter__(self) -> Iterator[LoadStep]:
         return iter(self.steps)
+
+    @overload
+    def __getitem__(self, index: SupportsIndex) -> LoadStep: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> History: ...
+
+    def __getitem__(self, index: SupportsIndex | slice) -> LoadStep | History:
+        if not isinstance(index, slice):
+            return self.steps[index]
+        places = range(len(self.steps))[index]
+        if places.step < 0:
+            raise InputError("a history goes forward", value=index, allowed="a step of 1 or more")
+        steps = self.steps[index]
+        numbers = {step.step for step in steps}
+        return replace(
+            self,
+            steps=steps,
+            contact_records=tuple(one for one in self.contact_records if one.step in numbers),
+            reference=None if self.reference is None else self.reference.at(index),
+            before=self.steps[places.start - 1] if places.start else self.before,
+        )
 
     @property
     def patch_pressure_MPa(self) -> Array:
@@ -289,7 +197,7 @@ class History:
     @property
     def unloading(self) -> NDArray[np.bool_]:
         """Whether the load fell to each load step, shape (steps,)."""
-        before = (None, *self.steps)
+        before = (self.before, *self.steps)
         return np.array(
             [step.is_unloading(last) for step, last in zip(self.steps, before, strict=False)], bool
         )
@@ -340,6 +248,39 @@ class History:
             ImportError: When pandas, which patchlaw does not require, is not installed.
         """
         return data_frame(self.records())
+
+    def to_xarray(self) -> Any:
+        """Return all columns and the state of the patches as an xarray dataset.
+
+        Columns that no load step knows are left out. Of patches the dimensions are ``step``, ``ix``
+        and ``iy``, of regions ``step`` and ``region``.
+
+        Raises:
+            ImportError: When xarray, which patchlaw does not require, is not installed.
+        """
+        known = [one for one in COLUMNS if any(one.of(step) is not None for step in self.steps)]
+        values: dict[str, Any] = {
+            one.name: (("step",), getattr(self, one.name), _attributes(one)) for one in known
+        }
+        places: dict[str, Any] = {"step": values.pop("step", (("step",), self.step))}
+        if isinstance(self.patches, PatchGrid):
+            axes = dict(zip(("ix", "iy"), self.patches.grid, strict=True))
+        else:
+            axes, places["region"] = {"region": self.patches.count}, list(self.patches.names)
+        for name in self._patch_values:
+            column = np.array([getattr(step.patches, name) for step in self.steps])
+            shaped = column.reshape(len(self.steps), *axes.values())
+            values[f"patch_{name}"] = (("step", *axes), shaped)
+        return dataset(values, places, {"units": "mm, N, MPa"})
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what the history is in a line, and the curve with the solver's work as a table."""
+        if not self.steps:
+            return "History without a load step", ((), ())
+        count = len(self.steps)
+        ranges = span(self.approach_mm, "mm"), span(self.force_N, "N")
+        line = f"History of {count} load step{'s' * (count > 1)}: {', '.join(ranges)}"
+        return line, self.table(most=60)
 
     def table(self, *names: str, most: int = 1000) -> Table:
         """Return headings and rows of the tables that reports and terminals show.
@@ -392,13 +333,17 @@ class History:
         """
         return by_matplotlib("figures.curves.history_figure", self, label)
 
-    def _repr_html_(self) -> str:
-        """Return the table as HTML, which notebooks show for a history."""
-        return table_html(self.table())
 
+for _column in leak_columns():
+    setattr(History, _column.name, _column)
 
 COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
 """The columns of ``history.csv``, in their order."""
+
+
+def _attributes(column: Column) -> dict[str, str]:
+    """Return the attributes of a column in a dataset, which its axes are labelled with."""
+    return {"long_name": column.meaning} | ({"units": column.unit} if column.unit else {})
 
 
 def range_notes(steps: Sequence[LoadStep], table: LawTable | None) -> Iterator[str]:

@@ -1,20 +1,17 @@
-"""Fills templates of HTML pages and tables; a page needs no network and no other file."""
+"""Fills templates of HTML pages; a page needs no network and no other file."""
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
 from multiscale.readable import duration
+from support.displayed import table_html
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-Table: TypeAlias = tuple[Sequence[str], Sequence[Sequence[str]]]
-"""Headings of the columns, and the rows with a text for each column."""
 
 
 def filled(template: str, **content: Any) -> str:
@@ -27,19 +24,11 @@ def filled(template: str, **content: Any) -> str:
     return _templates().get_template(template).render(**content) + "\n"
 
 
-def table_html(table: Table) -> str:
-    """Return a table as an HTML element.
-
-    Args:
-        table: Its headings and rows.
-    """
-    return str(_templates().get_template("results/table.jinja").module.table(table))  # type: ignore[attr-defined]
-
-
 @cache
 def _templates() -> Environment:
     """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
 
     templates = Environment(
         loader=FileSystemLoader(Path(__file__).parents[1]),
@@ -50,4 +39,5 @@ def _templates() -> Environment:
     )
     templates.filters["base64"] = lambda content: b64encode(content).decode()
     templates.filters["duration"] = duration
+    templates.globals["table"] = lambda *content: Markup(table_html(*content))
     return templates

@@ -4,37 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from multiscale.loading.leak import WAYS, Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, measured, number, percent, quantity
 
 _UNCERTAIN = 0.3
 """Error over the leak from which on a report warns."""
 
-WAYS = {"x_": "along x", "y_": "along y", "": "over the contact face"}
-"""Where a fluid may flow, by what stands for it in names of columns."""
+_REMEDIES = {
+    "grid": "on half as many cells a side it differs by {}, as channels are few cells wide (finer "
+    "surface.grid)",
+    "rows": "between the rows of its table it may differ by {}",
+    "samples": "between samples it differs by {} (more law.seeds, or larger samples)",
+}
+"""What is said of a leak that is not certain, by the cause of most of its error."""
 
 
-def known_leaks(steps: Sequence[LoadStep], way: str) -> list[LoadStep]:
-    """Return the load steps whose leak is known.
-
-    Args:
-        steps: The load steps.
-        way: A key of `WAYS`.
-    """
-    return [step for step in steps if _leak(step, way) is not None]
-
-
-def leak_text(step: LoadStep, way: str) -> str:
-    """Return the leak at a load step with its error, or that the gap is closed.
+def leak_text(leak: Leak) -> str:
+    """Return a leak with its error, or that the gap is closed.
 
     Args:
-        step: The load step.
-        way: A key of `WAYS`.
+        leak: The leak.
     """
-    rate, error = _leak(step, way), _error(step, way)
-    if not rate:
-        return "closed, nothing leaks" + (f" (or {quantity(error, 'mm³/s', 2)})" if error else "")
-    return measured(rate, error, "mm³/s")
+    if not leak.rate:
+        closed = "closed, nothing leaks"
+        return f"{closed} (or {quantity(leak.error, 'mm³/s', 2)})" if leak.error else closed
+    return measured(leak.rate, leak.error, "mm³/s")
 
 
 def leak_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
@@ -44,44 +39,35 @@ def leak_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
         steps: The load steps.
     """
     for way, name in WAYS.items():
-        known = known_leaks(steps, way)
+        known = [(step.step, leak) for step in steps if (leak := step.leak(way)) is not None]
         if not known:
             continue
-        step = known[-1]
-        yield f"leak {name} at load step {step.step}: {_whole_text(step, way)}"
-        closed = [one.step for one in known if not _leak(one, way)]
+        number_of_last, last = known[-1]
+        yield f"leak {name} at load step {number_of_last}: {_whole_text(last)}"
+        closed = [step for step, leak in known if not leak.rate]
         if closed and len(closed) < len(known):
             yield (
                 f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first at "
                 f"load step {closed[0]}"
             )
-        rate, error = _leak(step, way) or 0.0, _error(step, way)
-        if error is not None and error > _UNCERTAIN * abs(rate):
-            yield Caution(
-                f"the leak {name} depends on the grid: on half as many cells a side it differs by "
-                f"{quantity(error, 'mm³/s', 2)}, as channels are few cells wide (finer "
-                "surface.grid)"
-            )
+        if last.causes and last.error is not None and last.error > _UNCERTAIN * abs(last.rate):
+            cause, error = max(last.causes, key=lambda one: one[1])
+            text = _REMEDIES[cause].format(quantity(error, "mm³/s", 2))
+            yield Caution(f"the leak {name} is uncertain: {text}")
 
 
-def _whole_text(step: LoadStep, way: str) -> str:
-    text = leak_text(step, way)
-    if not _leak(step, way):
+def _whole_text(leak: Leak) -> str:
+    text = leak_text(leak)
+    if not leak.rate:
         return f"{text}: the surfaces touch everywhere along a line across the flow"
-    if not way:
-        return text
-    gap = quantity(getattr(step, f"hydraulic_gap_{way}mm"), "mm", 3)
-    factor = number(getattr(step, f"flow_factor_{way[0]}"), 3)
-    text += f"; hydraulic gap {gap}, flow factor {factor}"
-    share = getattr(step, f"constriction_{way}fraction")
-    if share is not None:
-        text += f", {percent(share)} of it through the channel of the narrowest constriction"
+    if len(leak.causes) > 1:
+        causes = (f"{cause} {quantity(error, 'mm³/s', 2)}" for cause, error in leak.causes)
+        text += f" ({', '.join(causes)})"
+    if leak.hydraulic_gap is not None:
+        text += f"; hydraulic gap {quantity(leak.hydraulic_gap, 'mm', 3)}"
+    if leak.flow_factor is not None:
+        text += f", flow factor {number(leak.flow_factor, 3)}"
+    if leak.constriction is not None:
+        text += f", {percent(leak.constriction)} of it through the channel of the narrowest "
+        text += "constriction"
     return text
-
-
-def _leak(step: LoadStep, way: str) -> float | None:
-    return getattr(step, f"leak_{way}mm3_per_s")
-
-
-def _error(step: LoadStep, way: str) -> float | None:
-    return getattr(step, f"leak_error_{way}mm3_per_s")

@@ -16,6 +16,7 @@ from geometry.patches import PatchGrid, Regions
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
+from multiscale.results.leak_columns import leaks_of
 from support.errors import InputError
 
 _TEXT = "reason"
@@ -100,6 +101,7 @@ def _load_step(row: dict[str, str], patches: PatchState) -> LoadStep:
     values["moment_N_mm"] = (values["moment_x_N_mm"], values["moment_y_N_mm"])
     if values.get("first_touch_approach_mm") is not None:
         values["zero_mm"] = values["first_touch_approach_mm"] - values["approach_mm"]
+    values["leaks"] = leaks_of(values)
     known = {item.name for item in fields(LoadStep)}
     return LoadStep(patches=patches, **{key: values[key] for key in values.keys() & known})
 

@@ -145,6 +145,19 @@ class ReferenceRecord:
         limit = replace(self.approach, value=self.approach.value - zero)
         return replace(self, approach_mm=self.approach_mm - zero, approach=limit)
 
+    def at(self, steps: slice) -> ReferenceRecord:
+        """Return the record of some load steps alone.
+
+        Args:
+            steps: Their places.
+        """
+        arrays = {
+            name: getattr(self, name)[:, steps]
+            for name in ("approach_mm", "force_N", "contact_area_fraction")
+        }
+        limits = {name: getattr(self, name).at(steps) for name in ("approach", "force", "area")}
+        return replace(self, **arrays, **limits)
+
     def columns(self, steps: Sequence[LoadStep]) -> dict[str, Sequence[float] | Array]:
         """Return the columns of ``reference.csv``: the limits, then the values on every mesh.
 

@@ -33,8 +33,8 @@ Problem = tuple[str, str, str]
 """A key, why its value makes no sense beside those of others, and what is allowed."""
 
 
-_WITHOUT_CELLS = {"isolated", "consistent", "reference", "auto"}
-"""Couplings that know no gaps of the surface's cells."""
+_WITHOUT_GAPS = {"isolated", "reference", "auto"}
+"""Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,7 +232,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         ("counter_surface", scene.counter_surface, {"reference"}, rigid),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
-        ("leak", scene.leak, _WITHOUT_CELLS, mapped),
+        ("leak", scene.leak, _WITHOUT_GAPS, mapped),
     ):
         if value is not None and scene.kind in kinds:
             others = (repr(one) for one in ("concurrent", "consistent", "isolated", "analytic"))
@@ -259,7 +259,7 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
 
 def _leak(scene: SceneSections) -> Iterator[Problem]:
     """Yield what does not fit of the flow over a face, between its edges."""
-    leak, second = scene.leak, scene.counter_body
+    leak = scene.leak
     if leak is None:
         return
     over_face = "law.kind = 'representative' on a [body]"
@@ -268,8 +268,6 @@ def _leak(scene: SceneSections) -> Iterator[Problem]:
     if scene.law.representative and not leak.between_edges:
         problem = "is required with law.kind = 'representative': the fluid flows over the face"
         yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-    if scene.law.representative and second is not None and second.mesh is not None:
-        yield "leak", "does not go with a counter-body on a mesh", "a rigid side or a half-space"
 
 
 def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:

@@ -11,15 +11,18 @@ from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections, check_together
 from multiscale.scene.keys import keys_beside, scene_keys
 from multiscale.scene.reader import read, to_dict
-from multiscale.scene.scene_file import changed, overridden, read_scene_file
+from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
+from support.displayed import Displayed, Table
 from support.errors import InputError, did_you_mean
 from support.fields import KEY, key_of
 
 
-@dataclass(frozen=True, kw_only=True)
-class Scene(SceneSections):
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Scene(Displayed, SceneSections):
     """A complete scene: its sections, and the file that it was read from.
+
+    Printed, or in a notebook, it shows the keys that were written.
 
     Args:
         source: The file; None for a scene from Python.
@@ -94,6 +97,11 @@ class Scene(SceneSections):
             data = changed(data, key, value)
         return Scene.from_dict(data, self.source)
 
+    def displayed(self) -> tuple[str, Table]:
+        """Return where the scene is from in a line, and a table of the keys that were written."""
+        rows = [(key, _said(value)) for key, value in flat(self.written)]
+        return f"Scene {self.file or 'from Python'}", (("key", "value"), rows)
+
     def stated(self, section: str) -> set[str]:
         """Return the keys that were written of a section.
 
@@ -133,6 +141,13 @@ def _copied(data: Any) -> Any:
     if isinstance(data, dict):
         return {name: _copied(value) for name, value in data.items()}
     return data
+
+
+def _said(value: Any) -> str:
+    """Return a value as a table shows it; of an array its shape."""
+    if (shape := getattr(value, "shape", ())) != ():
+        return f"{' × '.join(map(str, shape))} numbers"
+    return str(value)
 
 
 def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:

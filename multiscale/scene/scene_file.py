@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -74,6 +75,20 @@ def _may_be_heights(content: bytes) -> bool:
         return error.start < len(content[:_START]) - 4  # the last character may be cut
     lines = [line for line in map(str.strip, text.splitlines()) if line and line[0] != "#"]
     return "\0" in text or (bool(lines) and not any("=" in one or one[0] == "[" for one in lines))
+
+
+def flat(section: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the keys of a scene with dots, and their values.
+
+    Args:
+        section: The scene as nested dictionaries.
+        above: What stands before its keys.
+    """
+    for name, value in section.items():
+        if isinstance(value, Mapping):
+            yield from flat(value, f"{above}{name}.")
+        else:
+            yield f"{above}{name}", value
 
 
 def overridden(data: dict[str, Any], text: str) -> dict[str, Any]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.couplings.dispatch import coupling_class
-from multiscale.readable import duration
+from multiscale.readable import column, duration
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
@@ -30,11 +30,12 @@ from multiscale.studies.errors import (
 from multiscale.studies.measured_run import measured_run
 from multiscale.studies.running import CaseResult, Journal, run_cases
 from support.collective import on_root, place_in
+from support.displayed import Displayed, Table, of_columns
 from support.errors import InputError
 
 
-@dataclass(frozen=True, kw_only=True)
-class Comparison:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Comparison(Displayed):
     """The configurations of a scene against the best of them.
 
     The best configuration that was reached is the measure: the others are compared against it.
@@ -103,6 +104,18 @@ class Comparison:
         is_beaten = ((others >= costs).all(axis=2) & (others > costs).any(axis=2)).any(axis=1)
         best = np.flatnonzero(np.isfinite(costs).all(axis=1) & ~is_beaten)
         return tuple(sorted((ended[index] for index in best), key=lambda row: row.seconds))
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what was compared in a line, and a table of the configurations."""
+        errors = [self.error(row) if self.measure else math.nan for row in self.rows]
+        table = of_columns(
+            ["configuration", *(row.name for row in self.rows)],
+            column("time", (row.seconds for row in self.rows), "s", 3),
+            column(f"error of the {self.response}", errors, "%", 3),
+            ["status", *("measure" if row.is_measure else row.status for row in self.rows)],
+        )
+        against = f", against {self.measure}" if self.measure else ""
+        return f"Comparison of {len(self)} configurations of {self.scene}{against}", table
 
 
 def compare(

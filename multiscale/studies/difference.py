@@ -18,8 +18,8 @@ from multiscale.figures import by_matplotlib
 from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
 from multiscale.results.data_frames import data_frame
 from multiscale.results.history import History
-from multiscale.results.html_page import Table, table_html
 from multiscale.results.reading import read_history, result_of_a_run
+from multiscale.scene.scene_file import flat
 from multiscale.studies import AT
 from multiscale.studies.run_curves import (
     APPROACH,
@@ -32,6 +32,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
+from support.displayed import Displayed, Table
 from support.errors import InputError
 
 _MOST_CHANGES = 40
@@ -69,8 +70,8 @@ class Ratio:
             return np.abs(self.ratio) * np.abs(self.errors / self.values).sum(axis=0)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Difference:
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Difference(Displayed):
     """Two runs beside each other.
 
     Attributes:
@@ -188,9 +189,9 @@ class Difference:
         """
         return by_matplotlib("studies.difference_figure.difference_figure", self)
 
-    def _repr_html_(self) -> str:
-        """Return the table as HTML, which notebooks show."""
-        return table_html(self.table())
+    def displayed(self) -> tuple[str, Table]:
+        """Return what is compared in a line, and the table of the last load."""
+        return f"Difference of {self.names[1]} from {self.names[0]}", self.table()
 
 
 def difference(
@@ -344,7 +345,7 @@ def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
     scenes = [run.scene for run in runs]
     if scenes[0] is None or scenes[1] is None:
         return
-    first, second = (dict(_flat(scene)) for scene in scenes if scene is not None)
+    first, second = (dict(flat(scene)) for scene in scenes if scene is not None)
     keys = [key for key in (first | second) if not key.startswith("output.")]
     differing = [key for key in keys if first.get(key) != second.get(key)]
     for key in differing[:_MOST_CHANGES]:
@@ -353,16 +354,6 @@ def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
         yield "…", f"{len(differing) - _MOST_CHANGES} more", ""
     if runs[0].heights != runs[1].heights:
         yield "heights, SHA-256", runs[0].heights[:12] + "…", runs[1].heights[:12] + "…"
-
-
-def _flat(section: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the keys of a scene with dots, and their values."""
-    for name, value in section.items():
-        key = f"{above}{name}"
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{key}.")
-        else:
-            yield key, value
 
 
 def _said(value: Any) -> str:

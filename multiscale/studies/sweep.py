@@ -7,6 +7,7 @@ ranks does not change a bit of what is computed from them.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -16,6 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.figures import by_matplotlib
+from multiscale.progress import case_progress
+from multiscale.readable import column
 from multiscale.results.data_frames import data_frame
 from multiscale.results.history import COLUMNS
 from multiscale.scene.identity import identity
@@ -23,6 +26,7 @@ from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases
 from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from support.collective import on_root, place_in, together
+from support.displayed import Displayed, Table, of_columns, spread
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -35,6 +39,13 @@ QUANTILES = (0.05, 0.5, 0.95)
 BINS = 20
 """Bins of a histogram, equally wide from the smallest to the largest value."""
 
+_SHOWN = (
+    ("approach_mm", "approach", "mm"),
+    ("force_N", "force", "N"),
+    ("mean_pressure_MPa", "pressure", "MPa"),
+    ("contact_area_fraction", "area", "%"),
+)
+"""Columns of a sweep that is displayed, with headings and units."""
 _COLUMNS = tuple(column.name for column in COLUMNS)
 _DRAWN = ("surface.spectrum.seed", "counter_surface.spectrum.seed", "counter_surface.shift")
 """Keys over whose values statistics are taken: draws of one roughness. Files are compared."""
@@ -48,6 +59,7 @@ def sweep(
     folder: str | Path | None = None,
     part: tuple[int, int] = (1, 1),
     observe: Callable[[Case, CaseResult], None] | None = None,
+    progress: bool = False,
 ) -> SweepResults:
     """Run a scene for all combinations of values of its keys.
 
@@ -61,6 +73,8 @@ def sweep(
             next call goes on from them, on any number of ranks; None stores nothing.
         part: This call runs the k-th of n parts of the cases, as one job of many; from 1.
         observe: Called on its rank with every case that is done now.
+        progress: Whether the cases that are done are shown, in the terminal or below a notebook's
+            cell; instead of `observe`.
 
     Returns:
         The results of all cases that are done, those of other parts too, on every rank.
@@ -85,10 +99,12 @@ def sweep(
 
     cases = together(comm, checked)
     journal = Journal(folder, on_root(comm, lambda: identity(scene)))
-    mine = run_cases(
-        cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
-        part=part, observe=observe,
-    )  # fmt: skip
+    shown = case_progress(comm, len(cases), parts) if progress else nullcontext(observe)
+    with shown as tell:
+        mine = run_cases(
+            cases, lambda case, progress: run_case(case.scene, progress=progress), journal, comm,
+            part=part, observe=tell,
+        )  # fmt: skip
     held = [mine] if size == 1 else comm.allgather(mine)
     return SweepResults(cases, {number: one for part in held for number, one in part.items()})
 
@@ -117,7 +133,7 @@ class Statistics:
         return np.asarray(self.values[:, NUMBERS.index(column), FIELDS.index(field)])
 
 
-class SweepResults:
+class SweepResults(Displayed):
     """The results of a sweep. A column of ``history.csv`` is an attribute of shape (cases, steps).
 
     NaN stands where a case has no such load step or no value.
@@ -245,6 +261,20 @@ class SweepResults:
             ImportError: When pandas, which patchlaw does not require, is not installed.
         """
         return data_frame(list(self.records()))
+
+    def displayed(self) -> tuple[str, Table]:
+        """Return what was varied in a line, and a table of the cases at their last load steps."""
+        records = list(self.case_records())
+        shown = [records[place] for place in spread(len(records), 60)]
+        columns = [["case", *(str(one["case"]) for one in shown)]]
+        columns += [[key, *(str(one[key]) for one in shown)] for key in self.keys]
+        for name, heading, unit in _SHOWN:
+            values = (np.nan if one[name] is None else one[name] for one in shown)
+            columns.append(column(heading, values, unit))
+        if self.failures or self.unfinished:
+            columns.append(["status", *(one["status"] for one in shown)])
+        line = f"SweepResults of {len(self)} cases over {', '.join(self.keys)}"
+        return f"{line}; the last load step of each", of_columns(*columns)
 
     def plot(self) -> Any:
         """Draw mean pressure over approach: cases, and mean and band of every ensemble.

@@ -38,6 +38,10 @@ class Case:
         free_tilt: Whether the plane turns without moment instead of keeping its slopes.
         units: Units that lengths and pressures are written in, with their size in mm and MPa;
             bare numbers without.
+        friction: Coefficient of friction; None for contacts without shear.
+        shear: Shifts of the plane, after the normal load or along it.
+        shear_path: ``"after"``, or ``"along"`` where there are as many shifts as turning points.
+        leak: Whether a fluid flows through the gap, in both directions.
     """
 
     heights: np.ndarray
@@ -53,6 +57,10 @@ class Case:
     tolerance: float = 1e-3
     free_tilt: bool = False
     units: tuple = ()
+    friction: float | None = None
+    shear: tuple = ()
+    shear_path: str = "after"
+    leak: bool = False
 
     def __str__(self):
         micro, sides = ", ".join(self.micro.values()), self.block["sides"]
@@ -60,7 +68,7 @@ class Case:
         return (
             f"{self.kind}, {micro}, {self.story}, heights {self.heights.shape}, patches"
             f" {self.patches}, height {self.block['height']}, {sides}, tilt {tilt}, hardness"
-            f" {self.hardness}"
+            f" {self.hardness}, friction {self.friction} {self.shear_path}, leak {self.leak}"
         )
 
     @property
@@ -99,7 +107,20 @@ class Case:
         }
         if self.hardness is not None:
             data["micro"]["hardness"] = self._pressure(self.hardness)
+        if self.friction is not None:
+            data["friction"] = {"coefficient": self.friction}
+            load |= self._sheared(len(load.get("approach", load.get("force", ()))))
+            data["load"] = load
+        if self.leak:
+            data["leak"] = {"viscosity": 1e-9, "pressures": [self._pressure(0.2), 0.0]}
         return run(Scene.from_dict(data))
+
+    def _sheared(self, points):
+        """Return the keys of the load for shear; along the normal load with as many points."""
+        shifts = [[self._length(value) for value in shift] for shift in self.shear]
+        if self.shear_path == "along":
+            return {"shear": (shifts * points)[:points], "shear_path": "along"}
+        return {"shear": shifts, "shear_steps": 2}
 
     @property
     def _tables(self):
@@ -107,7 +128,12 @@ class Case:
 
     def mirrored(self):
         """Return the scene mirrored along x."""
-        return replace(self, heights=self.heights[::-1], tilt=(-self.tilt[0], self.tilt[1]))
+        return replace(
+            self,
+            heights=self.heights[::-1],
+            tilt=(-self.tilt[0], self.tilt[1]),
+            shear=tuple((-x, y) for x, y in self.shear),
+        )
 
     def turned(self):
         """Return the scene turned by 90°: x becomes y, y becomes −x."""
@@ -119,6 +145,7 @@ class Case:
             patches=self.patches[::-1],
             block=self.block | {"cells": [ny, nx, nz]},
             tilt=(-self.tilt[1], self.tilt[0]),
+            shear=tuple((-y, x) for x, y in self.shear),
         )
 
     def scaled(self, length, modulus):
@@ -133,6 +160,7 @@ class Case:
             lengths=tuple(side * length for side in self.lengths),
             block=block,
             approach=self.approach * length,
+            shear=tuple((x * length, y * length) for x, y in self.shear),
             hardness=None if self.hardness is None else self.hardness * modulus,
         )
 
@@ -171,7 +199,7 @@ def drawn(seed):
         hardness = float(10 ** random.uniform(-2.0, 0.0)) * steepness * modulus
         hardness /= 1.0 - poisson_ratio**2
     cells = [max(4, patches[0]), max(4, patches[1]), 4]
-    return Case(
+    case = Case(
         heights=heights,
         lengths=lengths,
         block={
@@ -192,6 +220,22 @@ def drawn(seed):
         hardness=hardness,
         free_tilt=bool(random.random() < 0.15),
     )
+    return _with_shear_and_leak(case, np.random.default_rng((seed, 1)))
+
+
+def _with_shear_and_leak(case, random):
+    """Return a case that half-space contacts also solve with friction, a fluid, or both."""
+    if case.micro["model"] != "half-space" or case.kind not in ("analytic", "concurrent"):
+        return case
+    if random.random() < 0.6:
+        size = case.approach * 10 ** random.uniform(-2.0, 0.0)
+        case = replace(
+            case,
+            friction=float(10 ** random.uniform(-1.5, 0.0)),
+            shear=tuple((float(x), float(y)) for x, y in size * random.normal(size=(3, 2))),
+            shear_path=str(random.choice(["after", "along"])),
+        )
+    return replace(case, leak=bool(random.random() < 0.5))
 
 
 def _heights(random, grid, lengths, patches):

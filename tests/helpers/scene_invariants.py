@@ -66,7 +66,13 @@ def checks(case, folder):
         cycled = case.history(folder, force=[force, 0.5 * force], steps=1, cycles=2)
         yield Found("force hit", abs(cycled.force_N[0] / force - 1.0), 1e-8)
         yield Found("force hit again", abs(cycled.force_N[2] / force - 1.0), 1e-8)
-        yield Found("force cycles", float(len(cycled) != 4), 0.0)
+        yield Found(
+            "force cycles",
+            float(
+                len(cycled) != 4 + 6 * (case.shear_path == "after" and case.friction is not None)
+            ),
+            0.0,
+        )
     if case.kind == "consistent":
         together = replace(case, kind="concurrent").history(folder, **points)
         largest = together.force_N.max() or 1.0
@@ -92,6 +98,10 @@ def _alone(case, history):
         yield from _yielding(case, history)
     yield Found("reloaded", float(abs(force[4] - force[2]) / scale), 1e-8)
     yield Found("unloading is below loading", float((force[3] - force[1]) / scale), 1e-8)
+    if case.friction is not None:
+        yield from _sheared(case, history)
+    if case.leak:
+        yield from _leaking(history)
     energies = history.elastic_energy_mJ
     if np.isfinite(energies).all():
         yield Found("elastic energy", float(-energies.min()), 0.0)
@@ -131,10 +141,71 @@ def _yielding(case, history):
     yield Found("plastic work grows", float(-np.diff(work).min() / (work.max() or 1.0)), 1e-9)
 
 
+def _sheared(case, history):
+    """Yield what must hold of one history with friction."""
+    shear = np.hypot(history.shear_force_x_N, history.shear_force_y_N)
+    most = case.friction * history.force_N
+    scale = most.max() or 1.0
+    yield Found("friction bounds the shear force", float((shear - most).max() / scale), 1e-10)
+    yield Found(
+        "slip within the contact",
+        float((history.slip_area_fraction - history.contact_area_fraction).max()),
+        1e-12,
+    )
+    lost = history.dissipated_mJ
+    yield Found("friction takes energy", float(-np.diff(lost).min() / (lost.max() or 1.0)), 1e-12)
+    yield Found("shear finite", float(not np.isfinite(shear).all()), 0.0)
+
+
+def _leaking(history):
+    """Yield what must hold of one history with a fluid in the gap."""
+    for rate, percolates in (
+        (history.leak_x_mm3_per_s, history.percolates_x),
+        (history.leak_y_mm3_per_s, history.percolates_y),
+    ):
+        yield Found("no leak against the pressure", float(-rate.min()), 0.0)
+        yield Found("leaks where it percolates", float(((rate > 0) != (percolates > 0)).any()), 0.0)
+        yield Found("a higher load leaks less", float(max(np.diff(rate[:3]).max(), 0.0)), 0.0)
+
+
+MOVED = {
+    "mirrored": np.array([[-1.0, 0.0], [0.0, 1.0]]),
+    "turned": np.array([[0.0, -1.0], [1.0, 0.0]]),
+}
+
+
+def _same_shear(name, case, base, other, units):
+    """Yield how much shear forces and losses of two histories differ, the first one moved."""
+    move = MOVED.get(name, np.eye(2))
+    given = move @ [base.shear_force_x_N, base.shear_force_y_N]
+    found = np.array([other.shear_force_x_N, other.shear_force_y_N]) / units[0]
+    scale = case.friction * base.force_N.max() or 1.0
+    yield Found(f"{name}: shear force", float(np.abs(found - given).max() / scale), 1e-6)
+    lost, again = base.dissipated_mJ, other.dissipated_mJ / units[1]
+    # where all but nothing slips, the loss is what iterations leave
+    scale = max(lost.max(), 1e-3 * scale * case.approach)
+    yield Found(f"{name}: dissipated", float(np.abs(lost - again).max() / scale), 1e-5)
+
+
+def _same_leak(name, base, other, unit):
+    """Yield how much the leaks of two histories differ, the first one moved."""
+    swap = np.abs(MOVED.get(name, np.eye(2)))
+    given = swap @ [base.leak_x_mm3_per_s, base.leak_y_mm3_per_s]
+    found = np.array([other.leak_x_mm3_per_s, other.leak_y_mm3_per_s]) / unit
+    yield Found(f"{name}: leak", float(np.abs(found - given).max() / given.max()), 1e-6)
+    closed = swap @ [base.percolates_x, base.percolates_y]
+    again = np.array([other.percolates_x, other.percolates_y])
+    yield Found(f"{name}: closed", float(np.abs(again - closed).max()), 0.0)
+
+
 def _same(name, case, base, other, change, solved, shared, scale=(1.0, 1.0)):
     """Yield how much two histories differ, the first one changed."""
     length, modulus = scale
     unit = modulus * length**2
+    if case.friction is not None:
+        yield from _same_shear(name, case, base, other, (unit, unit * length))
+    if case.leak:
+        yield from _same_leak(name, base, other, length**3)
     largest = base.force_N.max() or 1.0
     yield Found(
         f"{name}: force", float(np.abs(other.force_N / unit - base.force_N).max() / largest), solved

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import ufl
@@ -13,6 +14,7 @@ from petsc4py import PETSc
 
 from geometry.patches import PatchGrid
 from macro import compat
+from support.errors import InputError
 
 HEXAHEDRA, TETRAHEDRA = dmesh.CellType.hexahedron, dmesh.CellType.tetrahedron
 TOP, BOTTOM = 7, 3
@@ -33,6 +35,22 @@ class PowerLaw:
     def stiffness(self, closure):
         over = np.maximum(closure - self.touch, 0.0)
         return self.power * self.k * over ** (self.power - 1.0) * (closure > self.touch)
+
+
+@dataclass(frozen=True)
+class RangedLaw(PowerLaw):
+    """A law that knows its area and range, as springs under friction need it."""
+
+    end: float = 2e-2
+
+    @property
+    def range(self):
+        return self.touch, self.end
+
+    def at(self, closure, *, extend=False):
+        if not extend and np.any(closure > self.end):
+            raise InputError("closure beyond the end of the patch law")
+        return SimpleNamespace(contact_area_fraction=np.clip(closure / 0.1, 0.0, 1.0))
 
 
 LAWS = [PowerLaw(k, touch) for k, touch in ((3e4, 0.0), (1e4, 2e-3), (5e4, 4e-3), (2e4, 1e-3))]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from multiscale.exports.export import CSV_COLUMNS
+from multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
 from multiscale.output.results import FILES
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
 from multiscale.results.extrapolation import Estimate
@@ -60,7 +60,7 @@ def columns_of_a_reference():
         ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
         ("contact.h5", FIELDS),
         ("reference.csv", columns_of_a_reference()),
-        ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, "pressure_scatter_MPa")),
+        ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, *FLOW_COLUMNS, "pressure_scatter_MPa")),
     ],
 )
 def test_every_column_is_described(file, columns):

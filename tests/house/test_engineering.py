@@ -50,16 +50,14 @@ def test_the_leak_on_the_page_is_that_of_its_scene():
         step = history.steps[index]
         assert 100.0 * step.contact_area_fraction == pytest.approx(float(area), abs=0.05)
         if leaks[0] == "closed":
-            assert (step.percolates_x, step.percolates_y) == (0, 0)
+            assert [leak.percolates for leak in step.leaks] == [0, 0]
             continue
         for direction, text in zip("xy", leaks, strict=True):
             value, error = (float(one) for one in re.findall(r"\d+\.\d+", text))
             power = float("1" + (re.findall(r"e-\d", text) or ["e0"])[0])
-            leak, off = (
-                getattr(step, f"{name}_{direction}_mm3_per_s") for name in ("leak", "leak_error")
-            )
-            assert leak == pytest.approx(value * power, rel=0.02)
-            assert off == pytest.approx(error * power, rel=0.1)
-        found = (step.constriction_x_fraction, step.constriction_y_fraction)
+            leak = step.leak(direction)
+            assert leak.rate == pytest.approx(value * power, rel=0.02)
+            assert leak.error == pytest.approx(error * power, rel=0.1)
+        found = [leak.constriction for leak in step.leaks]
         said = [float(one) for one in re.findall(r"\d+", shares)]
         np.testing.assert_allclose(100.0 * np.array(found), said, atol=0.6)

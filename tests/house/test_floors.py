@@ -20,14 +20,14 @@ FINITE_ELEMENTS = {"dolfinx", "petsc4py", "mpi4py", "ufl", "basix", "ffcx"}
 # folders and flat modules from the ground up: each imports only from lines above its own
 FLOORS = {
     "support": [
-        "arrays cores errors small_caches",
-        "checks collective fields packages quantities whole_files",
-        "checked_store",
+        "arrays cores displayed errors small_caches",
+        "checks collective fields network packages quantities whole_files",
+        "checked_store network_flow",
     ],
     "geometry": [
         "interpolant legendre_modes materials",
-        "face_frame filters surface",
-        "patches spectrum statistics summits zero",
+        "face_frame filters spring_bed surface",
+        "patches sliders spectrum statistics summits zero",
         "plausibility shear_state",
         "facing preparation rigid_plane",
         "files",
@@ -52,8 +52,9 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "figures machine",
+        "console figures machine",
         "laws loading",
+        "progress",
         "exports results scene",
         "inputs",
         "bodies",

@@ -7,7 +7,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
-EXAMPLE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)[0]
+EXAMPLE, FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 
 
 def test_example_runs_and_prints_what_the_page_says():
@@ -20,6 +20,15 @@ def test_example_runs_and_prints_what_the_page_says():
     (line,) = shown.stdout.splitlines()
     said = re.search(r"It prints `(.*?)`", PAGE)
     assert line == said.group(1)
+
+
+def test_the_same_pad_slips_as_the_page_says():
+    code = EXAMPLE + FRICTION
+    shown = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert shown.returncode == 0, shown.stderr
+    assert shown.stdout.splitlines()[-1] == re.search(r"Its last line is `(.*?)`", PAGE).group(1)
 
 
 def test_example_runs_on_two_ranks(waiting_ranks, tmp_path):

@@ -2,10 +2,13 @@
 
 import json
 import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import ufl
 from dolfinx import fem
+from dolfinx import mesh as dmesh
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -17,6 +20,8 @@ from helpers.user_problems import (
     PATCHES,
     TETRAHEDRA,
     TOP,
+    PowerLaw,
+    RangedLaw,
     box,
     clamped,
     elastic,
@@ -25,6 +30,8 @@ from helpers.user_problems import (
 
 from geometry.meshes.block import BlockShape
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction
 from macro import (
     Block,
     ContactProblem,
@@ -81,6 +88,28 @@ def bar():
     return found, COMM.allgather(given)
 
 
+def rubbing():
+    """Return shear forces, energies and shifts of a face that slips, step by step, per element."""
+    found, laws = {}, [RangedLaw(law.k, law.touch) for law in LAWS]
+    shears = [ShearControl(shift=(6e-4, 2e-4)), ShearControl(force=(-0.2, 0.3))]
+    for cell, mode in ((TETRAHEDRA, "pointwise"), (HEXAHEDRA, "patchwise")):
+        mesh = box(cell=cell, comm=COMM)
+        tags, space = marked(mesh), compat.vector_space(mesh, 1)
+        u, friction = fem.Function(space), Friction(coefficient=0.3, poisson_ratio=0.2)
+        options = {"patches": PATCHES, "mode": mode, "friction": friction}
+        force = Control(force=3.0, tilt=None)
+        rough = Interface(space, tags, TOP, laws=laws, indenter=force, **options)
+        problem = ContactProblem(elastic(u), u, [clamped(space, tags)], rough)
+        for k, shear in enumerate((None, *shears)):
+            rough.indenter = replace(force, shear=shear)
+            problem.solve()
+            if k == 1:
+                rough.slip_record = rough.slip_record  # as from another run
+            values = [*rough.shear_force, rough.dissipated, rough.slip_area, *rough.shift]
+            found[f"{mode} {k}"] = [float(value) for value in values]
+    return found
+
+
 def refusals():
     """Return what all ranks say of a face that is not there, and of a wrong facet on the last."""
     mesh = box(cell=TETRAHEDRA, comm=COMM)
@@ -94,12 +123,50 @@ def refusals():
     return COMM.allgather(told)
 
 
+@dataclass(frozen=True)
+class LeakingLaw(PowerLaw):
+    """A law that also tells a transmissivity, which falls with the closure and differs by way."""
+
+    def transmissivities(self, closure):
+        gap = np.maximum(0.02 - closure, 0.0)
+        return np.stack([gap**3, 0.3 * gap**3], axis=1)
+
+
+def leak():
+    """Return what leaks over a bent box's face, its balance, and integrals of its pressure."""
+    found = {}
+    for cell in (TETRAHEDRA, HEXAHEDRA):
+        mesh = box(cells=(6, 5, 3), cell=cell, comm=COMM)
+        tags, space = marked(mesh), compat.vector_space(mesh, 1)
+        left, right = (
+            dmesh.locate_entities_boundary(mesh, 2, lambda x, at=at: np.isclose(x[0], at))
+            for at in (0.0, 1.0)
+        )
+        for laws in (LeakingLaw(3e4), [LeakingLaw(k) for k in (3e4, 1e4, 5e4, 2e4)]):
+            u = fem.Function(space)
+            patches = PATCHES if isinstance(laws, list) else None
+            plane = RigidPlane(approach=8e-3, tilt=(2e-3, -1e-3))
+            rough = Interface(space, tags, TOP, laws=laws, patches=patches, indenter=plane)
+            ContactProblem(elastic(u), u, [clamped(space, tags)], rough).solve()
+            flow = rough.leak(left, right, viscosity=1e-9, pressures=(0.4, 0.1))
+            whole = ufl.dx(domain=mesh)
+            moments = [
+                COMM.allreduce(fem.assemble_scalar(fem.form(flow.pressure**k * whole)))
+                for k in (1, 2)
+            ]
+            name = f"{cell.name} {rough.mode}"
+            found[name] = [flow.rate, *moments], flow.imbalance
+    return found
+
+
 if __name__ == "__main__":
     result = {}
     for element, mode in zip(("P1", "P2", "Q1", "Q2"), 2 * ("patchwise", "pointwise"), strict=True):
         result |= cube(element, mode)
     ends, facets = bar()
-    errors = refusals()
+    errors, leaks = refusals(), leak()
+    rubbed = rubbing()
     if COMM.rank == 0:
-        values = {"values": result, "bar": ends, "facets": facets, "errors": errors}
+        values = {"values": result, "bar": ends, "facets": facets, "errors": errors, "leaks": leaks}
+        values["rubbed"] = rubbed
         sys.stdout.write(json.dumps(values) + "\n")

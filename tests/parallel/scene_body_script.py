@@ -65,7 +65,12 @@ def main(folder):
         last = run.steps[-1]
         # errors are differences of forces
         errors = [last.force_N + error for _, error in last.errors]
-        found[name] = last.force_N, last.approach_mm, last.leak_mm3_per_s or 0.0, *errors
+        found[name] = (
+            last.force_N,
+            last.approach_mm,
+            getattr(last.leak("face"), "rate", 0.0),
+            *errors,
+        )
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))

@@ -33,8 +33,26 @@ def test_ranks_may_have_no_facets(on_ranks, ranks):
 
 
 @pytest.mark.parametrize("ranks", RANKS)
+def test_what_slips_is_the_same_on_any_ranks(on_ranks, ranks):
+    one = on_ranks[1]["rubbed"]
+    assert one["pointwise 2"][:2] == pytest.approx([-0.2, 0.3], rel=1e-10)
+    for name, values in on_ranks[ranks]["rubbed"].items():
+        largest = max(map(abs, one[name][:2]))
+        assert values[:2] == pytest.approx(one[name][:2], abs=1e-8 * max(largest, 0.1)), name
+        assert values[2:] == pytest.approx(one[name][2:], rel=1e-8, abs=1e-13), name
+
+
+@pytest.mark.parametrize("ranks", RANKS)
 def test_all_ranks_refuse_together(on_ranks, ranks):
     errors = on_ranks[ranks]["errors"]
     assert errors == [errors[0]] * ranks
     assert "has no facets" in errors[0][0]
     assert "are not in the mesh" in errors[0][1]
+
+
+@pytest.mark.parametrize("ranks", RANKS)
+def test_a_face_leaks_the_same_on_any_ranks(on_ranks, ranks):
+    for name, (values, imbalance) in on_ranks[ranks]["leaks"].items():
+        assert values == pytest.approx(on_ranks[1]["leaks"][name][0], rel=1e-8), name
+        assert values[0] > 0.0
+        assert imbalance < 1e-10, name

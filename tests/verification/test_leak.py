@@ -13,8 +13,8 @@ from geometry.spectrum import Spectrum, synthesise
 from micro import HalfSpaceModel
 from micro.closed_forms.leak import patir_cheng, slight_roughness, slit_resistance
 from micro.flow.gap_flow import cell_network, gap_flow
-from micro.flow.potential_flow import network_flow
 from support.errors import InputError
+from support.network_flow import network_flow
 
 MODULUS = 1000.0
 

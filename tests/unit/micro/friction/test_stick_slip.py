@@ -75,6 +75,19 @@ def test_the_start_does_not_count():
     assert some == pytest.approx(solve_tractions(made, np.zeros((2, 24))).traction, abs=1e-8)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+def test_tractions_go_where_nothing_shears(count):
+    grid = TangentialGrid(GRID, SPACING, poisson_ratio=0.3, periodic=False)
+    start = np.linspace(-0.01, 0.02, 2 * count).reshape(2, count)
+    made = TractionProblem(
+        grid=grid, cells=Cells.of(np.arange(count), GRID), bound=np.full(count, 0.1),
+        shift=np.zeros((2, count)), force=None, tolerance=1e-8,
+    )  # fmt: skip
+    solution = solve_tractions(made, start)
+    assert np.abs(solution.traction).max() <= 1e-8 * np.abs(start).max()
+    assert not solution.slipping.any()
+
+
 def test_more_force_than_friction_transmits_slides():
     made, _ = problem(1, force=(0.8, 0.6))
     with pytest.raises(NotConverged, match="exceeds what friction transmits: the contact slides"):

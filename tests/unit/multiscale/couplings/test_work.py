@@ -17,7 +17,7 @@ from multiscale.couplings.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
-from multiscale.output.terminal import Pace
+from multiscale.progress import Pace
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):

@@ -1,6 +1,6 @@
 """Laws survive a file bit for bit, and anything else is refused."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import h5py
 import numpy as np
@@ -11,6 +11,7 @@ from multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.rows import LawRows, PlanePath
+from multiscale.laws.transmissivity import Transmissivity
 from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
@@ -43,6 +44,14 @@ def table():
             interpolation_error=1 / 3,
             stiffness_error=1 / 7,
             warning_pressure=1 / 11,
+            transmissivity=Transmissivity(
+                separation=rising[4] + np.arange(rows),
+                hydraulic_gap=random.random((rows, 2)),
+                on_half=random.random((rows, 2)),
+                scatter=random.random((rows, 2)),
+            )
+            if rows > 2
+            else None,
         )
 
     patches = PatchGrid(grid=(2, 3), lengths=(0.1, 1 / 3))
@@ -67,6 +76,10 @@ def test_round_trip_is_exact(table, tmp_path):
             assert column.tobytes() == again.tobytes(), name
         for name in SCALARS:
             assert getattr(law, name) == getattr(copy, name)
+        assert (law.transmissivity is None) == (copy.transmissivity is None)
+        for one in fields(law.transmissivity) if law.transmissivity else ():
+            values = (getattr(each.transmissivity, one.name) for each in (law, copy))
+            np.testing.assert_array_equal(*values)
     for name in ("approach", "tilt", "force", "moment"):
         assert getattr(table.path, name).tobytes() == getattr(back.path, name).tobytes()
     write_laws(tmp_path / "laws.h5", replace(table, path=None))
@@ -77,8 +90,10 @@ def test_every_column_says_its_unit(table, tmp_path):
     write_laws(tmp_path / "laws.h5", table)
     with h5py.File(tmp_path / "laws.h5") as file:
         units = {name: file["patch_0_0"][name].attrs["unit"] for name in COLUMNS}
+        flow = {name: one.attrs["unit"] for name, one in file["patch_0_0/transmissivity"].items()}
     assert units["closure"] == "mm"
     assert units["pressure"] == "MPa"
+    assert (flow["hydraulic_gap_x"], flow["scatter_y"]) == ("mm", "mm^3")
 
 
 def test_other_files_are_refused(tmp_path):

@@ -15,7 +15,7 @@ from multiscale.output.provenance import provenance
 from multiscale.output.report import citations, report_html, shown_contacts
 from multiscale.output.results import write_results
 from multiscale.readable import percent, quantity
-from multiscale.results.html_page import filled, table_html
+from multiscale.results.html_page import filled
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
@@ -155,10 +155,6 @@ def test_citation_is_that_of_the_file():
         assert title in program + paper
     for name in re.findall(r'family-names: "?([^"\n]+)"?', given):
         assert name in paper
-
-
-def test_table_alone_is_escaped():
-    assert "<td>a &lt; b" in table_html((["head"], [[RESERVED]]))
 
 
 def cycle(folder, *words):

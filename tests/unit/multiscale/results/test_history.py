@@ -1,14 +1,17 @@
 """The columns of a history are attributes, a data frame and a table that notebooks show."""
 
+import re
 import sys
+from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
 import pytest
 
-from geometry.patches import PatchGrid
+from geometry.patches import PatchGrid, Regions
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.results.history import COLUMNS, History
+from support.errors import InputError
 
 FIRST_COLUMNS = (
     "step", "approach_mm", "force_N", "mean_pressure_MPa", "contact_area_fraction",
@@ -56,9 +59,75 @@ def test_table_shows_values_with_their_errors(history):
 
 def test_notebooks_show_the_table(history):
     shown = history._repr_html_()
-    assert shown.startswith("<table>") and shown.endswith("</table>")
+    assert shown.startswith("<p>History of 2 load steps: 4 to 8 µm, 0.5 to 1 N</p><table>")
+    assert shown.endswith("</table>")
     assert shown.count("<tr>") == 3
     assert "<td>1.000 ± 0.030</td>" in shown
+
+
+def test_a_history_is_printed_as_the_table(history):
+    assert repr(history) == "<History of 2 load steps: 4 to 8 µm, 0.5 to 1 N>"
+    line, heading, first, second = str(history).splitlines()
+    assert line in repr(history)
+    assert heading.startswith("step  approach [µm]      force [N]")
+    assert first.split()[:3] == ["1", "4", "0.5"] and "1.000 ± 0.030" in second
+    assert str(History(steps=(), patches=history.patches)).strip() == "History without a load step"
+
+
+def test_an_index_gives_a_load_step_and_a_slice_a_history(history):
+    assert history[-1] is history.steps[1]
+    falling = replace(history, steps=history.steps[::-1])
+    assert falling.unloading.tolist() == [False, True]
+    assert falling[1:].unloading.tolist() == [True]  # its first step was fallen to all the same
+    assert falling[1:][:].unloading.tolist() == [True]
+    assert falling[:1].force_N.tolist() == [1.0] and len(falling[2:]) == 0
+    assert history[::2].step.tolist() == [1]
+    with pytest.raises(InputError, match=r"-1\): a history goes forward .*a step of 1 or more"):
+        history[::-1]
+    with pytest.raises(IndexError):
+        history[2]
+
+
+def test_a_load_step_is_printed_with_what_is_known(history):
+    step = history[1]
+    assert repr(step) == "<LoadStep 2: 8 µm, 1.000 ± 0.030 N>"
+    assert re.search(r"^force_error_N +0\.03$", str(step), re.MULTILINE)
+    assert "leak" not in str(step)
+
+
+def test_a_dataset_has_columns_and_patches(history, monkeypatch):
+    made = []
+    xarray = ModuleType("xarray")
+    xarray.Dataset = lambda values, coords, attrs: made.append((values, coords, attrs))
+    monkeypatch.setitem(sys.modules, "xarray", xarray)
+    rising = np.arange(6.0)
+    state = PatchState(closure_mm=rising, pressure_MPa=rising, contact_area_fraction=rising)
+    steps = tuple(replace(step, patches=state) for step in history)
+    grid = PatchGrid(grid=(3, 2), lengths=(1.0, 1.0))
+    replace(history, steps=steps, patches=grid).to_xarray()
+    replace(history, steps=steps, patches=Regions(names=tuple("abcdef"))).to_xarray()
+    (values, coordinates, _), (of_regions, regions, _) = made
+    dimensions, pressure = values["patch_pressure_MPa"]
+    assert dimensions == ("step", "ix", "iy") and pressure.shape == (2, 3, 2)
+    for index in range(grid.count):
+        assert pressure[(1, *grid.unravel(index))] == rising[index]
+    assert values["force_N"][0] == ("step",) and values["force_N"][1].tolist() == [0.5, 1.0]
+    assert values["force_N"][2] == {"long_name": "Normal force on the plane", "units": "N"}
+    assert "leak_mm3_per_s" not in values and coordinates["step"][1].tolist() == [1, 2]
+    assert of_regions["patch_closure_mm"][0] == ("step", "region")
+    assert regions["region"] == list("abcdef")
+
+
+def test_datasets_are_those_of_xarray(history):
+    pytest.importorskip("xarray")
+    made = history.to_xarray()
+    assert made.force_N.sel(step=2) == 1.0 and made.force_N.attrs["units"] == "N"
+
+
+def test_a_dataset_without_xarray_says_what_to_install(history, monkeypatch):
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(ImportError, match=r"needs xarray"):
+        history.to_xarray()
 
 
 def test_data_frame_has_the_columns_of_the_file(history, monkeypatch):

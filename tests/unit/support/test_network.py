@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from micro.flow.network import Network
-from micro.flow.potential_flow import MOST_IMBALANCE, factorised, network_flow
 from support.errors import NotConverged
+from support.network import Network
+from support.network_flow import MOST_IMBALANCE, factorised, network_flow
 
 IN, OUT = -2, -1
 

@@ -16,9 +16,9 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse import linalg
 
-from micro.flow.network import Network
 from support.arrays import Array, Indices
 from support.errors import NotConverged
+from support.network import Network
 
 MOST_IMBALANCE = 1e-10
 """Largest sum of what does not balance at all nodes, over the flow through the network."""
@@ -67,12 +67,16 @@ def factorised(matrix: sparse.csr_matrix) -> Inverse:
     return factors.solve
 
 
-def network_flow(network: Network, preconditioner: Preconditioner = factorised) -> NetworkFlow:
+def network_flow(
+    network: Network, preconditioner: Preconditioner = factorised, *, limited: bool = False
+) -> NetworkFlow:
     """Solve for the flow through a network.
 
     Args:
         network: The network.
         preconditioner: Makes what solves for the potentials approximately.
+        limited: Whether its conductances are known to be within `Network.limits`. They may then
+            have any sign, as those of finite elements, if the whole is positive definite.
 
     Raises:
         NotConverged: When what enters and leaves the nodes does not balance.
@@ -80,7 +84,8 @@ def network_flow(network: Network, preconditioner: Preconditioner = factorised) 
     if not network.percolates:
         return _closed(network)
     reached = network.joined[network.tail] == network.joined[network.inlet]
-    part = network.only(reached).within_reach()
+    part = network.only(reached)
+    part = part if limited else part.within_reach()
     nodes = np.flatnonzero(network.joined[: network.count] == network.joined[network.inlet])
     potential, flow, iterations = _solved(part, nodes, preconditioner)
     out = part.divergence(flow)

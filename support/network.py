@@ -119,12 +119,20 @@ class Network:
     def within_reach(self) -> Network:
         """Return the network with conductances that double precision resolves side by side.
 
-        Those beyond `_WIDEST_STEP` times what the widest path to a terminal lets through are
-        lowered to that.
+        Larger ones are lowered to the `limits` of their nodes.
         """
-        widest = _WIDEST_STEP * self._widest_ways_out
-        limit = np.minimum(widest[self.tail], widest[self.head])
+        limits = self.limits
+        limit = np.minimum(limits[self.tail], limits[self.head])
         return replace(self, conductance=np.minimum(self.conductance, limit))
+
+    @property
+    def limits(self) -> Array:
+        """Largest conductance beside each node that double precision resolves, shape (n + 2,).
+
+        It is `_WIDEST_STEP` times what the widest path to a terminal lets through. All links must
+        be joined to both terminals.
+        """
+        return _WIDEST_STEP * self._widest_ways_out
 
     @cached_property
     def _tree(self) -> tuple[sparse.csr_matrix, Indices]:

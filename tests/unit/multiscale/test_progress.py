@@ -1,5 +1,6 @@
-"""What a run is at is shown: by a line for each tenth under mpirun, by a text beside a bar."""
+"""What a run is at is shown: by a line for each tenth under mpirun, by a text, in a notebook."""
 
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,10 +8,10 @@ import numpy as np
 from geometry import PatchGrid, Spectrum, patch_means, synthesise
 from geometry.rigid_plane import Control
 from micro import micro_model
+from multiscale import progress
 from multiscale.laws.consistent import consistent_laws
 from multiscale.laws.isolated import isolated_laws
 from multiscale.loading.load_history import LoadHistory
-from multiscale.output import terminal
 from support.collective import shared
 
 LOADS = LoadHistory(approach=(8e-3,), steps=4, tilt=(0.0, 0.0))
@@ -18,7 +19,7 @@ STEP = SimpleNamespace(step=1, approach_mm=0.008, force_N=1234.5, wall_s=7.0)
 
 
 def shown_on(rank, capsys):
-    with terminal.progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
+    with progress.run_progress(SimpleNamespace(rank=rank, size=2), LOADS) as (advance, observe):
         observe("block", 0, 0)
         for done in range(1, 98):
             observe("rows of laws", done, 97)
@@ -41,10 +42,30 @@ def test_other_ranks_are_silent(capsys):
 
 def test_a_text_for_all_that_is_counted():
     texts = []
-    observe = terminal.counting(texts.append)
+    observe = progress.counting(texts.append)
     observe("block", 0, 0)
     observe("laws of patches", 3, 16)
     assert texts == ["block", "laws of patches: 3 of at most 16"]
+
+
+def test_a_notebook_shows_one_line_that_changes(monkeypatch, capsys):
+    shown = []
+    line = SimpleNamespace(update=lambda content, raw: shown.append(content))
+    display = SimpleNamespace(display=lambda content, raw, display_id: line)
+    kernel = SimpleNamespace(get_ipython=lambda: SimpleNamespace(kernel=None), display=display)
+    monkeypatch.setitem(sys.modules, "IPython", kernel)
+    monkeypatch.setitem(sys.modules, "IPython.display", display)
+    with progress.run_progress(None, LOADS) as (advance, observe):
+        observe("set-up & body", 0, 0)
+        advance(STEP)
+    assert [one["text/plain"] for one in shown] == [
+        "set-up & body",
+        "load step 1/4: 8 µm, 1.234 kN; about 21 s left",
+    ]
+    assert shown[0]["text/html"] == "<div>set-up &amp; body</div>"
+    with progress.following(SimpleNamespace(rank=1, size=2)) as (begun, _):
+        begun("other ranks are silent")
+    assert len(shown) == 2 and not capsys.readouterr().out
 
 
 def test_shared_tasks_are_counted_over_all_ranks():

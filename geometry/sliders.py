@@ -1,0 +1,229 @@
+"""Shear stresses of the springs behind contact laws, each with a Coulomb slider of its own.
+
+The sliders of a sample hold the stresses of its springs; a step changes them by a return mapping in
+closed form, spring by spring. It is the backward Euler method: springs that touch in a step follow
+its whole slip. In two directions, and under varying closure.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from geometry.spring_bed import SpringBed
+from support.arrays import Array
+
+_AT_BOUND = 1e-9
+"""Share by which the stress of a spring may lie below its bound and still slip."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SliderState:
+    """What a load step leaves behind of the sliders of n samples with up to N springs each.
+
+    Args:
+        closure: Closures, shape (n,) [mm].
+        slip: Tangential displacements of the plane against the samples, shape (n, 2) [mm].
+        stress: Shear stresses of the springs, before they are scaled, shape (n, N, 2) [MPa].
+    """
+
+    closure: Array
+    slip: Array
+    stress: Array
+
+
+class SliderResponse(NamedTuple):
+    """Shear stresses of n samples after a step, and their exact derivatives.
+
+    Attributes:
+        stress: Shear stresses, shape (n, 2) [MPa].
+        by_slip: Their derivatives by the tangential displacement, shape (n, 2, 2) [MPa/mm].
+        by_closure: Their derivatives by the closure, which make tangents unsymmetric, shape (n, 2)
+            [MPa/mm].
+        after: The sliders after the step.
+        lost: Energy per area that friction took up in the step, ≥ 0, shape (n,) [N/mm].
+        stuck: Tangential stiffness of the springs that stick, shape (n,) [MPa/mm].
+        sticking: Tangential stiffness that all springs would have, shape (n,) [MPa/mm].
+        stick_closure: Closure at which springs as stiff as those that stick have touched: area in
+            contact there sticks, shape (n,) [mm].
+    """
+
+    stress: Array
+    by_slip: Array
+    by_closure: Array
+    after: SliderState
+    lost: Array
+    stuck: Array
+    sticking: Array
+    stick_closure: Array
+
+
+class _Springs(NamedTuple):
+    """Springs of n samples at closures, shapes (n, N)."""
+
+    stiffness: Array
+    force: Array
+    growth: Array
+
+
+class Sliders:
+    """Coulomb friction of samples with contact laws.
+
+    Args:
+        beds: Springs of every law.
+        ratios: Mindlin's ratio r of every law.
+        patch: Law of every sample, shape (n,).
+        coefficient: Coefficient of friction μ.
+    """
+
+    def __init__(
+        self,
+        beds: Sequence[SpringBed],
+        ratios: Array,
+        patch: NDArray[np.intp],
+        coefficient: float,
+    ) -> None:
+        most = max((len(bed) for bed in beds), default=0)
+
+        def padded(name: str, fill: float) -> Array:
+            rows = np.full((len(beds), most), fill)
+            for row, bed in zip(rows, beds, strict=True):
+                row[: len(bed)] = getattr(bed, name)
+            return rows[patch]
+
+        self._beds, self._patch = tuple(beds), patch
+        self._start, self._width = padded("start", np.inf), padded("width", 0.0)
+        self._stiffness = padded("stiffness", 0.0)
+        self._ratio = np.asarray(ratios, float)[patch]
+        self._coefficient = coefficient
+
+    @property
+    def at_rest(self) -> SliderState:
+        """The sliders where nothing has touched yet."""
+        n, springs = self._start.shape
+        closure = np.full(n, -1e30)  # far from touching, and a number
+        return SliderState(closure=closure, slip=np.zeros((n, 2)), stress=np.zeros((n, springs, 2)))
+
+    def respond(
+        self, before: SliderState, closure: Array, slip: Array, pressure: Array, rate: Array
+    ) -> SliderResponse:
+        """Return the shear stresses after a step.
+
+        Args:
+            before: The sliders before the step.
+            closure: Closures c at its end, shape (n,) [mm].
+            slip: Tangential displacements there, shape (n, 2) [mm].
+            pressure: Pressures p of the laws there, shape (n,) [MPa].
+            rate: dp/dc there, shape (n,) [MPa/mm].
+        """
+        springs, mu = self._at(closure), self._coefficient
+        moved = (slip - before.slip) / self._ratio[:, None]
+        trial = before.stress + springs.stiffness[..., None] * moved[:, None]
+        size = np.hypot(trial[..., 0], trial[..., 1])
+        bound = mu * springs.force
+        slips = size > bound
+        share = np.where(slips, bound / np.where(slips, size, 1.0), 1.0)
+        after = trial * share[..., None]
+        ahead = np.where(slips[..., None], trial / np.where(slips, size, 1.0)[..., None], 0.0)
+
+        of_springs = springs.force.sum(axis=1)
+        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=of_springs > 0.0)
+        stress = after.sum(axis=1)
+        along = share * springs.stiffness
+        by_slip = along.sum(axis=1)[:, None, None] * np.eye(2)
+        by_slip -= np.einsum("ns,nsi,nsj->nij", along, ahead, ahead)
+        new = share * springs.growth
+        by_closure = new.sum(axis=1)[:, None] * moved
+        by_closure -= np.einsum("ns,nsi,nsj,nj->ni", new, ahead, ahead, moved)
+        by_closure += mu * np.einsum("ns,nsi->ni", springs.stiffness, ahead)
+        mean = np.divide(
+            stress, of_springs[:, None], out=np.zeros_like(stress), where=of_springs[:, None] > 0.0
+        )
+        scaling = (rate - scale * springs.stiffness.sum(axis=1))[:, None] * mean
+        sticks = np.hypot(after[..., 0], after[..., 1]) < (1.0 - _AT_BOUND) * bound
+        stuck = np.where(sticks, springs.stiffness, 0.0).sum(axis=1)
+        return SliderResponse(
+            stress=scale[:, None] * stress,
+            by_slip=(scale / self._ratio)[:, None, None] * by_slip,
+            by_closure=scale[:, None] * by_closure + scaling,
+            after=SliderState(closure=closure, slip=slip, stress=after),
+            lost=scale * self._lost(before, trial, after, springs),
+            stuck=scale / self._ratio * stuck,
+            sticking=scale / self._ratio * springs.stiffness.sum(axis=1),
+            stick_closure=self._closure_of(stuck),
+        )
+
+    def following(self, other: Sliders, state: SliderState) -> SliderState:
+        """Return sliders that go on from those of other laws of the same samples.
+
+        Between the closures at which groups of springs touch, their displacements are lines.
+
+        Args:
+            other: The sliders of the other laws.
+            state: Their state.
+        """
+        then, springs = other._at(state.closure), self._at(state.closure)
+        moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[..., None]
+        stress = np.zeros((len(state.closure), self._start.shape[1], 2))
+        for law in np.unique(self._patch):
+            rows, bed, old = self._patch == law, self._beds[law], other._beds[law]
+            lines = [np.interp(bed.centre, old.centre, each) for each in np.eye(len(old))]
+            found = np.einsum(
+                "os,noi->nsi", np.reshape(lines, (len(old), -1)), moved[rows][:, : len(old)]
+            )
+            stress[rows, : len(bed)] = found
+        stress *= springs.stiffness[..., None]
+        size, bound = np.hypot(stress[..., 0], stress[..., 1]), self._coefficient * springs.force
+        stress *= np.where(size > bound, bound / np.where(size > bound, size, 1.0), 1.0)[..., None]
+        return SliderState(closure=state.closure, slip=state.slip, stress=stress)
+
+    def _at(self, closure: Array) -> _Springs:
+        """Return stiffness and force of the springs at closures, and the stiffness's growth."""
+        depth = closure[:, None] - self._start
+        touched, width = depth > 0.0, np.where(self._width > 0.0, self._width, 1.0)
+        inside = np.clip(depth, 0.0, self._width)
+        share = np.where(self._width > 0.0, inside / width, touched)
+        rows = touched & (depth < self._width)
+        square = 0.5 * inside**2 / width + np.maximum(depth - self._width, 0.0)
+        return _Springs(
+            stiffness=self._stiffness * share,
+            force=self._stiffness * square,
+            growth=np.where(rows, self._stiffness / width, 0.0),
+        )
+
+    def _lost(self, before: SliderState, trial: Array, after: Array, now: _Springs) -> Array:
+        """Return what friction takes up per area, before it is scaled, shape (n,) [N/mm].
+
+        It is the stress of a spring times its slip. Where the bound rises in the step, its mean
+        counts; where it falls, the mean of both stresses. Springs that part lose their energy.
+        """
+        then = self._at(before.closure)
+        stiffness = np.maximum(now.stiffness, then.stiffness)
+        slip = (trial - after) * self._ratio[:, None, None]
+        slip /= np.where(stiffness > 0.0, stiffness, 1.0)[..., None]
+        rises = now.force > then.force
+        mean = np.where(rises, 0.5 + 0.5 * then.force / np.where(rises, now.force, 1.0), 1.0)
+        own = mean * (after * slip).sum(axis=-1)
+        falling = 0.5 * ((before.stress - after) * slip).sum(axis=-1)
+        lost: Array = (np.maximum(own, 0.0) + np.maximum(falling, 0.0)).sum(axis=1)
+        return lost
+
+    def _closure_of(self, stiffness: Array) -> Array:
+        """Return the closures at which the springs have a stiffness, shape (n,) [mm]."""
+        if not self._start.shape[1]:
+            return np.full(len(stiffness), -np.inf)
+        upto = np.cumsum(self._stiffness, axis=1)
+        last = np.count_nonzero(self._stiffness, axis=1) - 1
+        group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))
+        rows = np.arange(len(stiffness))
+        below = upto[rows, group] - self._stiffness[rows, group]
+        share = (stiffness - below) / np.where(last >= 0, self._stiffness[rows, group], 1.0)
+        return np.asarray(
+            self._start[rows, group] + np.clip(share, 0, 1) * self._width[rows, group]
+        )

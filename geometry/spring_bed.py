@@ -1,0 +1,199 @@
+"""The springs behind a contact law p(c), which make it a law of friction as well.
+
+A convex law is a bed of springs that touch one after another: p″(c′) dc′ of them at the closure c′.
+Each has a tangential stiffness, smaller by Mindlin's ratio r, and a Coulomb slider of its own. For
+shear under an unchanging closure they give τ = μ [p(c) − p(c − s/(μ r))], the normal law read
+twice, as the half-space does (Ciavarella 1998; Jäger 1998; for histories Popov & Heß 2015).
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
+
+import numpy as np
+
+from geometry.materials import PoissonRatio, mindlin_ratio
+from support.arrays import Array
+from support.errors import InputError
+from support.fields import Limits, check_limits
+
+TOLERANCE = 2e-3
+"""Error of the shear stress that chooses the springs, relative to the bound μ p of friction."""
+FEWEST, MOST = 10, 30
+"""Numbers of springs. Laws with waves on three octaves take 20 to 25 of them."""
+_FLOOR = 0.03
+"""Share of the largest pressure below which errors count relative to it, not to the pressure."""
+_SAMPLES = 600
+_COARSER, _FINER = 1.25, 0.5
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Friction:
+    """Coulomb friction of an interface with laws.
+
+    Args:
+        coefficient: Coefficient of friction μ: no shear stress exceeds μ times the pressure.
+        poisson_ratio: Poisson's ratio of the bodies, for laws that do not know their ratio of
+            normal to tangential stiffness; of two bodies the mean, weighted by 1/G. None: the laws
+            know it, as those of a scene do.
+
+    Raises:
+        InputError: When a number is outside its range.
+    """
+
+    coefficient: Annotated[float, Limits(gt=0, le=10)]
+    poisson_ratio: PoissonRatio | None = None
+
+    def __post_init__(self) -> None:
+        check_limits(self)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SpringBed:
+    """Groups of springs that touch between two closures, evenly spread over them.
+
+    Attributes:
+        start: Closures at which the N groups begin to touch, ascending, shape (N,) [mm].
+        width: Closure over which all springs of a group touch, shape (N,) [mm].
+        stiffness: Normal stiffness of the groups, shape (N,) [MPa/mm].
+        error: Largest error of the shear stress by them, relative to μ p.
+        missed: Largest share of the law's pressure by which that of the springs differs, which
+            are scaled to it; much where the stiffness of the law falls.
+    """
+
+    start: Array
+    width: Array
+    stiffness: Array
+    error: float = 0.0
+    missed: float = 0.0
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+    @property
+    def centre(self) -> Array:
+        """Mean closure at which the springs of each group touch, shape (N,) [mm]."""
+        return np.asarray(self.start + 0.5 * self.width)
+
+    def pressure(self, closure: Array) -> Array:
+        """Return the pressure of all springs at closures of shape (n,) [MPa]."""
+        depth = np.asarray(closure)[..., None] - self.start
+        inside = np.clip(depth, 0.0, self.width)
+        square = 0.5 * inside**2 / np.where(self.width > 0.0, self.width, 1.0)
+        return np.asarray((square + np.maximum(depth - self.width, 0.0)) @ self.stiffness)
+
+
+def springs_of(
+    pressure: Callable[[Array], Array],
+    stiffness: Callable[[Array], Array],
+    first: float,
+    last: float,
+    tolerance: float = TOLERANCE,
+) -> SpringBed:
+    """Choose the springs of a law by the error of the shear stress.
+
+    Between two closures springs are spread evenly, so that the stiffness is a line there. A group
+    of stiffness k and width h acts as one spring with one slider, which changes the shear stress
+    of partial slip by μ k h/8 at most. Where the stiffness of a law falls, as that of patches whose
+    neighbours take load over, springs stay as stiff as before, and all are scaled to the pressure.
+
+    Args:
+        pressure: The law's pressure at closures [MPa].
+        stiffness: Its derivative [MPa/mm].
+        first: Closure at first touch [mm]; infinite where nothing touches.
+        last: Largest closure of the law [mm].
+        tolerance: Error of the shear stress.
+    """
+    if not (np.isfinite(first) and np.isfinite(last)):
+        return SpringBed(start=np.zeros(0), width=np.zeros(0), stiffness=np.zeros(0))
+    share = np.linspace(0.0, 1.0, _SAMPLES + 1) if last > first else np.zeros(1)
+    closure = first + (last - first) * share**2  # laws start as a power of the closure
+    p = np.asarray(pressure(closure), float)
+    slope = np.maximum.accumulate(np.maximum(np.asarray(stiffness(closure), float), 0.0))
+    allowed = np.maximum(p, _FLOOR * p.max())
+    nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+    while len(nodes) > MOST + 1:
+        tolerance *= _COARSER
+        nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+    while len(nodes) < FEWEST + 1 and reached > 1e-9 and len(closure) > 1:
+        tolerance *= _FINER
+        nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+    at, steep = closure[nodes], slope[nodes]
+    group = np.diff(steep) > 0.0
+    jumps = steep[:1] > 0.0
+    bed = SpringBed(
+        start=np.concatenate([at[:1][jumps], at[:-1][group]]),
+        width=np.concatenate([np.zeros(int(jumps.sum())), np.diff(at)[group]]),
+        stiffness=np.concatenate([steep[:1][jumps], np.diff(steep)[group]]),
+        error=reached,
+    )
+    missed = np.abs(bed.pressure(closure) - p) / np.where(allowed > 0.0, allowed, 1.0)
+    return replace(bed, missed=float(missed.max()))
+
+
+def _nodes(
+    closure: Array, pressure: Array, slope: Array, allowed: Array, tolerance: float
+) -> tuple[list[int], float]:
+    """Return the samples at which groups end, and the error of the shear stress by them."""
+    nodes, reached, last = [0], 0.0, len(closure) - 1
+    while nodes[-1] < last:
+        i = nodes[-1]
+        ends = np.arange(i + 1, last + 1)
+        width, more = closure[ends] - closure[i], slope[ends] - slope[i]
+        line = pressure[i] + slope[i] * width + 0.5 * more * width
+        error = np.maximum(more * width / 8.0, np.abs(line - pressure[ends])) / allowed[ends]
+        beyond = np.flatnonzero(error > tolerance)
+        step = max(int(beyond[0]) if len(beyond) else len(ends), 1)
+        reached = max(reached, float(error[step - 1]))
+        nodes.append(i + step)
+    return nodes, reached
+
+
+def springs_of_law(law: Any) -> SpringBed:
+    """Return the springs of a law: its own, or those of its pressure over its range.
+
+    Args:
+        law: Has ``springs``; or ``pressure``, ``stiffness`` and ``range``, the closures at first
+            touch and at the end of the law.
+
+    Raises:
+        InputError: When it has none of both.
+    """
+    if isinstance(bed := getattr(law, "springs", None), SpringBed):
+        return bed
+    ends = getattr(law, "range", None)
+    if ends is None or np.shape(ends) != (2,):
+        raise InputError(
+            "friction needs the range of a law, over which springs stand for it",
+            key="friction",
+            value=law,
+            allowed="laws with range = (closure at first touch, largest closure) in mm",
+        )
+    return springs_of(law.pressure, law.stiffness, float(ends[0]), float(ends[1]))
+
+
+def stiffness_ratios(laws: Sequence[Any], friction: Friction) -> Array:
+    """Return Mindlin's ratios r of normal to tangential stiffness of laws, shape (N,).
+
+    Args:
+        laws: The laws.
+        friction: Says the bodies' Poisson's ratio, or that the laws know it.
+
+    Raises:
+        InputError: When neither does.
+    """
+    if friction.poisson_ratio is not None:
+        return np.full(len(laws), mindlin_ratio(friction.poisson_ratio))
+    ratios = np.array([float(getattr(law, "stiffness_ratio", np.nan)) for law in laws])
+    if not np.isfinite(ratios).all():
+        raise InputError(
+            "the laws do not know their ratio of normal to tangential stiffness",
+            key="friction",
+            value=friction.coefficient,
+            allowed="Friction(coefficient=…, poisson_ratio=…), or laws made by a scene",
+        )
+    return ratios

@@ -1,0 +1,169 @@
+"""Flow over a face in one plane, ∇·(T/(12 η) ∇P) = 0, between two of its edges.
+
+Linear elements on triangles with a transmissivity each, along x and along y. They let too much
+through, and converge with the square of the size of the triangles. Their matrix is that of a
+network of conductances between the nodes of each triangle, so that flows balance at every node.
+
+Theory: docs/theory.md, section 16.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from support.arrays import Array, Flags, Indices
+from support.errors import InputError, NotConverged
+from support.network import Network
+from support.network_flow import NetworkFlow, network_flow
+
+_SAME = 1e-6
+"""Distance of places that count as one, over the mean side of the triangles."""
+_LEAST = 1e-9
+"""Transmissivity of a triangle along the axis on which it is closed, over that along the other."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FaceFlow:
+    """The flow over a face whose inlet has the pressure 1 and whose outlet has 0.
+
+    Args:
+        total: Flow from inlet to outlet; times ΔP/(12 η) it is the flow rate [mm³]. 0 where no open
+            triangles join the two.
+        pressure: Pressures at the corners of the triangles, NaN where none of both reaches, shape
+            (n, 3).
+        leaving: What of it leaves the face from each triangle, shape (n,) [mm³].
+        imbalance: Sum of the absolute differences of what enters and what leaves over all nodes,
+            over the total.
+    """
+
+    total: float
+    pressure: Array
+    leaving: Array
+    imbalance: float = 0.0
+
+
+class TriangleFace:
+    """Triangles of a face and the nodes on its two edges.
+
+    Args:
+        corners: Corners of the triangles, shape (n, 3, 2) [mm].
+        inlet: Places of the nodes on the inlet, shape (k, 2) [mm]; those beyond the face are left
+            out.
+        outlet: Places of the nodes on the outlet [mm].
+
+    Attributes:
+        corners: Corners of the triangles.
+
+    Raises:
+        InputError: When no node of the face lies on one of them, or one lies on both.
+    """
+
+    def __init__(self, corners: Array, inlet: Array, outlet: Array) -> None:
+        self.corners = corners
+        edges = np.roll(corners, -1, axis=1) - corners
+        near = _SAME * float(np.linalg.norm(edges, axis=2).mean())
+        places = corners.reshape(-1, 2)
+        _, first, node = np.unique(
+            np.rint(places / near).astype(np.int64), axis=0, return_index=True, return_inverse=True
+        )
+        nodes = places[first]
+        ends = [_near(nodes, one, 1e3 * near) for one in (inlet, outlet)]
+        for name, on_edge in zip(("inlet", "outlet"), ends, strict=True):
+            if not on_edge.any():
+                raise InputError(f"the {name} has no edge in common with the contact face")
+        if (ends[0] & ends[1]).any():
+            raise InputError("inlet and outlet touch each other on the contact face")
+        # all nodes on an edge are one terminal of a network
+        self._count = count = len(nodes)
+        name_of = np.select(ends, [count, count + 1], np.arange(count))
+        self._node = name_of[node.reshape(-1, 3)]
+        # gradients of the three shape functions, turned sides over twice the area
+        opposite = np.roll(edges, -1, axis=1)
+        twice = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+        self._area = 0.5 * np.abs(twice)
+        turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
+        self._gradient = turned / twice[:, None, None]
+
+    def flow(self, transmissivity: Array) -> FaceFlow:
+        """Solve for the flow over the face.
+
+        Args:
+            transmissivity: T of the triangles along x and y, 0 where closed, shape (n, 2) [mm³].
+
+        Raises:
+            NotConverged: When what enters and leaves the nodes does not balance.
+        """
+        largest = transmissivity.max(axis=1)
+        is_open = largest > 0.0
+        part = np.maximum(transmissivity, _LEAST * largest[:, None])[is_open]
+        whole = self._network(part, is_open)
+        if whole.percolates:
+            resolved = np.minimum(1.0, self._limits(largest, is_open) / largest[is_open])
+            whole = self._network(part * resolved[:, None], is_open)
+        found = self._solved(whole)
+        pressure = np.full(self._node.shape, np.nan)
+        pressure[is_open] = found.potential[self._node[is_open]]
+        return FaceFlow(
+            total=found.total,
+            pressure=pressure,
+            leaving=self._leaving(whole, found, is_open),
+            imbalance=found.imbalance,
+        )
+
+    def _leaving(self, network: Network, found: NetworkFlow, is_open: Flags) -> Array:
+        """Return what leaves the face from each triangle, shape (n,) [mm³]."""
+        tail, head = self._links(is_open)
+        of = np.repeat(np.flatnonzero(is_open)[:, None], 3, axis=1)[tail != head]
+        into = (network.head == network.outlet).astype(float) - (network.tail == network.outlet)
+        return np.asarray(np.bincount(of, into * found.flow, len(is_open)), float)
+
+    def _solved(self, network: Network) -> NetworkFlow:
+        try:
+            return network_flow(network, limited=True)
+        except NotConverged as error:
+            raise NotConverged(
+                "the flow over the contact face",
+                reason=error.reason,
+                iterations=error.iterations,
+                remedy="take a finer mesh of the face, whose transmissivities differ too much",
+            ) from None
+
+    def _links(self, is_open: Flags) -> tuple[Indices, Indices]:
+        """Return the nodes at both ends of the sides of open triangles, shape (m, 3) each."""
+        node = self._node[is_open]
+        return node, np.roll(node, -1, axis=1)
+
+    def _network(self, transmissivity: Array, is_open: Flags) -> Network:
+        """Return the network that the elements are, with conductances of either sign."""
+        tail, head = self._links(is_open)
+        gradient = self._gradient[is_open]
+        weighted = gradient * (self._area[is_open, None] * transmissivity)[:, None, :]
+        conductance = -np.einsum("nik,nik->ni", weighted, np.roll(gradient, -1, axis=1))
+        apart = tail != head  # two nodes on an edge are one terminal
+        return Network(self._count, tail[apart], head[apart], conductance[apart])
+
+    def _limits(self, largest: Array, is_open: Flags) -> Array:
+        """Return the transmissivities of open triangles that are resolved, shape (m,) [mm³]."""
+        ends = np.sort(np.stack(self._links(is_open), axis=-1).reshape(-1, 2), axis=1)
+        values = np.repeat(largest[is_open], 3)
+        order = np.lexsort((-values, ends[:, 1], ends[:, 0]))
+        ends, values = ends[order], values[order]
+        first = np.append(True, (np.diff(ends, axis=0) != 0).any(axis=1))  # the largest of a side
+        first &= ends[:, 0] != ends[:, 1]
+        network = Network(self._count, ends[first, 0], ends[first, 1], values[first])
+        reached = network.joined[network.tail] == network.joined[network.inlet]
+        limits = np.full(self._count + 2, np.inf)
+        joined = network.joined == network.joined[network.inlet]
+        limits[joined] = network.only(reached).limits[joined]
+        return np.asarray(limits[self._node[is_open]].min(axis=1))
+
+
+def _near(nodes: Array, places: Array, distance: float) -> Flags:
+    """Return which nodes lie at one of some places, shape (n,)."""
+    found = np.zeros(len(nodes), bool)
+    if len(places):
+        found |= np.isfinite(cKDTree(places).query(nodes, distance_upper_bound=distance)[0])
+    return found

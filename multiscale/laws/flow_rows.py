@@ -1,0 +1,226 @@
+"""Rows of transmissivities: flows through the gaps of samples, or of the patches of a surface.
+
+Each row is solved on the cells of the surface and on half as many a side, whose difference is the
+error of the grid.
+
+Theory: docs/theory.md, section 16.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from geometry import Control, PatchGrid
+from micro import HalfSpaceModel
+from multiscale.gap_flows import flow_solver, solved_gap_flow
+from multiscale.laws.transmissivity import Transmissivity
+from support.arrays import Array
+from support.collective import shared
+
+_ROWS = 25
+"""Separations from first touch to 0 that are solved first; those after the first that is closed are
+left out."""
+_STEEP, _FINEST, _PASSES = 0.85, 2e-3, 6
+"""Rows are added half-way between two whose hydraulic gaps have a smaller ratio, until they are as
+near as this part of the separation at first touch, in so many passes at most."""
+_PATCH_ROWS = 17
+"""Approaches of a whole surface, from first touch to the largest load."""
+_FEWEST_CELLS = 16
+"""Cells along a side below which half of them are not tried."""
+
+
+class _Rows(NamedTuple):
+    """What n samples let through at m separations that fall.
+
+    Attributes:
+        separation: The separations, shape (m,) [mm].
+        fine: T along x and y on the cells, shape (n, m, 2) [mm³]; 0 beyond the first closed row.
+        coarse: The same on half as many cells a side.
+        pressure: Mean pressures, shape (n, m) [MPa]; NaN beyond the first closed row.
+    """
+
+    separation: Array
+    fine: Array
+    coarse: Array
+    pressure: Array
+
+    def joined(self, others: _Rows) -> _Rows:
+        """Return these rows and others in one order."""
+        order = np.argsort(-np.append(self.separation, others.separation), kind="stable")
+        parts = zip(self, others, (0, 1, 1, 1), strict=True)
+        return _Rows(*(np.concatenate((a, b), k).take(order, k) for a, b, k in parts))
+
+
+def sample_transmissivity(
+    models: Sequence[HalfSpaceModel], pressure_at: Callable[[Array], Array], comm: Any = None
+) -> Transmissivity:
+    """Tabulate the transmissivity of periodic samples, the mean of them at equal separations.
+
+    Args:
+        models: The periodic models of the samples, which count by their areas.
+        pressure_at: Mean pressures of their law at separations, [mm] to [MPa].
+        comm: MPI communicator, whose ranks share the samples; None for this process alone.
+
+    Returns:
+        The transmissivity, the same on every rank.
+
+    Raises:
+        NotConverged: When a contact problem or a flow cannot be solved.
+
+    Note:
+        Collective.
+    """
+    flow_solver(max(model.surface.heights.size for model in models))  # PETSc starts on all ranks
+    touch = max(_separation(model, model.first_touch) for model in models)
+    areas = np.array([model.surface.area for model in models])
+    shares = areas / areas.sum()
+
+    def means(values: Array) -> Array:
+        return np.asarray(np.tensordot(shares, values, 1))
+
+    rows = _solved(models, touch * np.linspace(1.0, 0.0, _ROWS) ** 2, comm)
+    for _ in range(_PASSES):
+        gap = np.cbrt(means(rows.fine))
+        steep = (gap[1:] < _STEEP * gap[:-1]).any(axis=1)
+        steep &= -np.diff(rows.separation) > _FINEST * touch
+        if not steep.any():
+            break
+        middles = 0.5 * (rows.separation[1:] + rows.separation[:-1])[steep]
+        rows = rows.joined(_solved(models, middles, comm))
+    fine, coarse = means(rows.fine), means(rows.coarse)
+    scatter = _scatter(rows, shares, pressure_at(rows.separation))
+    is_open = np.flatnonzero(np.maximum(fine, coarse).any(axis=1))
+    kept = slice(int(is_open[-1]) + 1, None, -1)  # with one closed row
+    return Transmissivity(
+        separation=rows.separation[kept].copy(),
+        hydraulic_gap=np.cbrt(fine[kept]),
+        on_half=np.cbrt(coarse[kept]),
+        scatter=scatter[kept],
+    )
+
+
+def _scatter(rows: _Rows, shares: Array, pressure: Array) -> Array:
+    """Return standard deviations of T among samples at mean pressures, shape (m, 2) [mm³].
+
+    Args:
+        rows: The rows of the samples.
+        shares: Shares of the samples in the area of all, shape (n,).
+        pressure: Mean pressures of the rows, rising, shape (m,) [MPa].
+    """
+    if len(shares) == 1:
+        return np.zeros((len(pressure), 2))
+    each = rows.fine.copy()  # at first touch, where pressures do not tell the separation
+    loaded = pressure > 0.0
+    for one, found, known in zip(each, rows.fine, rows.pressure, strict=True):
+        some = ~np.isnan(known)
+        some[: max(int((known == 0.0).sum()) - 1, 0)] = False
+        for axis, gap in enumerate(np.cbrt(found[some]).T):
+            one[loaded, axis] = np.interp(pressure[loaded], known[some], gap) ** 3
+    apart = (each - np.tensordot(shares, each, 1)) ** 2
+    return np.asarray(np.sqrt(np.tensordot(shares, apart, 1) / (1.0 - shares @ shares)))
+
+
+def _half(grid: tuple[int, int]) -> tuple[int, int]:
+    """Return half of the cells along both sides where that leaves enough."""
+    return grid if min(grid) < _FEWEST_CELLS else (grid[0] // 2, grid[1] // 2)
+
+
+def _separation(model: HalfSpaceModel, approach: float) -> float:
+    """Return the mean separation of a periodic sample at an approach [mm]."""
+    return model.reference_height - model.surface.mean_height - approach
+
+
+def _solved(models: Sequence[HalfSpaceModel], separations: Array, comm: Any) -> _Rows:
+    """Return rows of periodic samples at separations that fall; collective."""
+    grids = [grid for model in models for grid in (model.surface.grid, _half(model.surface.grid))]
+    own = [model for model in models for _ in (0, 1)]
+    found = shared(comm, len(grids), lambda k: _of_sample(own[k], grids[k], separations))
+    each = np.array(found)
+    return _Rows(separations, each[::2, :, :2], each[1::2, :, :2], each[::2, :, 2])
+
+
+def _of_sample(model: HalfSpaceModel, grid: tuple[int, int], separations: Array) -> Array:
+    """Return T along x and y [mm³] and the mean pressure [MPa] at separations, shape (m, 3)."""
+    if grid != model.surface.grid:
+        model = model.resampled(grid)
+    found, start = np.zeros((len(separations), 3)), None
+    found[:, 2] = np.nan
+    for row, separation in enumerate(separations):
+        if separation == 0.0:  # full contact
+            break
+        approach, found[row, 2] = _separation(model, 0.0) - float(separation), 0.0
+        if approach <= model.first_touch:
+            gap = separation + model.surface.mean_height - model.surface.heights
+            gap = np.maximum(gap, 0.0)
+        else:
+            state = model.press(Control(approach=approach), start=start)
+            start, gap, found[row, 2] = state.guess, state.open_gap, state.mean_pressure
+        for axis, direction in enumerate("xy"):
+            flow = solved_gap_flow(gap, model.surface.lengths, direction, periodic=True)
+            found[row, axis] = flow.transmissivity
+        if not found[row, :2].any():
+            break
+    return found
+
+
+def patch_transmissivities(
+    models: Sequence[HalfSpaceModel],
+    patches: PatchGrid,
+    approaches: tuple[float, float],
+    tilt: tuple[float, float] | None,
+    comm: Any = None,
+) -> list[Transmissivity]:
+    """Tabulate the transmissivities of the patches of one surface that is pressed as a whole.
+
+    The sides of a patch along the flow are walls.
+
+    Args:
+        models: The model of the whole surface on its body, and that on half as many cells a side.
+        patches: The partition.
+        approaches: First and last approach of the plane [mm].
+        tilt: Slopes of the plane; None lets it turn.
+        comm: MPI communicator, whose ranks share the rows; None for this process alone.
+
+    Raises:
+        InputError: When a patch has less than two cells along a side.
+        NotConverged: When a contact problem or a flow cannot be solved.
+
+    Note:
+        Collective.
+    """
+    first, last = approaches
+    rows = np.linspace(first, last, _PATCH_ROWS if last > first else 1)
+    tasks = [(model, approach) for model in models for approach in rows.tolist()]
+
+    def solve(task: int) -> Array:
+        model, approach = tasks[task]
+        gap = model.press(Control(approach=approach, tilt=tilt)).open_gap
+        return np.array([_of_patch(gap, patches, index) for index in range(patches.count)])
+
+    found = np.array(shared(comm, len(tasks), solve)).reshape(2, len(rows), patches.count, 3)
+    return [_patch_table(*found[:, :, index]) for index in range(patches.count)]
+
+
+def _of_patch(gap: Array, patches: PatchGrid, index: int) -> tuple[float, float, float]:
+    """Return mean gap [mm] and T along x and y [mm³] of a patch in a map of gaps."""
+    parts = []
+    for cells, place, count in zip(gap.shape, patches.unravel(index), patches.grid, strict=True):
+        parts.append(slice(place * cells // count, (place + 1) * cells // count))
+    own = gap[parts[0], parts[1]]
+    flows = [solved_gap_flow(own, patches.size, way, periodic=False) for way in "xy"]
+    return float(own.mean()), *(flow.transmissivity for flow in flows)  # type: ignore[return-value]
+
+
+def _patch_table(fine: Array, coarse: Array) -> Transmissivity:
+    """Return the table of rows of separation and T along x and y, shape (m, 3), as gaps fall."""
+    rising = fine[::-1, 0] > np.append(-np.inf, np.maximum.accumulate(fine[::-1, 0])[:-1])
+    gaps = np.cbrt(fine[::-1, 1:])[rising]
+    return Transmissivity(
+        separation=fine[::-1, 0][rising],
+        hydraulic_gap=gaps,
+        on_half=np.cbrt(coarse[::-1, 1:])[rising],
+        scatter=np.zeros_like(gaps),
+    )

@@ -1,0 +1,59 @@
+"""The notebooks are scripts that run, each asserts a number; a kernel executes one as it stands."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "demos" / "notebooks"
+SCRIPTS = sorted(FOLDER.glob("*.py"))
+QUICK = {"joint_stiffness"}
+"""Notebooks that take two seconds; the others are among the long tests."""
+
+
+@pytest.mark.parametrize(
+    "script",
+    [
+        pytest.param(one, marks=[] if one.stem in QUICK else pytest.mark.long, id=one.stem)
+        for one in SCRIPTS
+    ],
+)
+def test_a_notebook_runs_as_a_script(script):
+    done = subprocess.run(
+        [sys.executable, script.name],
+        cwd=FOLDER,  # where a kernel starts
+        env={**os.environ, "MPLBACKEND": "agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
+def test_a_notebook_is_a_narrative_of_the_site(script):
+    text = script.read_text(encoding="utf-8")
+    assert text.startswith("# %% [markdown]\n# # ")
+    assert "\nassert " in text and len(text.splitlines()) <= 130
+    assert f"(../demos/notebooks/{script.name})" in (ROOT / "docs" / "demos.md").read_text("utf-8")
+    assert f"\n/demos/notebooks/{script.stem}\n" in (ROOT / "docs" / "index.md").read_text("utf-8")
+
+
+@pytest.mark.long
+def test_a_kernel_shows_tables_progress_and_pictures():
+    pytest.importorskip("ipykernel")
+    nbclient, jupytext = pytest.importorskip("nbclient"), pytest.importorskip("jupytext")
+    notebook = jupytext.read(FOLDER / "my_map.py")
+    last, place = notebook.cells[-1], {"metadata": {"path": FOLDER}}
+    last.source += "\nfrom mpi4py import MPI\nMPI.COMM_WORLD.size, MPI.Is_initialized()"
+    nbclient.NotebookClient(notebook, timeout=300, resources=place).execute()
+    shown = [one for cell in notebook.cells for one in cell.get("outputs", ())]
+    pages = [one.data["text/html"] for one in shown if "text/html" in one.get("data", {})]
+    assert any("surface.filter.short" in page for page in pages)
+    assert any("load step 4/4" in page for page in pages)
+    assert any("History of 4 load steps" in page and "0.5899 ± 0.0031" in page for page in pages)
+    assert any("image/png" in one.get("data", {}) for one in shown)
+    assert shown[-1].data["text/plain"] == "(1, True)"

@@ -1,0 +1,187 @@
+"""Sliders: return mapping against small steps of many springs, tangents, energy, loops, turns."""
+
+import numpy as np
+import pytest
+
+from geometry.sliders import Sliders
+from geometry.spring_bed import springs_of
+
+MU, RATIO, TOUCH, END = 0.37, 1.23, 0.4e-3, 7e-3
+
+
+def pressure(closure):
+    return 611.0 * np.maximum(closure - TOUCH, 0.0) ** 1.7
+
+
+def rate(closure):
+    return 1.7 * 611.0 * np.maximum(closure - TOUCH, 0.0) ** 0.7
+
+
+@pytest.fixture(scope="module")
+def sliders():
+    bed = springs_of(pressure, rate, TOUCH, END)
+    return Sliders([bed], np.array([RATIO]), np.zeros(1, int), MU)
+
+
+def step(sliders, before, closure, slip):
+    c = np.array([closure])
+    return sliders.respond(before, c, np.array([slip], float), pressure(c), rate(c))
+
+
+def walk(sliders, path):
+    """Responses along a path of (closure, slip x, slip y)."""
+    found, state = [], sliders.at_rest
+    for closure, *slip in path:
+        found.append(step(sliders, state, closure, slip))
+        state = found[-1].after
+    return found
+
+
+def fine_springs(path, count=4000, parts=40):
+    """Slow oracle: many springs, each with its slider, in small steps along straight ways."""
+    touch = TOUCH + (END - TOUCH) * (np.arange(count) + 0.5) / count
+    edges = TOUCH + (END - TOUCH) * np.arange(count + 1) / count
+    k = np.diff(rate(edges))
+    stress, at, forces = np.zeros((count, 2)), np.array([TOUCH, 0.0, 0.0]), []
+    for target in np.asarray(path, float):
+        for share in np.arange(1, parts + 1) / parts:
+            now = at + share * (target - at)
+            before = at + (share - 1.0 / parts) * (target - at)
+            stress += (k * (now[0] > touch))[:, None] / RATIO * (now[1:] - before[1:])
+            bound = MU * k * np.maximum(now[0] - touch, 0.0)
+            size = np.hypot(*stress.T)
+            stress *= np.where(size > bound, bound / np.maximum(size, 1e-300), 1.0)[:, None]
+        at = target
+        forces.append(stress.sum(axis=0))
+    return np.array(forces)
+
+
+def scaled(*points):
+    """Closures and slips, the latter in parts of that of full sliding at the largest closure."""
+    return [(c * END, x * MU * RATIO * END, y * MU * RATIO * END) for c, x, y in points]
+
+
+PATHS = {
+    "shear": scaled((0.9, 0, 0), (0.9, 0.2, 0), (0.9, 0.5, 0), (0.9, 0.8, 0)),
+    "back": scaled((0.9, 0, 0), (0.9, 0.6, 0), (0.9, 0.1, 0), (0.9, -0.5, 0), (0.9, 0.6, 0)),
+    "turn": scaled((0.9, 0, 0), *((0.9, 0.45, 0.045 * k) for k in range(11))),
+    "unload": scaled(
+        (0.9, 0, 0), (0.9, 0.3, 0), (0.6, 0.3, 0), (0.4, 0.3, 0), (0.9, 0.3, 0), (0.9, 0.4, 0)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PATHS)
+def test_few_springs_in_large_steps_are_many_in_small_ones(sliders, name):
+    found = np.array([each.stress[0] for each in walk(sliders, PATHS[name])])
+    exact = fine_springs(PATHS[name])
+    # 25 springs: 0.2 % of the bound each way; a turn in ten steps: backward Euler's first order
+    tolerance = (0.03 if name == "turn" else 0.006) * MU * float(pressure(0.9 * END))
+    assert found == pytest.approx(exact, abs=tolerance)
+
+
+def test_full_sliding_is_the_coefficient_times_the_pressure(sliders):
+    *_, last = walk(sliders, scaled((0.8, 0, 0), (0.8, 3.0, 4.0)))
+    bound = MU * float(pressure(0.8 * END))
+    assert last.stress[0] == pytest.approx([0.6 * bound, 0.8 * bound], rel=1e-13)
+    assert last.stuck[0] == 0.0
+    assert last.stick_closure[0] == pytest.approx(TOUCH)
+
+
+def test_sticking_springs_are_as_stiff_as_the_law_over_mindlins_ratio(sliders):
+    first, last = walk(sliders, scaled((0.8, 0, 0), (0.8, 1e-9, 0)))
+    law = float(rate(0.8 * END)) / RATIO
+    assert last.by_slip[0] == pytest.approx(law * np.eye(2), rel=5e-3)  # lines between the nodes
+    assert last.stuck[0] == pytest.approx(law, rel=5e-3)
+    assert first.stick_closure[0] == pytest.approx(0.8 * END, rel=1e-9)
+
+
+def test_what_sticks_is_the_law_at_the_lower_load(sliders):
+    """Ciavarella and Jäger: cells stick that would be in contact at the closure c − s/(μ r)."""
+    slip = 0.3 * MU * RATIO * END
+    *_, last = walk(sliders, [(0.9 * END, 0, 0), (0.9 * END, slip, 0)])
+    groups = END / len(springs_of(pressure, rate, TOUCH, END))
+    assert last.stick_closure[0] == pytest.approx(0.6 * END, abs=2.0 * groups)
+
+
+def test_tangents_are_the_derivatives():
+    bed = springs_of(pressure, rate, TOUCH, END)
+    sliders = Sliders([bed] * 50, np.full(50, RATIO), np.arange(50), MU)
+    rng = np.random.default_rng(3)
+    closures, slips = END * rng.random((2, 50)), MU * END * rng.normal(size=(2, 50, 2))
+
+    def at(before, closure, slip):
+        return sliders.respond(before, closure, slip, pressure(closure), rate(closure))
+
+    before = at(sliders.at_rest, closures[0], slips[0]).after
+    found, width = at(before, closures[1], slips[1]), 1e-8 * END
+    for k, axis in enumerate(np.eye(2)):
+        ahead, behind = (at(before, closures[1], slips[1] + w * axis) for w in (width, -width))
+        change = (ahead.stress - behind.stress) / (2.0 * width)
+        scale = float(rate(END)) / RATIO
+        assert found.by_slip[:, :, k] == pytest.approx(change, abs=1e-5 * scale)
+    ahead, behind = (at(before, closures[1] + w, slips[1]) for w in (width, -width))
+    change = (ahead.stress - behind.stress) / (2.0 * width)
+    assert found.by_closure == pytest.approx(change, abs=1e-5 * float(rate(END)))
+    assert np.abs(found.by_closure).max() > 0.1 * MU * float(rate(END))
+
+
+def test_nothing_gains_energy_on_any_path(sliders):
+    rng = np.random.default_rng(8)
+    path = np.column_stack([END * rng.random(400), MU * END * rng.normal(size=(400, 2))])
+    lost = np.array([each.lost[0] for each in walk(sliders, path)])
+    assert lost.min() >= 0.0
+    assert np.count_nonzero(lost) > 390
+
+
+def test_a_loop_closes_and_loses_its_area(sliders):
+    amplitude = 0.5 * MU * RATIO * END
+    parts = np.concatenate([np.linspace(1, -1, 81), np.linspace(-1, 1, 81)[1:]])
+    path = [(0.9 * END, 0, 0), *((0.9 * END, amplitude * part, 0) for part in parts)]
+    found = walk(sliders, path)[1:]
+    assert found[-1].stress == pytest.approx(found[0].stress, rel=1e-12)
+    assert found[80].stress == pytest.approx(-found[0].stress, rel=1e-12, abs=1e-12)  # Masing
+    force = np.array([each.stress[0, 0] for each in found])
+    area = float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(amplitude * parts)))
+    # the trapezoidal rule cuts corners, and small steps sum up their own slips
+    assert sum(float(each.lost[0]) for each in found[1:]) == pytest.approx(area, rel=3e-3)
+
+
+def test_the_way_along_a_line_does_not_count(sliders):
+    slip = 0.6 * MU * RATIO * END
+    pressed = (0.8 * END, 0, 0)
+    *_, once = walk(sliders, [pressed, (0.8 * END, slip, 0)])
+    *_, often = walk(sliders, [pressed, *((0.8 * END, slip * s, 0) for s in (0.1, 0.45, 0.7, 1))])
+    assert often.stress == pytest.approx(once.stress, rel=1e-13)
+    # sticking under a rising load, the path does not count: springs that touch anew are unsheared
+    *_, back = walk(sliders, [pressed, (0.8 * END, 1e-3 * slip, 0), pressed])
+    assert np.abs(back.stress).max() <= 1e-2 * MU * float(pressure(0.8 * END))
+
+
+def test_springs_that_part_lose_their_energy(sliders):
+    held = (0.8 * END, 0.2 * MU * RATIO * END, 0)
+    pressed, sheared, parted = walk(sliders, [(0.8 * END, 0, 0), held, (0.0, *held[1:])])
+    assert parted.stress == pytest.approx(np.zeros((1, 2)))
+    work, before = 0.0, pressed.after
+    for share in (np.arange(200) + 1.0) / 200.0:  # work of the shear until then
+        now = step(sliders, before, held[0], (share * held[1], 0.0))
+        work += float(now.stress[0, 0]) * held[1] / 200.0
+        before = now.after
+    # all of it is lost at the end: sliding first, and then what the springs stored
+    assert float(sheared.lost[0] + parted.lost[0]) == pytest.approx(work, rel=0.02)
+
+
+def test_sliders_go_on_under_a_law_that_goes_further(sliders):
+    longer = Sliders(
+        [springs_of(pressure, rate, TOUCH, 1.6 * END)], np.array([RATIO]), np.zeros(1, int), MU
+    )
+    path = scaled((0.9, 0, 0), (0.9, 0.4, 0.1), (0.8, 0.2, 0.3))
+    last, same = walk(sliders, path)[-1], walk(longer, path)[-1]
+    moved = longer.following(sliders, last.after)
+    bound = MU * float(pressure(0.9 * END))
+    assert moved.stress.sum(axis=1) == pytest.approx(
+        last.after.stress.sum(axis=1), abs=0.01 * bound
+    )
+    assert moved.stress.sum(axis=1) == pytest.approx(
+        same.after.stress.sum(axis=1), abs=0.01 * bound
+    )

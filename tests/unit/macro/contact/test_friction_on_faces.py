@@ -1,0 +1,248 @@
+"""Friction of laws on faces: the law's own shear, balance, memory of load steps, refusals."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from helpers.user_problems import (
+    HEXAHEDRA,
+    LAWS,
+    PATCHES,
+    TOP,
+    PowerLaw,
+    RangedLaw,
+    box,
+    clamped,
+    elastic,
+    marked,
+)
+from petsc4py import PETSc
+
+from geometry.materials import mindlin_ratio
+from geometry.rigid_plane import Control, RigidPlane
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction
+from macro import ContactProblem, Interface, LawsAtPoints, compat
+from support.errors import InputError, NotConverged
+
+MU, NU = 0.41, 0.2
+FRICTION = Friction(coefficient=MU, poisson_ratio=NU)
+
+
+LAW = RangedLaw(3e3)
+RANGED = [RangedLaw(law.k, law.touch) for law in LAWS]
+
+
+@pytest.fixture(scope="module")
+def body():
+    mesh = box(cells=(3, 3, 2), cell=HEXAHEDRA)
+    return SimpleNamespace(mesh=mesh, tags=marked(mesh), space=compat.vector_space(mesh, 1))
+
+
+def problem_on(body, laws=LAW, scale=1.0, **options):
+    u = fem.Function(body.space)
+    rough = Interface(
+        body.space, body.tags, TOP, laws=laws,
+        **({"indenter": Control(force=1.7), "friction": FRICTION} | options),
+    )  # fmt: skip
+    residual = scale * elastic(u)
+    return rough, ContactProblem(residual, u, [clamped(body.space, body.tags)], rough)
+
+
+def shifted(x, y, **other):
+    return Control(**(other or {"force": 1.7}), shear=ShearControl(shift=(x, y)))
+
+
+def sheared(x, y, **other):
+    return Control(**(other or {"force": 1.7}), shear=ShearControl(force=(x, y)))
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+def test_a_stiff_body_shears_as_the_law_does(body, mode):
+    rough, problem = problem_on(body, scale=1e7, mode=mode)
+    problem.solve()
+    closure = rough.patch_closure[0]
+    for part in (0.2, 0.7, 1.4):
+        slip = part * MU * mindlin_ratio(NU) * closure
+        rough.indenter = shifted(0.6 * slip, -0.8 * slip)
+        problem.solve()
+        lower = LAW.pressure(max(closure * (1.0 - part), 0.0))
+        exact = MU * (1.7 - float(lower))  # on 1 mm²
+        # springs by error, 0.2 % of the bound
+        assert rough.shear_force == pytest.approx([0.6 * exact, -0.8 * exact], abs=4e-3 * MU * 1.7)
+    assert np.hypot(*rough.shear_force) == pytest.approx(MU * rough.force, rel=1e-7)
+    assert rough.slip_area == pytest.approx(rough.area, rel=1e-7)
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+@pytest.mark.parametrize("laws", [LAW, RANGED])
+def test_forces_are_in_balance_and_no_step_gains_energy(body, mode, laws):
+    patches = {"patches": PATCHES} if laws is RANGED else {}
+    rough, problem = problem_on(body, laws, mode=mode, **patches)
+    lost = [0.0]
+    for control in (
+        Control(force=1.7),
+        shifted(3e-4, 1e-4),
+        shifted(2e-3, -1e-3),
+        shifted(-4e-3, 3e-3, force=0.9),
+        sheared(0.1, 0.2, force=1.1, tilt=None),
+        shifted(0.0, 0.0, approach=3e-3),
+    ):
+        rough.indenter = control
+        problem.solve()
+        along = np.array([*rough.shear_force, -rough.force])
+        assert problem.reaction() == pytest.approx(-along, abs=1e-8 * rough.force)
+        stress = np.hypot(*rough.shear_stress.T)
+        assert np.all(stress <= (1.0 + 1e-9) * MU * rough.pressure)
+        if control.shear and control.shear.force:
+            assert rough.shear_force == pytest.approx(control.shear.force, abs=1e-10)
+        lost.append(rough.dissipated)
+    assert np.all(np.diff(lost) >= 0.0)
+    assert lost[-1] > 0.0
+
+
+@pytest.mark.parametrize("mode", ["pointwise", "patchwise"])
+@pytest.mark.parametrize(
+    "control",
+    [
+        shifted(7e-4, 3e-4, approach=4e-3),
+        shifted(7e-4, 3e-4, force=1.7, tilt=None),
+        sheared(0.21, 0.05, force=1.7, tilt=None),
+    ],
+)
+def test_tangents_are_the_derivatives_of_residuals(body, mode, control):
+    rough, problem = problem_on(body, RANGED, mode=mode, patches=PATCHES)
+    problem.solve()
+    rough.indenter = control
+    vector = compat.petsc_vector(problem.displacement)
+    rng = np.random.default_rng(5)
+    vector.array[:] += 1e-5 * rng.normal(size=vector.local_size)
+    direction, product = vector.duplicate(), vector.duplicate()
+    direction.array[:] = rng.normal(size=vector.local_size)
+
+    def residual(part):
+        moved, result = vector.copy(), vector.duplicate()
+        moved.axpy(part, direction)
+        result.set(0.0)
+        rough.add_residual(moved, result)
+        return result.array.copy()
+
+    width = 1e-8
+    change = (residual(width) - residual(-width)) / (2.0 * width)
+    product.set(0.0)
+    rough.move_tangent(vector)
+    rough.add_product(direction, product)
+    # differences of forces that a shift is found for have its tolerance besides
+    assert product.array == pytest.approx(change, abs=2e-5 * np.abs(change).max())
+    if rough.assembles:
+        matrix = compat.assemble_matrix(compat.compile_form(_stiffness(body)), [])
+        alone = matrix.copy()
+        rough.constrain([])
+        rough.add_tangent(vector, matrix)
+        matrix.axpy(-1.0, alone)
+        rough.move_tangent(vector)
+        product.set(0.0)
+        rough.add_product(direction, product)
+        assert (matrix * direction).array == pytest.approx(
+            product.array, abs=1e-12 * np.abs(product.array).max()
+        )
+        assert (matrix - PETSc.Mat().createTranspose(matrix).convert("aij")).norm() > 0.01
+
+
+def _stiffness(body):
+    u = fem.Function(body.space)
+    return ufl.derivative(elastic(u), u)
+
+
+def test_only_accepted_steps_move_the_sliders(body):
+    rough, problem = problem_on(body)
+    rough.indenter = shifted(1e-3, 0.0)
+    problem.solve()
+    force, before = rough.shear_force, rough.slip_record
+    for x in (5e-3, -2e-3):  # tried, and not accepted
+        rough.indenter = shifted(x, 1e-3)
+        rough.evaluate(problem.displacement)
+    with pytest.raises(NotConverged, match="SLIDES"):
+        rough.indenter = sheared(0.8, 0.0)
+        problem.solve()
+    assert np.array_equal(rough.slip_record.stress, before.stress)
+    rough.indenter = shifted(1e-3, 0.0)
+    problem.solve()  # nothing moves, and nothing is lost
+    assert rough.shear_force == pytest.approx(force, rel=1e-9)
+    assert rough.slip_record.stress == pytest.approx(before.stress, abs=1e-9 * force[0])
+    rough.indenter = shifted(-3e-3, 2e-3)
+    problem.solve()
+    there = rough.shear_force, rough.dissipated
+    rough.slip_record = before  # the step is taken back, and taken in another run
+    rough.indenter = shifted(1e-3, 0.0)
+    problem.solve()
+    other, again = problem_on(body)
+    other.slip_record = rough.slip_record
+    for interface, one in ((rough, problem), (other, again)):
+        interface.indenter = shifted(-3e-3, 2e-3)
+        one.solve()
+        assert interface.shear_force == pytest.approx(there[0], rel=1e-8)
+        assert interface.dissipated == pytest.approx(there[1], rel=1e-7)
+
+
+def test_beyond_a_law_nothing_is_accepted(body):
+    rough, problem = problem_on(body, RangedLaw(3e3, end=8e-3))
+    problem.solve()
+    before = rough.slip_record
+    rough.indenter = shifted(1e-3, 0.0, force=6.0)
+    with pytest.raises(NotConverged, match="LAW_RANGE"):
+        problem.solve()
+    assert np.array_equal(rough.slip_record.stress, before.stress)
+
+
+def test_the_plane_holds_what_expands_below_it(body):
+    """A pressed body that grows sideways is held by friction, and sheared towards its middle."""
+    rough, problem = problem_on(body, indenter=Control(force=1.7))
+    problem.solve()
+    x = rough.points[:, 0] - 0.5
+    assert np.corrcoef(x, rough.shear_stress[:, 0])[0, 1] < -0.5
+    assert rough.shear_force == pytest.approx([0.0, 0.0], abs=1e-6)
+
+
+def test_without_friction_tangents_stay_symmetric(body):
+    _, plain = problem_on(body, friction=None)
+    _, rubbed = problem_on(body)
+    assert plain._newton.snes.ksp.getType() == "cg"
+    assert rubbed._newton.snes.ksp.getType() == "gmres"
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        ({"friction": -0.1}, "greater than 0"),
+        ({"friction": 0.0}, "greater than 0"),
+        ({"friction": "0.3"}, "is no friction"),
+        ({"friction": True}, "is no friction"),
+        ({"friction": 0.3}, "do not know their ratio"),
+        ({"laws": PowerLaw(3e3)}, "needs the range of a law"),
+        ({"friction": None, "indenter": shifted(1e-3, 0.0)}, "without friction"),
+    ],
+)
+def test_misuse_is_refused_by_key(body, options, problem):
+    with pytest.raises(InputError) as error:
+        problem_on(body, **options)
+    assert problem in str(error.value)
+    assert error.value.key == "friction"
+
+
+def test_an_external_operator_with_friction_is_refused(body):
+    rough, _ = problem_on(body)
+    with pytest.raises(InputError, match="knows pressures alone") as error:
+        LawsAtPoints(rough, np.zeros((1, 1, 3)))
+    assert error.value.key == "friction"
+
+
+def test_a_plane_without_shear_does_not_slide(body):
+    rough, problem = problem_on(body, indenter=RigidPlane(approach=4e-3))
+    problem.solve()
+    assert rough.shift == pytest.approx([0.0, 0.0])
+    plain, _ = problem_on(body, friction=None)
+    with pytest.raises(InputError, match="has no friction"):
+        plain.slip_record  # noqa: B018

@@ -1,0 +1,113 @@
+"""What leaks over a face in a user's own problem: closed forms, directions, and what is refused."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from dolfinx import fem
+from dolfinx import mesh as dmesh
+from helpers.user_problems import HEXAHEDRA, PATCHES, TETRAHEDRA, TOP, PowerLaw, box, marked
+
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import RigidPlane
+from macro import Interface, compat
+from support.errors import InputError
+
+LENGTHS = (1.5, 1.0, 1.0)
+WATER = {"viscosity": 1e-9, "pressures": (0.4, 0.1)}
+T = 3e-9, 1e-9
+
+
+@dataclass(frozen=True)
+class LeakingLaw(PowerLaw):
+    """A law with a transmissivity of its own along x and y, to the closure's power."""
+
+    power_of_leak: float = 0.0
+
+    def transmissivities(self, closure):
+        along, across = (np.full_like(closure, one) for one in T)
+        return np.stack([along, across], axis=1) * (closure[:, None] / 1e-3) ** self.power_of_leak
+
+
+def side(mesh, axis, at):
+    return dmesh.locate_entities_boundary(mesh, 2, lambda x: np.isclose(x[axis], at))
+
+
+def interface(cell=TETRAHEDRA, law=None, plane=None, **options):
+    mesh = box(cells=(6, 4, 2), cell=cell, lengths=LENGTHS)
+    space = compat.vector_space(mesh, 1)
+    options = {"laws": law or LeakingLaw(1e3), "indenter": plane or RigidPlane(approach=1e-3)}
+    found = Interface(space, marked(mesh, LENGTHS), TOP, **options)
+    found.evaluate(fem.Function(space))
+    return mesh, found
+
+
+@pytest.mark.parametrize("cell", [TETRAHEDRA, HEXAHEDRA])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_uniform_gap_leaks_as_plates_and_its_pressure_is_a_plane(cell, axis):
+    mesh, found = interface(cell)
+    first, second = side(mesh, axis, 0.0), side(mesh, axis, LENGTHS[axis])
+    leak = found.leak(first, second, **WATER)
+    expected = T[axis] * LENGTHS[1 - axis] / LENGTHS[axis] * 0.3 / 12e-9
+    assert leak.rate == pytest.approx(expected, rel=1e-10)
+    assert leak.imbalance < 1e-10 and leak.percolates
+    points = leak.pressure.function_space.tabulate_dof_coordinates()
+    on_face = np.isclose(points[:, 2], 0.0)
+    plane = 0.4 - 0.3 * points[:, axis] / LENGTHS[axis]
+    np.testing.assert_allclose(leak.pressure.x.array[on_face], plane[on_face], atol=1e-12)
+    assert (leak.pressure.x.array[~on_face] == 0.0).all()
+    back = found.leak(second, first, **WATER)
+    assert back.rate == pytest.approx(expected, rel=1e-10)
+
+
+def test_a_wedge_leaks_as_its_parts_in_series():
+    """T = T₀ c³ of a closure that grows along the flow: ∫ dx/T across the face."""
+    law = LeakingLaw(1e3, power_of_leak=3.0)
+    plane = RigidPlane(approach=2e-3, tilt=(1e-3, 0.0))
+    mesh, found = interface(law=law, plane=plane)
+    leak = found.leak(side(mesh, 0, 0.0), side(mesh, 0, LENGTHS[0]), **WATER)
+    closures = 2.0 + np.array([-0.75, 0.75])
+    resistance = 0.5 * (closures[0] ** -2 - closures[1] ** -2)  # ∫ dc/c³, c in µm over mm
+    # six elements of one transmissivity each let too much through, with the square of their size
+    assert leak.rate == pytest.approx(T[0] / resistance * 0.3 / 12e-9, rel=0.03)
+
+
+def test_patches_leak_in_parallel_and_in_series():
+    """Patches of one law each, whose borders lie on those of the facets."""
+    laws = [LeakingLaw(1e3, power_of_leak=p) for p in (0.0, 3.0, 0.0, 3.0)]
+    mesh = box(cells=(4, 4, 2), cell=HEXAHEDRA)
+    space = compat.vector_space(mesh, 1)
+    plane = RigidPlane(approach=2e-3)
+    found = Interface(space, marked(mesh), TOP, laws=laws, patches=PATCHES, indenter=plane)
+    found.evaluate(fem.Function(space))
+    rows = found.leak(side(mesh, 0, 0.0), side(mesh, 0, 1.0), **WATER).rate
+    assert rows == pytest.approx(T[0] * 4.5 * 0.3 / 12e-9, rel=1e-9)  # 1 and 8 beside each other
+    columns = found.leak(side(mesh, 1, 0.0), side(mesh, 1, 1.0), **WATER).rate
+    assert columns == pytest.approx(T[1] / (0.5 + 0.5 / 8.0) * 0.3 / 12e-9, rel=1e-9)
+
+
+def test_what_drives_no_flow_is_refused():
+    mesh, found = interface()
+    ends = side(mesh, 0, 0.0), side(mesh, 0, LENGTHS[0])
+    for options, text in (
+        ({"viscosity": 0.0, "pressures": (1.0, 0.0)}, "viscosity = 0.0: must be a number greater"),
+        ({"viscosity": 1.0, "pressures": (1.0, 1.0)}, "pressures = .*drives no flow"),
+    ):
+        with pytest.raises(InputError, match=text):
+            found.leak(*ends, **options)
+    with pytest.raises(InputError, match="the outlet has no edge in common with the contact face"):
+        found.leak(ends[0], side(mesh, 2, -LENGTHS[2]), **WATER)
+    with pytest.raises(InputError, match="inlet and outlet touch each other"):
+        found.leak(ends[0], side(mesh, 1, 0.0), **WATER)
+    _, without = interface(law=PowerLaw(1e3))
+    with pytest.raises(InputError, match=r"the law knows no leak.*leak=True"):
+        without.leak(*ends, **WATER)
+    small = PatchGrid(grid=(1, 1), lengths=(0.3, 0.3))
+    space = found.space
+    part = Interface(
+        space, marked(mesh, LENGTHS), TOP, laws=[LeakingLaw(1e3)], patches=small,
+        indenter=RigidPlane(approach=1e-3),
+    )  # fmt: skip
+    part.evaluate(fem.Function(space))
+    with pytest.raises(InputError, match="a part of the contact face has no laws"):
+        part.leak(*ends, **WATER)
