@@ -92,7 +92,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
             "load.zero": "mean plane",
             "load.approach": -0.01,
         },
-        "`accuracy`": {"accuracy": 0.05},
+        "`accuracy`": {"accuracy": 0.4},
     },
     "Results": {
         '`output.contact = "all"` (spots, maps)': {"output.contact": "all"},

@@ -14,6 +14,8 @@ is in the cache takes no finite elements.
 
 import sys
 
-from support.packages import LazyPackage
+from support.packages import LazyPackage, load_wheels_mpi
+
+load_wheels_mpi()
 
 sys.modules[__name__].__class__ = LazyPackage

@@ -10,6 +10,7 @@ import os
 import platform
 import re
 import shutil
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,13 +27,16 @@ from multiscale.machine import cluster_nodes, cores_statement, detached_processe
 from support.collective import on_root
 from support.cores import node_cores
 from support.errors import InputError, PatchlawError
-from support.packages import optional_packages, removal, shadows
+from support.packages import load_wheels_mpi, optional_packages, removal, shadows
 
 _OLDEST = {
     "numpy": (1, 24), "scipy": (1, 10), "dolfinx": (0, 5), "petsc4py": (3, 18), "mpi4py": (3, 1),
     "h5py": (3, 7), "gmsh": (4, 8), "pydantic": (2, 7), "jinja2": (3, 1), "matplotlib": (3, 6),
 }  # fmt: skip
 """The oldest release of every package that patchlaw is tested with."""
+
+
+_REMEDY = "take Debian 12 or newer and run ./setup.sh, or pip install 'patchlaw[fenicsx]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +71,7 @@ def examine(comm: Any, checks: Mapping[str, Check]) -> Iterator[tuple[str, Check
     Note:
         Collective.
     """
+    load_wheels_mpi()
     for topic, check in checks.items():
         try:
             with optional_packages():
@@ -104,7 +109,7 @@ def packages(comm: Any, load: Callable[[str], Any] = import_module) -> CheckResu
     if not wrong:
         return CheckResult("ok", ", ".join(versions))
     state = "warning" if set(wrong) == {"matplotlib"} else "fail"  # it draws figures alone
-    return CheckResult(state, "; ".join(wrong.values()), "take Debian 12 or newer, run ./setup.sh")
+    return CheckResult(state, "; ".join(wrong.values()), _REMEDY)
 
 
 def petsc(comm: Any) -> CheckResult:
@@ -115,10 +120,14 @@ def petsc(comm: Any) -> CheckResult:
     """
     from petsc4py import PETSc
 
+    from macro.linear_solvers.options import has_hypre
+
     version = ".".join(map(str, PETSc.Sys.getVersion()))
     have = [name for name in ("mumps", "hypre", "ptscotch") if PETSc.Sys.hasExternalPackage(name)]
     bits = 8 * PETSc.IntType(0).itemsize
+    coarsened = "by hypre" if has_hypre() else "by PETSc's GAMG, as there is no hypre"
     text, remedy = f"{version} with {', '.join(have) or 'no package'}, {bits}-bit indices", ""
+    text = f"{text}; meshes that are no lattice coarsen {coarsened}"
     if PETSc.ScalarType(0).dtype.kind == "c":
         text = f"{version} computes with complex numbers"
         remedy = "take a PETSc of real numbers (Debian: python3-petsc4py-real)"
@@ -136,11 +145,18 @@ def launcher(comm: Any) -> CheckResult:
     from mpi4py import MPI
 
     library = MPI.Get_library_version().strip().partition(",")[0].splitlines()[0]
+    library = " ".join(library.replace("Version:", "").split())
     if detached := detached_processes():
         text = f"started as one of {detached[1]} processes, but each stands alone ({library})"
         remedy = f"start with the mpirun of {library}, or srun --mpi=pmix; see docs/hpc.md"
         return CheckResult("fail", text, remedy)
-    if not (command := shutil.which("mpirun")):
+    own = Path(sys.prefix, "bin", "mpirun")
+    command = shutil.which("mpirun")
+    if own.exists() and (command is None or not own.samefile(command)):
+        first = f"{command} comes first on PATH" if command else "it is not on PATH"
+        remedy = f"activate the environment, or start ranks with {own}"
+        return CheckResult("warning", f"{library} has an mpirun of its own, but {first}", remedy)
+    if not command:
         remedy = "for parallel runs: apt-get install mpi-default-bin"
         return CheckResult("warning", f"{library}, no mpirun on PATH", remedy)
     return CheckResult("ok", f"{library}, {command}")

@@ -22,13 +22,11 @@ def flow_solver(cells: int) -> Preconditioner:
     """
     if cells > MOST_FACTORISED:
         try:
-            from macro.linear_solvers.scalar_multigrid import (
-                has_scalar_multigrid,
-                scalar_multigrid,
-            )
+            from macro.linear_solvers.options import has_hypre
+            from macro.linear_solvers.scalar_multigrid import scalar_multigrid
         except ImportError:
             return factorised
-        if has_scalar_multigrid():
+        if has_hypre():
             return scalar_multigrid
     return factorised
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from multiscale.auto.keys import (
@@ -16,7 +16,7 @@ from multiscale.auto.keys import (
     with_value,
 )
 from multiscale.bodies.reader import read_bodies
-from multiscale.couplings.coupling import Coupling, Source
+from multiscale.couplings.coupling import Coupling, Meshes, Source
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.inputs.surfaces import located, make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
@@ -54,32 +54,66 @@ def make_setup(
     Note:
         Collective.
     """
-    with located(scene):
-        first, counter = meshes = read_bodies(scene, comm)
-        facts = first.facts if first else None, counter.facts if counter else None
-        source = Source(scene, facts, nodes or ClusterNodes(), like)
-        coupling: Coupling = on_root_alone(
-            large_object_comm(comm), lambda: _made(source, resolved or {}, mesh_error)
-        )
-        coupling.attach(comm, meshes)
-    return coupling
-
-
-def _made(source: Source, known: Mapping[str, Any], mesh_error: MeshError | None) -> Coupling:
-    """Return the coupling of a scene, with its auto values as they were or as they are chosen."""
-    began, scene = time.perf_counter(), source.scene
+    began, known = time.perf_counter(), resolved or {}
     auto: frozenset[str] = frozenset() if known else auto_keys(scene)
-    start = provisional(with_resolved(scene, known), auto)
+    build = _Builder(comm, nodes or ClusterNodes())
+    with located(scene):
+        start = provisional(with_resolved(scene, known), auto)
+        if not known and is_measured(scene):
+            from multiscale.auto.search import coupling_by_accuracy, measured_mesh_error
 
-    def build(stated: Scene) -> Coupling:
-        return coupling_class(stated).from_scene(source._replace(scene=stated, like=None))
+            measure = mesh_error or measured_mesh_error
+            chosen = coupling_by_accuracy(scene, start, build, measure, comm)
+            seconds = {"surface": 0.0, "choice": time.perf_counter() - began}
+            return chosen.changed(seconds=seconds)
+        if "patches.grid" in auto:
+            grid = on_root_alone(comm, lambda: map_grid(start, make_surface(start)))
+            start = with_value(start, "patches.grid", grid)
+        cells = known.get("micro") and (int(known["micro"][0]), int(known["micro"][1]))
+        return build(start, like=like, cells=cells)
 
-    if not known and is_measured(scene):
-        from multiscale.auto.search import coupling_by_accuracy, measured_mesh_error
 
-        chosen = coupling_by_accuracy(scene, start, build, mesh_error or measured_mesh_error)
-        return replace(chosen, seconds={"surface": 0.0, "choice": time.perf_counter() - began})
-    if "patches.grid" in auto:
-        start = with_value(start, "patches.grid", map_grid(start, make_surface(start)))
-    cells = known.get("micro") and (int(known["micro"][0]), int(known["micro"][1]))
-    return coupling_class(start).from_scene(source._replace(scene=start, cells=cells))
+@dataclass(frozen=True)
+class _Builder:
+    """Makes couplings of scenes without auto values, on bodies that are read once.
+
+    Args:
+        comm: MPI communicator; None for this process alone.
+        nodes: The nodes of the run.
+    """
+
+    comm: Any
+    nodes: ClusterNodes
+    _read: dict[str, Any] = field(default_factory=dict)
+
+    def __call__(
+        self,
+        scene: Scene,
+        *,
+        like: Coupling | None = None,
+        cells: tuple[int, int] | None = None,
+    ) -> Coupling:
+        """Make the coupling of a scene, on its bodies; collective.
+
+        Args:
+            scene: The scene.
+            like: A coupling with the same surface, which is taken from it.
+            cells: Cells of the half-space of contact problems; None when they are the surface's.
+        """
+        first, counter = meshes = self._meshes(scene)
+        facts = first.facts if first else None, counter.facts if counter else None
+        source = Source(scene, facts, self.nodes, like, cells)
+        coupling: Coupling = on_root_alone(
+            large_object_comm(self.comm), lambda: coupling_class(scene).from_scene(source)
+        )
+        coupling.attach(self.comm, meshes)
+        return coupling
+
+    def _meshes(self, scene: Scene) -> Meshes:
+        """Return the bodies of a scene; those of the latest one are at hand."""
+        sections = (scene.body, scene.counter_body)
+        if self._read.get("sections") != sections:
+            self._read.clear()  # before others take memory
+            self._read.update(meshes=read_bodies(scene, self.comm), sections=sections)
+        meshes: Meshes = self._read["meshes"]
+        return meshes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import ctypes
 import os
 import sys
 import warnings
@@ -10,6 +11,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from traceback import walk_tb
 from types import ModuleType
@@ -25,8 +27,8 @@ _SCENES = (
 _FINITE_ELEMENTS = (
     "bodies of finite elements",
     "basix dolfinx ffcx gmsh mpi4py petsc4py ufl",
-    "take dolfinx, petsc4py, mpi4py and gmsh from one distribution, Debian by ./setup.sh or as "
-    "fenics-dolfinx and python-gmsh from conda-forge; pip has no dolfinx",
+    "take dolfinx, petsc4py, mpi4py and gmsh from one source: Debian by ./setup.sh, wheels by "
+    "pip install 'patchlaw[fenicsx]' (Python 3.12 or newer), or conda-forge by environment.yml",
 )
 _NEEDS = {
     package: (what, source)
@@ -99,6 +101,23 @@ def optional_packages() -> Iterator[None]:
             problem = f"cannot be imported ({' '.join(str(error).split())[:200]})"
         name = _PARTS.get(package, package)
         raise NotInstalled(f"{name} {problem}, and {what} need it: {source}") from error
+
+
+def wheels_mpi() -> Path | None:
+    """Return the MPI library that dolfinx's wheels are linked with; None where it is no wheel."""
+    library = Path(sys.prefix, "lib", "libmpi.so.12")
+    return library if find_spec("dolfinx_solver") and library.exists() else None
+
+
+def load_wheels_mpi() -> None:
+    """Load the MPI library of dolfinx's wheels, before anything that is linked with it.
+
+    It comes as a wheel of its own, in a folder that mpi4py alone looks into. A library that is
+    loaded is found by all others, in whatever order packages are imported, and MPI starts with
+    mpi4py as ever.
+    """
+    if library := wheels_mpi():
+        ctypes.CDLL(str(library))
 
 
 def shadows(path: Sequence[str] | None = None) -> dict[str, str]:

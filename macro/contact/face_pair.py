@@ -196,6 +196,18 @@ class FacePair(ContactFace):
         """Areas of the patches on the first face, shape (N,) [mm²]."""
         return self.first.areas
 
+    def check_common(self) -> None:
+        """Refuse faces of which no part lies on the other.
+
+        Raises:
+            InputError: When no quadrature point of the first face lies on the second one.
+        """
+        if not self.comm.allreduce(int(self.on_both.sum())):
+            raise InputError(
+                "the contact faces of the two bodies have no part in common",
+                allowed="faces that lie opposite to each other, in the coordinates of both meshes",
+            )
+
     @cached_property
     def patchwise(self) -> Sampling:
         """Laws at the mean closures of the patches."""

@@ -33,13 +33,17 @@ ALGEBRAIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
     "mg_levels_ksp_type": "chebyshev",
-    "mg_levels_ksp_max_it": 4,
-    "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.05",
-    "mg_levels_pc_type": "jacobi",
+    "mg_levels_ksp_max_it": 3,
+    "mg_levels_ksp_chebyshev_esteig": "0,0.05,0,1.1",
+    "mg_levels_esteig_ksp_max_it": 30,
+    "mg_levels_pc_type": "bjacobi",
+    "mg_levels_sub_pc_type": "icc",
+    "mg_levels_sub_pc_factor_shift_type": "positive_definite",
 }
-"""Smoothed aggregation. Jacobi is the smoother that works on every release of PETSc. Four steps
-over a wide range of eigenvalues take a quarter fewer iterations than the usual two, in about the
-same time."""
+"""Smoothed aggregation, with the rigid body modes of the nodes. On every rank incomplete Cholesky
+factors couple the nodes of flat cells, which aggregates of nodes alone hardly see: 8 to 24
+iterations to 1e-8 on machine parts of 5·10³ to 14·10³ unknowns, where Jacobi's smoother took 8 to
+71 and PETSc's 10 iterations missed the largest eigenvalue of a pad of hexahedra."""
 
 GEOMETRIC_DEFAULTS: Mapping[str, object] = {
     "pc_type": "mg",
@@ -61,6 +65,11 @@ DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 
 
 _MOST_ITERATIONS = 1000
+
+
+def has_hypre() -> bool:
+    """Tell whether PETSc was built with hypre; the wheels of dolfinx come without."""
+    return bool(PETSc.Sys.hasExternalPackage("hypre"))
 
 
 def users_options() -> tuple[tuple[str, str], ...]:

@@ -21,11 +21,6 @@ _SCALAR = f"{PREFIX}leak_"
 _CLASSICAL: Mapping[str, object] = {"pc_type": "hypre", "pc_hypre_type": "boomeramg"}
 
 
-def has_scalar_multigrid() -> bool:
-    """Tell whether PETSc was built with hypre."""
-    return bool(PETSc.Sys.hasExternalPackage("hypre"))
-
-
 def scalar_multigrid(matrix: sparse.csr_matrix) -> Callable[[Array], Array]:
     """Return a cycle of multigrid for a symmetric positive definite M-matrix.
 

@@ -25,10 +25,20 @@ Tetrahedra coarsen node by node, by the norms of the 3 × 3 blocks: 13 to 20 ite
 Hexahedra coarsen by component with a high threshold: 10 to 17 iterations, 43 on cells 20 times as
 long as high on rollers. Norms of blocks do not tell the directions of such cells apart: 128 to 255.
 
-Smoothed aggregation (PETSc's GAMG) takes 11 to 20 iterations on cells of even lengths, but 61 to
-131 on flat ones on rollers, and its set-up takes 2 to 15 times as long, because its interpolation
-has tens of entries in a row. With a threshold, flat cells coarsen so slowly that set-up takes
-minutes. It is used on request (``-patchlaw_pc_type gamg``). The figures are of PETSc 3.18.
+A PETSc without hypre, such as that of dolfinx's wheels, has smoothed aggregation (GAMG) instead,
+with the rigid body modes of the nodes and the smoother of `ALGEBRAIC_DEFAULTS`. Iterations to 1e-8
+on the same bodies, those of the tests, with slow modes solved for:
+
+    pads, flange, L of linear elements      hypre 11 to 17, smoothed aggregation 8 to 14
+    their quadratic elements                      13 to 17                       13 to 17
+    rings of cells 8 times as long as high        14 to 18                       13 to 20
+    the same, 20 times                            17                             24
+    the same, 8 times, 35 000 unknowns            14                             25
+    pad of 295 000 unknowns                       15                             15
+
+Its set-up takes 1.1 to 2.6 times the CPU time. Under laws much stiffer than the elements a linear
+solve takes 11 to 13 iterations, with hypre 4. It is used on request, too (``-patchlaw_pc_type
+gamg``). The figures are of PETSc 3.18; 3.25 differs by two iterations at most.
 
 Theory: section 11 of ``docs/theory.md``.
 """
@@ -48,7 +58,12 @@ from scipy import sparse
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
 from macro.linear_solvers.node_matrices import Stiffened, for_displacements, with_springs
-from macro.linear_solvers.options import DIRECT_DEFAULTS, PREFIX
+from macro.linear_solvers.options import (
+    ALGEBRAIC_DEFAULTS,
+    DIRECT_DEFAULTS,
+    PREFIX,
+    has_hypre,
+)
 from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 
 COMPRESSIBLE = 0.45
@@ -161,7 +176,12 @@ def algebraic_options(mesh: Any) -> Mapping[str, object]:
 
     Args:
         mesh: dolfinx mesh of tetrahedra or hexahedra.
+
+    Returns:
+        Those of hypre, or of smoothed aggregation where PETSc was built without it.
     """
+    if not has_hypre():
+        return ALGEBRAIC_DEFAULTS
     return _BY_COMPONENTS if compat.is_hexahedral(mesh) else _BY_NODES
 
 

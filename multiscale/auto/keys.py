@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -25,43 +25,63 @@ from support.errors import InputError
 MOST_HEIGHTS = 2048
 """Heights along a side of grids that are chosen, at most."""
 _KEYS = ("surface.grid", "micro.model", "coupling.kind", "patches.grid", "block.cells")
+_OF_SAMPLES = ("surface.grid", "micro.finite_slopes")
+_BODIES = ("body", "counter_body")
+_MEASURED = ("surface.grid", "micro.model", "coupling.kind", "micro.finite_slopes")
 
 
 def auto_keys(scene: Scene) -> frozenset[str]:
     """Return the keys with auto values: ``"auto"``, or not stated beside an accuracy.
 
     The block's cells are one of them only under laws on its mesh, the grid of the surface only
-    where it is a spectrum's.
+    where it is a spectrum's, the degree of displacements only under laws of samples.
 
     Args:
         scene: The scene as it was given.
     """
-    open_keys = set()
-    for key in _KEYS:
-        name, _, field = key.partition(".")
-        section = getattr(scene, name)
-        if section is None or scene.law.representative:
-            continue
-        unstated = scene.accuracy is not None and field not in scene.stated(name)
-        if name == "micro":  # its other keys belong to a model that is stated
-            unstated = unstated and not scene.stated(name)
-        if name == "surface":
-            unstated = scene.accuracy is not None and scene.surface.lacks_grid
-        if getattr(section, field) == "auto" or unstated:
-            open_keys.add(key)
+    representative = scene.law.representative
+    keys = _OF_SAMPLES if representative else _KEYS
+    open_keys = {key for key in keys if _is_open(scene, key)} | set(_of_elements(scene))
     return frozenset(open_keys if scene.on_mesh else open_keys - {"block.cells"})
+
+
+def _is_open(scene: Scene, key: str) -> bool:
+    """Tell whether a key is ``"auto"``, or not stated beside an accuracy."""
+    name, _, field = key.partition(".")
+    section = getattr(scene, name)
+    if section is None:
+        return False
+    unstated = scene.accuracy is not None and field not in scene.stated(name)
+    if key == "micro.model":  # its other keys belong to a model that is stated
+        unstated = unstated and not scene.stated(name)
+    if name == "surface":
+        unstated = scene.accuracy is not None and scene.surface.lacks_grid
+    return unstated or getattr(section, field) == "auto"
+
+
+def _of_elements(scene: Scene) -> Iterator[str]:
+    """Yield the open keys on the meshes of bodies: refinements, under laws of samples elements."""
+    if scene.accuracy is None or not coupling_class(scene).has_body:
+        return
+    meshed = [name for name in _BODIES if getattr(getattr(scene, name), "mesh", None)]
+    fields = [f"{name}.refinements" for name in meshed]
+    if scene.law.representative:
+        fields += [f"{name}.element" for name in meshed]
+        fields += [f"block.{field}" for field in ("cells", "element") if scene.block is not None]
+    yield from (key for key in fields if _is_open(scene, key))
 
 
 def is_measured(scene: Scene) -> bool:
     """Tell whether errors are measured before the run to resolve auto values.
 
     They are wherever a key is open that errors depend on, with an accuracy the edges of a
-    reference's meshes among them.
+    reference's meshes and the elements of bodies among them.
 
     Args:
         scene: The scene as it was given.
     """
-    opened = bool(auto_keys(scene) & {"surface.grid", "micro.model", "coupling.kind"})
+    of_elements = set(_of_elements(scene))
+    opened = bool(auto_keys(scene) & ({*_MEASURED} | of_elements))
     sized = scene.accuracy is None or not scene.reference.sizes_are_open
     return opened or (coupling_class(scene).meshes_roughness and not sized)
 
@@ -106,7 +126,7 @@ def resolved_sections(coupling: Coupling, given: Scene) -> dict[str, Any]:
 
     Returns:
         The sections with auto values by name, as JSON can hold them. That of the micro model is the
-        cells of the half-space.
+        cells of the half-space; under laws of samples ``finite_slopes`` is beside it.
     """
     names = {key.partition(".")[0] for key in auto_keys(given)}
     if is_measured(given):
@@ -117,6 +137,8 @@ def resolved_sections(coupling: Coupling, given: Scene) -> dict[str, Any]:
         sections[name] = to_dict(section)
     if "micro" in names:
         sections["micro"] = None if coupling.cells is None else list(coupling.cells)
+    if "micro.finite_slopes" in auto_keys(given):
+        sections["finite_slopes"] = coupling.scene.micro.finite_slopes
     return sections
 
 
@@ -127,7 +149,8 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         scene: The scene as it was given.
         resolved: What `resolved_sections` returned.
     """
-    contents = {name: content for name, content in resolved.items() if name != "micro"}
+    of_micro = ("micro", "finite_slopes")
+    contents = {name: content for name, content in resolved.items() if name not in of_micro}
     sections: dict[str, Any] = {
         name: read(type(getattr(scene, name)), content) for name, content in contents.items()
     }
@@ -135,6 +158,8 @@ def with_resolved(scene: Scene, resolved: Mapping[str, Any]) -> Scene:
         name: {key: value for key, value in content.items() if value is not None}
         for name, content in contents.items()
     }
+    if "finite_slopes" in resolved:
+        scene = with_value(scene, "micro.finite_slopes", resolved["finite_slopes"])
     return replace(scene, **sections, written=scene.written | stated)
 
 

@@ -2,21 +2,23 @@
 
 What the scene states is kept. The contact problem on the scene's body is solved on coarse cells,
 its errors are measured (`multiscale.measured_errors`), and the cells are refined until the sum of
-the errors keeps the accuracy. Where causes other than the cells exceed it, and the scene leaves the
-coupling open, the roughness is meshed, and the meshes of this reference are refined in the same
-way. Neither clocks nor the machine take part: the same scene gets the same values everywhere, or
-is refused where their memory is missing. The rule in words: docs/choosing.md.
+the errors keeps the accuracy, the mesh of a body likewise. Where causes other than the cells exceed
+it, and the scene leaves the coupling open, the roughness is meshed, and the meshes of this
+reference are refined in the same way. Laws of samples: `multiscale.auto.samples`. Neither clocks
+nor the machine take part: the same scene gets the same values everywhere, or is refused where their
+memory is missing. The rule in words: docs/choosing.md.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import cast
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
 
 from geometry.zero import Zero
 from micro import HalfSpaceModel
+from multiscale.auto.bodies import OpenMeshes, as_quadratic
 from multiscale.auto.keys import (
     MOST_HEIGHTS,
     auto_keys,
@@ -25,6 +27,8 @@ from multiscale.auto.keys import (
     on_waves,
     with_value,
 )
+from multiscale.auto.rule import TRIALS, Errors, Grid, Share, Tally, refinement, scaled
+from multiscale.auto.samples import SampleSearch
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -34,29 +38,20 @@ from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import ZERO, ErrorProbe
 from multiscale.results.notes import relative_error
 from multiscale.scene.scene import Scene
+from support.collective import on_root_alone
 from support.errors import InputError, NotConverged
 
 Build = Callable[[Scene], Coupling]
 MeshError = Callable[[ReferenceCoupling], float]
-Errors = Mapping[str, float]
 
-_TRIALS = 6
-"""Most trials of a grid, or of the size of meshes."""
 _MOST_UNKNOWNS = 1_000_000
 """Unknowns of all meshes of a reference beyond which they are not refined of themselves: 3.5 GB."""
-
-
-def refinement(excess: float, order: float) -> float:
-    """Return the refinement for the next trial.
-
-    Args:
-        excess: Error over allowed error.
-        order: Known order of the error in the size.
-    """
-    return min(max(excess ** (1.0 / order), 1.3), 2.0)
+_PROBLEMS = 7
+"""Contact problems that solve a load step and measure its errors, about."""
 
 
 def measured_mesh_error(coupling: ReferenceCoupling) -> float:
@@ -79,63 +74,110 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
 
 
 def coupling_by_accuracy(
-    given: Scene, start: Scene, build: Build, mesh_error: MeshError
+    given: Scene, start: Scene, build: Build, mesh_error: MeshError, comm: Any = None
 ) -> Coupling:
     """Make the coupling of a scene with its auto values resolved so that the accuracy is kept.
 
     Args:
         given: The scene as it was given.
         start: The same with values to start from.
-        build: Makes the coupling of a scene without auto values.
-        mesh_error: Measures the relative error of the meshes of a reference.
+        build: Makes the coupling of a scene without auto values; collective.
+        mesh_error: Measures the relative error of the meshes of a reference; collective.
+        comm: MPI communicator; None for this process alone.
 
     Raises:
         InputError: When nothing that the scene allows can be made, or the memory is missing.
         NotConverged: When a contact problem cannot be solved.
+
+    Note:
+        Collective.
     """
-    search, auto, kind = _Search(given, build, mesh_error), auto_keys(given), coupling_class(start)
+    search, auto = _Search(given, build, mesh_error, comm), auto_keys(given)
+    kind = coupling_class(start)
     if "surface.grid" in auto:
         on_cells = start.micro.model == "half-space" and not kind.meshes_roughness
         # heights along the shortest wave: what is tried first, and enough for summits and meshes
         start = on_waves(start, 8 if on_cells else 16)
     if kind.tolerance_by_accuracy and start.coupling.table_tolerance is None:
         start = with_value(start, "coupling.table_tolerance", 0.1 * search.accuracy)
+    if given.law.representative:
+        samples = SampleSearch(given, search.accuracy, build, search.tally)
+        return search.decided(*samples.found(start))
     coupling = build(start)
     if "patches.grid" in auto:
-        coupling = build(with_value(start, "patches.grid", map_grid(start, coupling.surface)))
+        start = with_value(start, "patches.grid", map_grid(start, coupling.surface))
+        coupling = build(start)
     if kind.meshes_roughness:
         return search.decided(*search.with_refined_meshes(cast(ReferenceCoupling, coupling)))
-    if isinstance(coupling.micro, HalfSpaceModel):
-        return search.kept_or_meshed(
-            *search.refined_cells(cast(MicroCoupling, coupling), coupling.micro)
-        )
+    if isinstance(coupling.micro, HalfSpaceModel) and not given.loads_bodies:
+        return search.kept_or_meshed(*search.refined(cast(MicroCoupling, coupling)))
     return search.decided(coupling, {})
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The search for auto values of one scene; see `coupling_by_accuracy`."""
+    """The search for auto values of one scene; see `coupling_by_accuracy`. All is collective."""
 
     given: Scene
     build: Build
     mesh_error: MeshError
+    comm: Any
+    tally: Tally = field(default_factory=Tally)
 
     @property
     def accuracy(self) -> float:
         """Relative error of the force that may be left, 2 % by default."""
         return self.given.accuracy or 0.02
 
-    def refined_cells(
-        self, coupling: MicroCoupling, model: HalfSpaceModel
-    ) -> tuple[MicroCoupling, Errors]:
+    def refined(self, coupling: MicroCoupling) -> tuple[MicroCoupling, Errors]:
+        """Refine the cells of the half-space model, and the meshes of its bodies.
+
+        A mesh is refined as long as what the body adds exceeds its share and falls by a fifth.
+        """
+        before = math.inf
+        for _ in range(TRIALS):
+            coupling, errors = self._with_refined_cells(coupling)
+            share = Share(errors, ("body",), self.accuracy)
+            if share.excess <= 1.0 or share.error > 0.8 * before:
+                break
+            finer = OpenMeshes(self.given).refined(coupling, _most_unrefined(coupling))
+            if finer is None:
+                break
+            before = share.error
+            coupling.release()
+            coupling = cast(MicroCoupling, self.build(finer))
+        return coupling, errors
+
+    def _with_refined_cells(self, coupling: MicroCoupling) -> tuple[MicroCoupling, Errors]:
         """Refine the cells of the half-space model until its errors keep the accuracy."""
+        probe = replace(coupling.error_probe(), by_laws=False)
+        cells, errors, tried = on_root_alone(
+            self.comm, lambda: self._refined_cells(coupling, probe)
+        )
+        for grid, problems in tried:
+            self.tally.add(size=math.prod(grid), solutions=problems, finite_slopes=probe.order > 0)
+        if "surface.grid" in auto_keys(self.given):
+            if cells != coupling.surface.grid:
+                finer = with_value(coupling.scene, "surface.grid", cells)
+                coupling = cast(MicroCoupling, self.build(finer))
+            return coupling, errors
+        model = replace(cast(HalfSpaceModel, coupling.micro), surface=coupling.surface)
+        return coupling.changed(micro=model.resampled(cells)), errors
+
+    def _refined_cells(
+        self, coupling: MicroCoupling, probe: ErrorProbe
+    ) -> tuple[Grid, Errors, list[tuple[Grid, int]]]:
+        """Return the cells, their errors, and the cells that were tried with their problems.
+
+        This is not collective.
+        """
         auto, cells, scene = auto_keys(self.given), coupling.surface.grid, coupling.scene
-        new_surface = "surface.grid" in auto
+        new_surface, model = "surface.grid" in auto, probe.model
         may_refine = new_surface or "micro.model" in auto
         if may_refine and not new_surface:
-            cells = _scaled(cells, 0.25)
-        probe, history = replace(coupling.error_probe(), by_laws=False), coupling.load_history
-        for trial in range(_TRIALS):
+            cells = scaled(cells, 0.25)
+        history, tried = coupling.load_history, list[tuple[Grid, int]]()
+        for trial in range(TRIALS):
             if new_surface:
                 surface = make_surface(with_value(scene, "surface.grid", cells))
                 model = replace(model, surface=surface, highest=surface.highest)
@@ -143,27 +185,25 @@ class _Search:
                 probe = replace(probe, zero=Zero(scene.loading.zero).error(surface))
             else:
                 model = replace(model, surface=coupling.surface).resampled(cells)
-            errors = _measured(replace(probe, model=model), history)
-            by_cells = errors["grid"] + (errors.get(ZERO, 0.0) if new_surface else 0.0)
-            others = sum(errors.values()) - by_cells
-            # at other loads errors differ: this one may take 0.8 of the accuracy
-            allowed = max(0.8 * self.accuracy - others, 0.5 * others)
-            last = trial == _TRIALS - 1 or max(cells) >= MOST_HEIGHTS
-            if not may_refine or last or by_cells <= allowed:
+            errors, loads = _measured(replace(probe, model=model), history)
+            tried.append((cells, loads * _PROBLEMS))
+            causes = ("grid", ZERO) if new_surface else ("grid",)
+            share = Share(errors, causes, self.accuracy)
+            last = trial == TRIALS - 1 or max(cells) >= MOST_HEIGHTS
+            if not may_refine or last or share.excess <= 1.0:
                 break
-            cells = _scaled(cells, refinement(by_cells / allowed, order=1.5))
-        if new_surface:
-            made = self.build(with_value(scene, "surface.grid", model.surface.grid))
-            coupling = cast(MicroCoupling, made)
-        return replace(coupling, micro=model), errors
+            cells = scaled(cells, refinement(share.excess, order=1.5))
+        return model.surface.grid, errors, tried
 
     def with_refined_meshes(self, coupling: ReferenceCoupling) -> tuple[ReferenceCoupling, Errors]:
         """Refine the meshes of a reference until their error keeps the accuracy."""
         coupling = self._with_first_meshes(coupling)
         if len(coupling.rough_meshes.shapes) == 1:  # one mesh does not show its error
             return coupling, {}
-        for _ in range(_TRIALS):
+        for _ in range(TRIALS):
             error, fine = self.mesh_error(coupling), coupling.scene.reference.fine
+            work = coupling.work()
+            self.tally.add(cycles=work.cycles / step_count(coupling.scene.loading))
             if error <= self.accuracy or not self._may_refine(coupling) or fine is None:
                 break
             finer = refinement(error / self.accuracy, coupling.rough_meshes.force_order)
@@ -222,6 +262,9 @@ class _Search:
         """Whether the scene leaves it open that its roughness be meshed."""
         if self.given.micro.hardness is not None or self.given.conductance is not None:
             return False  # meshes are elastic, and do not know the stiffness of the interface alone
+        others = (self.given.body, self.given.counter_body, self.given.counter_surface)
+        if any(one is not None for one in others):
+            return False  # it is the block whose roughness is meshed, under a rigid plane
         stated = self.given.stated("coupling") - {"kind"}
         return {"coupling.kind", "micro.model"} <= auto_keys(self.given) and not stated
 
@@ -236,8 +279,9 @@ class _Search:
             why=why,
             errors=errors,
             missed=missed or {},
+            work=self.tally.sentence,
         )
-        return replace(coupling, decision=decision)
+        return coupling.changed(decision=decision)
 
 
 def _is_small(coupling: ReferenceCoupling) -> bool:
@@ -245,11 +289,20 @@ def _is_small(coupling: ReferenceCoupling) -> bool:
     return sum(coupling.rough_meshes.unknowns) <= _MOST_UNKNOWNS
 
 
-def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
-    """Return the errors relative to the force, at the load where their sum is largest."""
+def _most_unrefined(coupling: MicroCoupling) -> float:
+    """Return the unknowns that bodies may have so that their elements can be quadratic."""
+    from macro.compliance.mesh_face import MOST_DOFS
+
+    bodies = coupling.meshes
+    return MOST_DOFS * sum(one.unknowns for one in bodies) / max(as_quadratic(bodies), 1)
+
+
+def _measured(probe: ErrorProbe, load_history: LoadHistory) -> tuple[Errors, int]:
+    """Return the errors relative to the force where their sum is largest, and how many loads."""
     worst: Errors = {"grid": 0.0}
     model = probe.on_body(probe.model, probe.order)
-    for value in sorted({load_history.largest, load_history.points[-1]}):
+    loads = sorted({load_history.largest, load_history.points[-1]})
+    for value in loads:
         state = model.press(load_history.control(value))
         if not state.force > 0.0:
             continue
@@ -257,10 +310,4 @@ def _measured(probe: ErrorProbe, load_history: LoadHistory) -> Errors:
         measured = probe.measure(state.force, plane.approach, plane.tilt, start=state.guess)
         errors = {cause: error / state.force for cause, error in measured.parts.items()}
         worst = max(worst, errors, key=lambda each: sum(each.values()))
-    return worst
-
-
-def _scaled(cells: tuple[int, int], factor: float) -> tuple[int, int]:
-    """Return cells along the sides times a factor, as multiples of 8 within the limits."""
-    x, y = (min(max(8 * math.ceil(factor * count / 8 - 1e-9), 48), MOST_HEIGHTS) for count in cells)
-    return x, y
+    return worst, len(loads)

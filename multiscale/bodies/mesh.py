@@ -32,7 +32,8 @@ class MeshTerms(FaceTerms):
         facets: Facets of its contact face; the frame's origin is the rectangle's lower corner.
         rectangle: The rectangle.
         around: What is around it.
-        origin: What tells the mesh from others: the digest of its file, and its size in mm.
+        origin: What tells the mesh from others: the digest of its file, its cells once they are
+            refined, and its size in mm.
         side_term: Free sides that are a term of their own; None where there is none.
         behind: Whether the body lies on the other side, in a frame turned about the y axis.
     """
@@ -72,7 +73,7 @@ class MeshTerms(FaceTerms):
         from macro.compliance.surroundings import surroundings
 
         rectangle = PatchGrid(grid=(1, 1), lengths=lengths)
-        facets = scene_body.facets[0]
+        facets, facts = scene_body.facets[0], scene_body.facts
         if behind:
             facets = from_outside(facets, lengths[0])
         around = surroundings(scene_body.body, facets, rectangle)
@@ -84,7 +85,7 @@ class MeshTerms(FaceTerms):
             facets=facets,
             rectangle=rectangle,
             around=around,
-            origin=(scene_body.facts.digest, scene_body.facts.lengths),
+            origin=(facts.digest, facts.cells, facts.lengths),
             side_term=sides,
             behind=behind,
         )

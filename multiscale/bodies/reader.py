@@ -94,8 +94,10 @@ class _Reader:
         from macro import contact_facets
         from macro.mesh.checks import size_note
         from macro.mesh.from_file import read_mesh
+        from macro.mesh.refinement import refined
 
         mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
+        mesh = refined(mesh, self._section.refinements)
         note = size_note(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
         for region in regions:

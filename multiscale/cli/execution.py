@@ -19,11 +19,12 @@ from multiscale.machine import (
 )
 from multiscale.output import terminal
 from multiscale.restart.interruption import ended_if_told
+from multiscale.restart.results_folder import folder_name
 from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
-from support.packages import optional_packages
+from support.packages import load_wheels_mpi, optional_packages
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
@@ -85,7 +86,7 @@ def scene_and_folder(
     Args:
         choice: Parsed words of the command line.
         comm: MPI communicator; None for a process on its own.
-        ending: What the folder is called after the scene's name, unless the user names a folder.
+        ending: How the folder's name ends, unless the user names a folder; see `folder_name`.
 
     Returns:
         The scene and the folder, the same on every rank.
@@ -101,7 +102,7 @@ def scene_and_folder(
 
     def read() -> tuple[Scene, Path]:
         scene = Scene.load(choice.scene, choice.set)
-        return scene, choice.out or Path("results") / f"{scene.name}{ending}"
+        return scene, choice.out or Path("results") / folder_name(scene.name, choice.set, ending)
 
     return on_root(comm, read)
 
@@ -146,6 +147,7 @@ def _start_petsc(options: list[str]) -> list[str]:
     """Start PETSc with the user's options; solver options get the prefix of our solver."""
     if not options:
         return []
+    load_wheels_mpi()
     import petsc4py
 
     prefixed = [

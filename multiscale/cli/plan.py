@@ -18,7 +18,10 @@ from support.collective import on_root_alone, place_in
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
-    """Say what a run would do, and why, and count its work; run nothing expensive.
+    """Say what a run would do and why, its work and memory; write no results.
+
+    Keys without a value, as beside an accuracy, are chosen by errors of contact problems that are
+    solved for it, as a run does first. Nothing else is solved.
 
     Args:
         choice: Parsed words of the command line.

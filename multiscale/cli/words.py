@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -25,6 +26,13 @@ DIFF_ENDING = "-diff"
 """What the results folder of two runs beside each other is called after their names."""
 
 
+_DISTRIBUTIONS = {
+    "patchlaw": ("patchlaw",),
+    "dolfinx": ("fenics-dolfinx", "dolfinx-solver-real"),
+}
+"""Distributions that bring a package: that of dolfinx, and its wheel with PETSc."""
+
+
 class UsageError(Exception):
     """The words of the command line are not understood."""
 
@@ -40,13 +48,12 @@ class _ShowVersions(argparse.Action):
     def __call__(self, *given: Any) -> NoReturn:
         from importlib import metadata  # takes longer than all else that --help needs
 
-        versions = []
-        for name, distribution in (("patchlaw", "patchlaw"), ("dolfinx", "fenics-dolfinx")):
-            try:
-                versions.append(f"{name} {metadata.version(distribution)}")
-            except metadata.PackageNotFoundError:
-                versions.append(f"{name} not installed")
-        print(", ".join(versions))
+        versions = dict.fromkeys(_DISTRIBUTIONS, "not installed")
+        for name, distributions in _DISTRIBUTIONS.items():
+            for distribution in distributions:
+                with suppress(metadata.PackageNotFoundError):
+                    versions[name] = metadata.version(distribution)
+        print(", ".join(f"{name} {version}" for name, version in versions.items()))
         raise SystemExit(0)
 
 
@@ -89,6 +96,9 @@ _QUIET = ("init", "run", "compare", "sweep", "laws", "surface", "diff")
 
 _WITH_PAGE = ("run", "compare", "diff")
 """Commands that write a report."""
+
+_UNUSED = "of a run: taken, and without effect here"
+"""What `plan` says of the words that it takes so that those of a run can be reused."""
 
 _TIME: dict[str, Any] = {"type": wall_time, "metavar": "TIME"}
 
@@ -142,12 +152,7 @@ def _add_init(init: argparse.ArgumentParser) -> None:
 def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run scenes."""
     run = command("run", "run.run_scene", "Run a scene; write history, laws, figures and report.")
-    run.add_argument(
-        "--resume",
-        action="store_true",
-        help="go on with an interrupted run, as without this; leave a finished one",
-    )
-    run.add_argument("--max-time", help="stop cleanly before this wall time is over", **_TIME)
+    _add_run_alone(run)
     _add_scene(run)
     compare = command(
         "compare",
@@ -190,9 +195,15 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     diff.add_argument("--at", choices=AT, help=equal)
     where = f"folder of the comparison (default: results/FIRST-SECOND{DIFF_ENDING})"
     diff.add_argument("--out", type=Path, metavar="DIR", help=where)
-    plan = "Say what a run would do, and why; run nothing expensive."
-    unused = "accepted so that the words of a run can be reused: a plan writes nothing"
-    _add_scene(command("plan", "plan.plan_scene", plan), folder=unused)
+    summary = (
+        "Say what a run would do and why, its work and memory; write no results, and solve only "
+        "what keys without a value ('auto', or beside accuracy) are chosen by."
+    )
+    plan = command("plan", "plan.plan_scene", summary)
+    _add_scene(plan, unused=_UNUSED)
+    _add_run_alone(plan, unused=_UNUSED)
+    for name in ("--open", "-q"):
+        plan.add_argument(name, action="store_true", dest="unused", help=_UNUSED)
     laws = "Tabulate the patch laws of a scene; write and draw them."
     tabulate = command("laws", "laws.tabulate_laws", laws)
     _add_scene(tabulate)
@@ -218,14 +229,25 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
 
 
-def _add_scene(command: argparse.ArgumentParser, *, folder: str = "", ending: str = "") -> None:
+def _add_run_alone(command: argparse.ArgumentParser, *, unused: str = "") -> None:
+    """Add what a run takes and other commands on a scene do not."""
+    resume = unused or "go on with an interrupted run, as without this; leave a finished one"
+    command.add_argument("--resume", action="store_true", help=resume)
+    stop = unused or "stop cleanly before this wall time is over"
+    command.add_argument("--max-time", help=stop, **_TIME)
+
+
+def _add_scene(command: argparse.ArgumentParser, *, ending: str = "", unused: str = "") -> None:
     """Add what every command on a scene takes: the file, the results folder, changes of keys."""
     command.add_argument("scene", type=Path, help="scene file (TOML)")
-    where = f"folder of the results (default: results/SCENE{ending}, by the file's name)"
-    command.add_argument("--out", type=Path, metavar="DIR", help=folder or where)
+    where = (
+        f"folder of the results (default: results/SCENE{ending}, by the file's name; where keys "
+        f"are set, results/SCENE-KEY=VALUE{ending})"
+    )
+    command.add_argument("--out", type=Path, metavar="DIR", help=unused or where)
     keys: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
     if not ending:  # the folders of comparisons and sweeps hold many scenes
-        other = "begin anew, whatever results are in this folder"
+        other = unused or "begin anew, whatever results are in this folder"
         command.add_argument("--overwrite", action="store_true", help=other)
     changes = "change keys of the scene, such as load.approach='4 um'"
     command.add_argument("--set", metavar="KEY=VALUE", help=changes, **keys)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple, Self
@@ -146,6 +146,16 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         self.comm, self._meshes = comm, meshes
+
+    def changed(self, **attributes: Any) -> Self:
+        """Return a coupling on the same bodies, nothing of which is made yet.
+
+        Args:
+            attributes: Those that differ.
+        """
+        other = replace(self, **attributes)
+        other.comm, other._meshes = self.comm, self._meshes
+        return other
 
     @classmethod
     def unstated_cells(cls, scene: Scene) -> Cells:

@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
@@ -19,12 +19,17 @@ from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.couplings.coupling import Source
+from multiscale.couplings.coupling import Meshes, Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
 from multiscale.inputs.memory import check_memory
-from multiscale.inputs.surfaces import RegionSamples, region_samples, sample_surface
+from multiscale.inputs.surfaces import (
+    RegionSamples,
+    located,
+    region_samples,
+    sample_surface,
+)
 from multiscale.law_errors import (
     CHECKS_OF_SAMPLE,
     LawErrorProbe,
@@ -66,6 +71,8 @@ class RepresentativeCoupling(LawCoupling):
         further_fields: Make functions on the mesh that are written with the other fields.
     """
 
+    tolerance_by_accuracy: ClassVar[bool] = True
+
     samples: tuple[RegionSamples, ...]
     micro: HalfSpaceModel
     further_fields: list[Callable[[LoadStep], Any]] = field(default_factory=list, init=False)
@@ -103,6 +110,14 @@ class RepresentativeCoupling(LawCoupling):
             plane_at_largest_load=plane,
         )
 
+    def attach(self, comm: Any, meshes: Meshes) -> None:
+        """Put the coupling on its bodies, whose contact faces must have a part in common."""
+        super().attach(comm, meshes)
+        if meshes[1] is not None:
+            face: Any = self.bodies.contact_face()
+            with located(self.scene, "counter_body.contact"):
+                face.check_common()
+
     # --- what is known before the run
 
     @property
@@ -121,6 +136,16 @@ class RepresentativeCoupling(LawCoupling):
         return tuple(one for region in self.samples for one in region.surfaces)
 
     @property
+    def label(self) -> str:
+        """The heights of the samples, and the elements of the bodies."""
+        bodies = ", ".join(
+            f"{('linear', 'quadratic')[body.degree - 1]} elements on {body.cells}"
+            for body in self.shown_bodies
+        )
+        slopes = " with finite slopes" * self.finite_slopes
+        return f"laws of samples on {describe.times(self.surface.grid)} heights{slopes}, {bodies}"
+
+    @property
     def finite_slopes(self) -> bool:
         """Whether finite slopes of the samples count: where the scene says so."""
         return bool(self.scene.micro.finite_slopes)
@@ -131,11 +156,22 @@ class RepresentativeCoupling(LawCoupling):
 
     def work(self, ranks: int = 1) -> Work:
         """Count what a run computes; see `Coupling.work`."""
-        rows = SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
-        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
         steps = step_count(self.scene.loading)
-        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
         checks = 0 if self.unmeasured() else (steps if self.scene.output.check == "all" else 1)
+        return self.counted(steps, checks, ranks=ranks)
+
+    def counted(self, steps: int, checks: int, *, laws: bool = True, ranks: int = 1) -> Work:
+        """Count what load steps take.
+
+        Args:
+            steps: Load steps.
+            checks: Those of them whose errors are measured.
+            laws: Whether laws are made for them.
+            ranks: Processes that share meshes.
+        """
+        rows = laws * SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
+        unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
+        cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
         return Work(
             size=int(self.surface.heights.size),
             solutions=float(rows + checks * CHECKS_OF_SAMPLE * len(self.rough_surfaces)),
@@ -160,7 +196,7 @@ class RepresentativeCoupling(LawCoupling):
         """Say how the run will know its error."""
         if self.unmeasured():
             return super().error_statement()
-        return self.measured_at(causes_of(self.samples))
+        return self.measured_at(causes_of(self.samples, half_space=self.both_elastic))
 
     # --- errors
 
@@ -177,6 +213,7 @@ class RepresentativeCoupling(LawCoupling):
             laws=solver.table.laws,
             samples=self.samples,
             probe_of=self._probe_of,
+            left_out=self._left_out(step.mean_pressure_MPa) if self.both_elastic else 0.0,
             comm=self.comm,
         )
         by_force = problem.forces.control.force is not None

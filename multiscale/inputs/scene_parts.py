@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -26,6 +27,7 @@ class Decision:
             worst; empty where they cannot be measured beforehand. That of laws is among them only
             after the run.
         missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
+        work: What the choice took, counted, in words; empty where nothing was tried.
     """
 
     accuracy: float
@@ -33,6 +35,7 @@ class Decision:
     errors: Mapping[str, float]
     why: str = ""
     missed: Mapping[str, float] = field(default_factory=dict)
+    work: str = ""
 
     @property
     def error(self) -> float:
@@ -53,6 +56,8 @@ class Decision:
         ]
         if self.missed:
             parts.append(f"without meshing the roughness {_listed(self.missed)}")
+        if self.work:
+            parts.append(f"the choice took {self.work}")
         return "; ".join(parts)
 
     @property
@@ -61,6 +66,11 @@ class Decision:
         if self.kept or not self.errors:
             return None
         largest = max(self.errors, key=lambda cause: self.errors[cause])
+        if self.error == math.inf:
+            return (
+                f"whether an accuracy of {100 * self.accuracy:.3g} % is kept is not known: the "
+                f"error by {largest} could not be measured at the largest load"
+            )
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
             f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
@@ -164,5 +174,8 @@ class SceneParts:
 def _listed(errors: Mapping[str, float]) -> str:
     if not errors:
         return "which is not measured beforehand"
+    if math.inf in errors.values():
+        largest = max(errors, key=lambda cause: errors[cause])
+        return f"which is not known: the error by {largest} could not be measured"
     causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
     return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"

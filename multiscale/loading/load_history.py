@@ -270,6 +270,20 @@ class LoadHistory:
             return LoadHistory(force=(control.force or 0.0,), steps=1, tilt=tilt)
         return LoadHistory(approach=(control.approach,), steps=1, tilt=tilt)
 
+    @property
+    def by_turning_points(self) -> LoadHistory:
+        """The history with a load step for every leg, through its turning points once."""
+        stages = tuple(
+            replace(one, steps=1, cycles=None if one.cycles is None else 1) for one in self.stage
+        )
+        return replace(self, steps=1, cycles=1, force_change=None, stage=stages)
+
+    @property
+    def decisive_legs(self) -> set[int]:
+        """The legs to the largest load and to the last one; all of stages, once through each."""
+        legs, points = range(self.by_turning_points.legs), self.points
+        return set(legs) if self.stage else {points.index(self.largest), legs[-1]}
+
     def control(self, value: float) -> Control:
         """Return what a load step to a value of the prescribed quantity prescribes."""
         if self.quantity == "force":

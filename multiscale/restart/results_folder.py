@@ -6,9 +6,11 @@ import errno
 import fcntl
 import json
 import os
+import re
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -29,9 +31,33 @@ from support.errors import InputError
 
 _NAME = ".lock"
 _OUTPUT = "output."
+_LONGEST = 120  # bytes of what was set, in the name of a folder
+_ODD = re.compile(r"[^\w.=+-]+")  # characters that shells or file systems may not take
 _READ_OR_MAKE = os.O_RDWR | os.O_CREAT
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS, errno.EBADF, errno.EISDIR, errno.EINVAL)
 """Errors of file systems without locks, or, the latter, without locks on folders."""
+
+
+def folder_name(scene: str, overrides: Sequence[str] = (), ending: str = "") -> str:
+    """Return what the folder of results is called where the user names none.
+
+    Keys that were set make another folder, so that results of different scenes do not meet; those
+    of ``[output]`` make no other scene, and no other folder.
+
+    Args:
+        scene: Name of the scene.
+        overrides: ``key=value`` strings with dotted keys, as for `Scene.load`.
+        ending: What follows after all.
+    """
+    pairs = (text.partition("=") for text in overrides)
+    values = {key.strip(): value.strip() for key, _, value in pairs}  # the last of a key counts
+    kept = (key for key in sorted(values) if not f"{key}.".startswith(_OUTPUT))
+    changed = [f"{key}={values[key]}" for key in kept]
+    name = "".join(f"-{_ODD.sub('_', text).strip('_')}" for text in changed)
+    if len(name.encode()) > _LONGEST:
+        digest = sha256(repr(changed).encode()).hexdigest()[:8]
+        name = f"{name.encode()[:_LONGEST].decode(errors='ignore')}-{digest}"
+    return f"{scene}{name}{ending}"
 
 
 @contextmanager

@@ -110,6 +110,8 @@ class CounterBodySection(BodyLoads):
         mesh_unit: Unit of the mesh's coordinates.
         contact: Physical name or number of the planar face that is in contact.
         element: Degree of the displacements.
+        refinements: How often every cell of the mesh is cut into eight, at the middles of its
+            straight edges.
         supports: Faces that are held; together they leave no rigid motion.
         materials: Elastic constants by physical name or number of the volumes; instead of these,
             one material for the whole body.
@@ -122,6 +124,7 @@ class CounterBodySection(BodyLoads):
     mesh_unit: Literal["mm", "m", "um", "inch"] = "mm"
     contact: Tag | None = None
     element: Literal["linear", "quadratic"] = "linear"
+    refinements: Annotated[int, Limits(ge=0, le=6)] = 0
     supports: tuple[SupportSection, ...] = ()
     materials: dict[str, VolumeSection] = field(default_factory=dict)
     young_modulus: PositivePressure | None = None

@@ -46,11 +46,13 @@ class SceneSections:
     Args:
         accuracy: Allowed relative error of the force. What is stated is kept. Keys that are
             ``"auto"`` or, with an accuracy, not stated (``surface.grid`` of a spectrum,
-            ``micro.model``, ``coupling.kind``, ``patches.grid`` and, under laws on a mesh,
-            ``block.cells``) get values by a rule from errors that are measured before the run, the
-            same on every machine. Under laws of samples (``law.kind = "representative"``) nothing
-            is chosen. The results say whether the error that is measured in the run keeps the
-            accuracy. Without it, ``auto`` means 2 %.
+            ``micro.model``, ``coupling.kind``, ``patches.grid``, ``refinements`` of bodies on
+            meshes and, under laws on a mesh, ``block.cells``) get values by a rule from errors that
+            are measured before the run, the same on every machine. Under laws of samples
+            (``law.kind = "representative"``) these keys are ``surface.grid`` of a spectrum,
+            ``micro.finite_slopes``, ``element`` and ``refinements`` of bodies, ``cells`` of a
+            block. The results say whether the error that is measured in the run keeps the accuracy.
+            Without it, ``auto`` means 2 %.
         surface: The rough surface.
         counter_surface: Roughness of the other side, which is smooth without this section: heights
             as measured on it, facing up, on the grid of ``[surface]``. It is laid on the surface
@@ -209,7 +211,7 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
             "law.kind = 'representative'",
         )
     other = scene.counter_surface
-    chosen = scene.accuracy is not None and other is None and not scene.law.representative
+    chosen = scene.accuracy is not None and other is None
     maps = [("law.regions", region) for region in scene.law.regions]
     for key, one in [("surface", scene.surface), ("counter_surface", other), *maps]:
         if one is not None and one.lacks_grid and not (chosen and key == "surface"):
@@ -247,13 +249,6 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
             "isolated laws against a half-space need the compliance of both bodies",
             "coupling.newton = 'condensed' and coupling.interface = 'patchwise'; or "
             "coupling.kind = 'consistent'",
-        )
-    by_accuracy = scene.accuracy is not None and not scene.law.representative
-    if scene.body is not None and (by_accuracy or "auto" in (coupling.kind, scene.surface.grid)):
-        yield (
-            "accuracy",
-            "is not kept on [body], nor are surface.grid or coupling.kind chosen there",
-            "leave it out, and state them; law.kind = 'representative' says whether it is kept",
         )
 
 

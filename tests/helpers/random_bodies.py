@@ -15,11 +15,21 @@ import numpy as np
 from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
 from geometry.meshes.gmsh_session import gmsh_session
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace, Material, MeshedBody, Support, contact_facets
+from macro import (
+    LawContactProblem,
+    LoadedFace,
+    Material,
+    MeshedBody,
+    Support,
+    TaggedMesh,
+    contact_facets,
+)
+from macro.compat import mesh_from_cells
+from macro.mesh.from_file import cell_tags, facet_tags
+from macro.mesh.refinement import refined
 from macro.mesh.tagged import planar_face
+from multiscale import Scene
 from multiscale.law_errors import LawErrorProbe
-
-from .refined_mesh import refined, tagged
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}
@@ -284,9 +294,22 @@ def _quadrilateral(occ, corners):
     return 2, occ.addPlaneSurface([occ.addCurveLoop([occ.addLine(p, q) for p, q in pairs])])
 
 
-def problem_on(body, arrays, comm):
+def mesh_of(body, comm):
+    """Return the mesh of a random body; collective."""
+    arrays = comm.bcast(arrays_of(body) if comm.rank == 0 else None)
+    own = slice(None) if comm.rank == 0 else slice(0)
+    mesh = mesh_from_cells(arrays.cells[own], arrays.points[own], None, comm)
+    return TaggedMesh(
+        mesh=mesh,
+        facet_tags=facet_tags(mesh, arrays.facets, arrays.facet_tags, arrays.facet_names),
+        cell_tags=cell_tags(mesh, arrays.cell_tags),
+        facet_names=arrays.facet_names,
+        cell_names=arrays.cell_names,
+    )
+
+
+def problem_on(body, mesh):
     """Return the contact face of a random body on a mesh, and what makes a problem on a face."""
-    mesh = tagged(arrays, comm)
     names = mesh.facet_names
     fixed = (None, None, 0.0) if body.shape == "ring" else (0.0, 0.0, 0.0)
     held = [Support(tag=names["support"], displacement=fixed)]
@@ -315,8 +338,8 @@ def stated_and_true(body, comm, *, refinements=2):
         A record with `dofs` of the meshes, `forces` on them at the same approach [N], `mesh` and
         `quadrature`, the measured errors [N].
     """
-    arrays = comm.bcast(arrays_of(body) if comm.rank == 0 else None)
-    face, problem_of = problem_on(body, arrays, comm)
+    tagged = mesh_of(body, comm)
+    face, problem_of = problem_on(body, tagged)
     problem = problem_of(face)
     load = body.pressure * float(face.areas.sum())
     state = problem.solve(Control(force=load, tilt=body.tilt))
@@ -334,10 +357,58 @@ def stated_and_true(body, comm, *, refinements=2):
     dofs, forces = [face.body.dofs], [state.force]
     same = Control(approach=state.approach, tilt=body.tilt)
     for _ in range(refinements):
-        arrays = comm.bcast(refined(arrays) if comm.rank == 0 else None)
-        finer, problem_of = problem_on(body, arrays, comm)
+        tagged = refined(tagged)
+        finer, problem_of = problem_on(body, tagged)
         forces.append(problem_of(finer).solve(same).force)
         dofs.append(finer.body.dofs)
     return SimpleNamespace(
         dofs=dofs, forces=np.array(forces), mesh=mesh, quadrature=quadrature, load=load
     )
+
+
+def rough_scene(body, mesh, seed, **keys):
+    """Return a scene of a random body with samples of its own under its mean pressure.
+
+    Args:
+        body: The body.
+        mesh: File of its mesh.
+        seed: Seed of the roughness.
+        keys: Further keys of the scene.
+    """
+    rng = np.random.default_rng([47, seed])
+    names = [body.materials[0], body.materials[1]]
+    modulus = names[-1 if body.shape == "pad" else 0].contact_modulus
+    # 2 to 20 % contact area; an rms height of a hundredth of the body's displacement to all of it
+    slope = 2.0 * body.pressure / modulus / float(np.exp(rng.uniform(np.log(0.02), np.log(0.2))))
+    moved = body.pressure / body.materials[0].young_modulus * body.length
+    height = moved * float(np.exp(rng.uniform(np.log(0.01), np.log(1.0))))
+    waves = int(rng.integers(4, 8))
+    spectrum = {"hurst": float(rng.uniform(0.6, 0.95)), "waves": [2, waves], "seed": seed}
+    materials = {"1": names[0], "2": names[1]}
+    fixed = ["free", "free", 0.0] if body.shape == "ring" else [0.0, 0.0, 0.0]
+    supports = [{"surface": "support", "displacement": fixed}]
+    if body.shape == "ring":
+        supports.append({"surface": "x", "displacement": [0.0, "free", "free"]})
+        supports.append({"surface": "y", "displacement": ["free", 0.0, "free"]})
+    section = {"mesh": str(mesh), "contact": "contact", "supports": supports}
+    constants = {
+        name: {"young_modulus": one.young_modulus, "poisson_ratio": one.poisson_ratio}
+        for name, one in materials.items()
+    }
+    section |= {"materials": constants} if body.shape == "pad" else constants["1"]
+    tilt = "free" if body.tilt is None else list(body.tilt)
+    # a wave of such a height and slope has about this length
+    length = 2.0 * np.pi * height / slope * 3.0
+    return Scene.from_dict(
+        {
+            "surface": {
+                "spectrum": {**spectrum, "rms_slope": slope},
+                "lengths": [length, length],
+            },
+            "law": {"kind": "representative"},
+            "body": section,
+            "load": {"pressure": body.pressure, "steps": 1, "zero": "mean plane", "tilt": tilt},
+            "output": {"figures": False, "report": False, "contact": "none"},
+            **keys,
+        }
+    )  # fmt: skip

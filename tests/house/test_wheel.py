@@ -1,17 +1,23 @@
 """sdist and wheel: what is in them, and that the wheel works where nothing but numpy and scipy is.
 
 A clean copy of the project is built as packagers do, installed in an environment without the
-system's packages, and asked for contacts; then for what it cannot do there.
+system's packages, and asked for contacts; then for what it cannot do there. With dolfinx's wheels
+beside it, in an environment of a newer Python, it is asked for all else.
 """
 
+import csv
 import os
+import shutil
 import subprocess
 import sys
 import tarfile
 import zipfile
 from pathlib import Path, PurePosixPath
 
+import numpy as np
 import pytest
+from helpers.box_msh import write_box
+from helpers.mpi_environment import MPI_ENVIRONMENT
 
 pytestmark = pytest.mark.long
 
@@ -161,8 +167,8 @@ def test_with_the_extra_scenes_without_finite_elements_run(built, bare):
     call(pip, "install", "--only-binary", ":all:", f"{built[1]}[scenes]", cwd=bare)
     (bare / "scene.toml").write_text(SCENE, encoding="utf-8")
     words = ("run", "scene.toml", "--set", "micro.model=half-space", "--set")
-    call(command, *words, "coupling.kind=analytic", cwd=bare)
-    assert {path.name for path in (bare / "results" / "scene").iterdir()} >= {
+    call(command, *words, "coupling.kind=analytic", "--out", "results", cwd=bare)
+    assert {path.name for path in (bare / "results").iterdir()} >= {
         "history.csv", "report.html", "curves.png"
     }  # fmt: skip
     words = (*words, "coupling.kind=concurrent", "--out", "other")
@@ -171,3 +177,111 @@ def test_with_the_extra_scenes_without_finite_elements_run(built, bare):
     assert "is not installed, and bodies of finite elements need it" in " ".join(
         done.stderr.split()
     )
+
+
+BODY = """
+[surface]
+spectrum = { hurst = 0.9, waves = [2, 4], rms_slope = 0.2, seed = 3 }
+grid = [16, 16]
+lengths = ["1 mm", "1 mm"]
+[patches]
+grid = [2, 2]
+[micro]
+finite_slopes = false
+[body]
+mesh = "cube.msh"
+contact = "top"
+supports = [{ surface = "bottom" }]
+young_modulus = "4 GPa"
+poisson_ratio = 0.15
+[coupling]
+interface = "pointwise"
+[load]
+approach = "6 um"
+steps = 2
+"""
+OF_THE_SUITE = (
+    "tests/verification/test_releases.py",
+    "tests/unit/macro/linear_solvers/test_solver_selection.py",
+    "tests/unit/macro/contact/test_stiff_contact.py",
+)
+NEWER = ("python3.14", "python3.13", "python3.12")
+NO_REGISTRY = ("No matching distribution found", "Could not find a version", "connection")
+
+
+def newer_python():
+    """Return a Python that dolfinx's wheels are made for; None where there is none."""
+    versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    own = sorted(versions.glob("3.1[234]*/bin/python"))
+    for python in [*filter(None, map(shutil.which, NEWER)), *reversed(own)]:
+        # commands of pyenv stand for versions that need not be chosen
+        words = [python, "-c", "import ensurepip, venv, sys; sys.exit(sys.version_info < (3, 12))"]
+        if not subprocess.run(words, capture_output=True, check=False).returncode:
+            return python
+    return None
+
+
+@pytest.fixture(scope="module")
+def alone(built, tmp_path_factory):
+    """Return a folder with an environment of wheels alone, and scenes to run there."""
+    if not (python := newer_python()):
+        pytest.skip("no Python 3.12 or newer")
+    folder = tmp_path_factory.mktemp("alone")
+    call(python, "-m", "venv", "env", cwd=folder)
+    words = (f"{built[1]}[fenicsx]", "pytest", "pytest-xdist")
+    pip = (folder / "env" / "bin" / "pip", "install", "--only-binary", ":all:")
+    installed = call(*pip, *words, cwd=folder, check=False)
+    if installed.returncode and any(words in installed.stderr for words in NO_REGISTRY):
+        pytest.skip("no registry has dolfinx's wheels for this machine")
+    assert not installed.returncode, installed.stderr
+    for name in ("my_surface.toml", "ground_steel.txt"):
+        shutil.copy(ROOT / "demos" / "scenes" / name, folder)
+    (folder / "body.toml").write_text(BODY, encoding="utf-8")
+    write_box(folder / "cube.msh", 3 * [np.linspace(0.0, 1.0, 7)])
+    return folder
+
+
+def call_alone(folder, *words, **options):
+    """Call a command of the environment, its own first on PATH, without the project's on it."""
+    path = f"{folder / 'env' / 'bin'}{os.pathsep}{os.environ['PATH']}"
+    return call(*words, cwd=folder, **MPI_ENVIRONMENT, PATH=path, PYTHONPATH="", **options)
+
+
+def forces(folder):
+    with (folder / "history.csv").open(encoding="utf-8") as file:
+        return [float(row["force_N"]) for row in csv.DictReader(file)]
+
+
+def test_with_the_wheels_of_dolfinx_the_doctor_is_content(alone):
+    shown = call_alone(alone, "patchlaw", "doctor").stdout
+    assert "MPICH" in shown and "by PETSc's GAMG, as there is no hypre" in shown
+    assert f"{alone / 'env' / 'bin' / 'mpirun'}" in shown
+
+
+def test_with_the_wheels_of_dolfinx_the_main_scene_runs(alone):
+    call_alone(alone, "patchlaw", "run", "my_surface.toml")
+    with (alone / "results" / "my_surface" / "history.csv").open(encoding="utf-8") as file:
+        last = list(csv.DictReader(file))[-1]
+    assert f"{1e3 * float(last['approach_mm']):.4f}" == "0.5899"  # the README's
+
+
+def test_with_the_wheels_of_dolfinx_bodies_give_the_same_on_two_ranks(alone):
+    words = ("run", "body.toml", "--out")
+    call_alone(alone, "mpirun", "-n", "2", "patchlaw", *words, "ranks")
+    call_alone(alone, "patchlaw", *words, "serial")
+    call(sys.executable, "-m", "patchlaw", *words, "here", cwd=alone, PYTHONPATH=str(ROOT))
+    here = forces(alone / "here")
+    assert len(here) == 2 and here[-1] > 0.1
+    for other in ("serial", "ranks"):
+        # residuals of 1e-10, with other multigrid methods
+        assert forces(alone / other) == pytest.approx(here, rel=1e-8)
+
+
+def test_with_the_wheels_of_dolfinx_a_part_of_the_suite_passes(alone):
+    for folder in ("tests", "demos/scenes"):
+        kept = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / folder, alone / folder, ignore=kept)
+    shutil.copy(ROOT / "pyproject.toml", alone)
+    words = ("-q", "-n", "0", *OF_THE_SUITE)
+    shown = call_alone(alone, "env/bin/python", "-P", "-m", "pytest", *words).stdout
+    assert " passed" in shown and " failed" not in shown

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -13,6 +14,7 @@ from helpers.machine_parts import Part, part_body, read_part
 
 from geometry import BlockShape, RefinedShape
 from macro import Block, Material, block_mesh
+from macro.linear_solvers import selection
 from macro.linear_solvers.multigrid import coarser_grids, lattice_of
 
 COMM = MPI.COMM_WORLD
@@ -92,5 +94,9 @@ if __name__ == "__main__":
     result = {name: run(case) for name, case in CASES.items()}
     for name, (part, options) in PARTS.items():
         result[name] = solved(part_body(read_part(Part(**part), COMM), **options))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(selection, "has_hypre", lambda: False)
+        part, options = PARTS["part, flat"]
+        result["part, without hypre"] = solved(part_body(read_part(Part(**part), COMM), **options))
     if COMM.rank == 0:
         print(json.dumps(result))

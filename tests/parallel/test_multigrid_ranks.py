@@ -2,6 +2,7 @@
 
 import pytest
 from helpers.on_ranks import OnRanks
+from helpers.petsc_build import ALGEBRAIC
 
 pytestmark = pytest.mark.long
 RANKS = [3]
@@ -17,9 +18,9 @@ def found(waiting_ranks):
 KINDS = {
     **dict.fromkeys(["graded", "margin", "quadratic", "tetrahedra", "column"], "mg"),
     **{"stiff volume": "mg", "incompressible": "cholesky"},
-    **{"refined": "mg", "refined, linear": "hypre", "refined, incompressible": "cholesky"},
-    **{"part, linear": "hypre", "part, quadratic": "mg", "part, hexahedra": "hypre"},
-    **{"part, quadratic hexahedra": "mg", "part, flat": "hypre"},
+    **{"refined": "mg", "refined, linear": ALGEBRAIC, "refined, incompressible": "cholesky"},
+    **{"part, linear": ALGEBRAIC, "part, quadratic": "mg", "part, hexahedra": ALGEBRAIC},
+    **{"part, quadratic hexahedra": "mg", "part, flat": ALGEBRAIC, "part, without hypre": "gamg"},
 }
 
 

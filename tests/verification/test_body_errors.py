@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.random_bodies import FACES, arrays_of, drawn, problem_on, stated_and_true
-from helpers.refined_mesh import refined
+from helpers.random_bodies import drawn, mesh_of, problem_on, stated_and_true
 from mpi4py import MPI
 
 from geometry import Control
@@ -20,29 +19,9 @@ def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
     assert found.mesh < 6.0 * true
 
 
-@pytest.mark.parametrize("seed", [3, 9])  # hexahedra of a ring, tetrahedra of a wedge
-def test_refinement_keeps_volumes_and_faces_and_halves_cells(seed):
-    body = drawn(seed)
-    once = arrays_of(body)
-    twice, count = refined(once), once.cells.shape[1]
-    assert len(twice.cells) == 8 * len(once.cells)
-    faces = [problem_on(body, arrays, MPI.COMM_SELF)[0] for arrays in (once, twice)]
-    assert faces[1].areas == pytest.approx(faces[0].areas, rel=1e-12)
-    # nodes of quadratic elements are the vertices of cells half as long
-    assert len(twice.points) == problem_on(body, once, MPI.COMM_SELF)[0].body.dofs // 3
-    for name, tag in FACES.items():
-        assert np.sum(twice.facet_tags == tag) == 4 * np.sum(once.facet_tags == tag), name
-    if count == 4:
-        edges = [mesh.points[mesh.cells[:, 1:]] - mesh.points[mesh.cells[:, :1]]
-                 for mesh in (once, twice)]  # fmt: skip
-        volumes = [np.abs(np.linalg.det(each)) for each in edges]
-        assert volumes[1].min() == pytest.approx(volumes[0].min() / 8, rel=1e-9)
-        assert volumes[1].sum() == pytest.approx(volumes[0].sum(), rel=1e-12)
-
-
 def test_quadrature_matters_where_a_plane_touches_a_part_of_the_face():
     body = drawn(3)  # held in a tilt
-    face, problem_of = problem_on(body, arrays_of(body), MPI.COMM_SELF)
+    face, problem_of = problem_on(body, mesh_of(body, MPI.COMM_SELF))
     load = body.pressure * float(face.areas.sum())
     state = problem_of(face).solve(Control(force=load, tilt=body.tilt))
     assert 0.05 < np.mean(state.sample_pressure == 0.0) < 0.95

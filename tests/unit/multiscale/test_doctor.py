@@ -61,6 +61,28 @@ def test_a_launcher_that_is_missing_is_a_warning(monkeypatch):
     assert (found.state, "no mpirun on PATH" in found.text) == ("warning", True)
 
 
+def test_the_mpirun_of_another_mpi_is_a_warning(monkeypatch, tmp_path):
+    """As where an environment has its MPI from a wheel, and the system one of its own."""
+    own, other = tmp_path / "bin" / "mpirun", tmp_path / "other" / "mpirun"
+    for each in (own, other):
+        each.parent.mkdir()
+        each.touch(mode=0o755)
+    monkeypatch.setattr(doctor.sys, "prefix", str(tmp_path))
+    monkeypatch.setenv("PATH", str(other.parent))
+    found = doctor.launcher(None)
+    assert (found.state, f"{other} comes first on PATH" in found.text) == ("warning", True)
+    assert found.remedy.endswith(f"start ranks with {own}")
+    monkeypatch.setenv("PATH", f"{own.parent}{os.pathsep}{other.parent}")
+    assert doctor.launcher(None).state == "ok"
+
+
+@pytest.mark.parametrize(("there", "by"), [(True, "by hypre"), (False, "by PETSc's GAMG")])
+def test_the_multigrid_of_meshes_is_named(monkeypatch, there, by):
+    monkeypatch.setattr("macro.linear_solvers.options.has_hypre", lambda: there)
+    found = doctor.petsc(None)
+    assert (found.state, f"coarsen {by}" in found.text) == ("ok", True)
+
+
 def test_singletons_under_a_foreign_launcher_are_seen(monkeypatch):
     monkeypatch.setenv("PMI_SIZE", "4")
     found = doctor.launcher(None)

@@ -13,6 +13,7 @@ from geometry.rigid_plane import Control
 from multiscale import Run, Scene, law_errors, run
 from multiscale.law_errors import interpolation_errors, mean_error
 from multiscale.readable import quantity
+from support.errors import InputError
 
 CELLS = (5, 4, 3)
 TICKS = BlockShape(interface=(1.1, 0.9), height=0.8, cells=CELLS).ticks
@@ -99,7 +100,8 @@ def test_linear_elements_without_affordable_quadratic_ones_leave_no_stated_error
 
 @pytest.mark.parametrize(("accuracy", "kept"), [(0.4, True), (0.001, False)])
 def test_an_accuracy_is_kept_or_said_not_to_be(mesh, accuracy, kept):
-    history = run(scene(mesh, accuracy=accuracy, law={"kind": "representative"}))
+    stated = {"body": {**body(mesh), "refinements": 0}, "micro": {"finite_slopes": False}}
+    history = run(scene(mesh, accuracy=accuracy, law={"kind": "representative"}, **stated))
     step = history.steps[-1]
     assert history.accuracy.kept is kept
     assert history.accuracy.error == pytest.approx(step.force_error_N / step.force_N, rel=1e-12)
@@ -194,3 +196,29 @@ def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
         assert errors["quadrature"] < 1e-4 * step.force_N
         assert 0.0 < errors["mesh"] < 0.1 * step.force_N
     assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
+
+
+def test_a_half_space_on_the_other_side_is_an_error_on_the_scale_of_the_face(mesh):
+    """Love's mean displacement of a square under a uniform pressure, times the stiffness."""
+    counter = {"young_modulus": 9300.0, "poisson_ratio": 0.31}
+    law, load = {"kind": "representative"}, {"force": "3.7 N", "steps": 1}
+    whole = Run(scene(mesh, law=law, load=load, counter_body=counter, accuracy=0.2))
+    (step,) = whole.load_steps()
+    press, d = whole.coupling.solver.press, 1e-6
+    near = [press(Control(approach=step.approach_mm + s * d)).force_N for s in (-1, 1)]
+    moved = 0.946 * 3.7 / (1.1 * 0.9) ** 0.5 * (1.0 - 0.31**2) / 9300.0
+    expected = moved * (near[1] - near[0]) / (2 * d)
+    errors = dict(step.errors)
+    assert errors["counter-body"] == pytest.approx(expected, rel=1e-4)  # a difference's
+    assert errors["counter-body"] == max(errors.values())
+    assert "most of it by counter-body" in whole.history().notes[0]
+    assert "counter-body" in whole.coupling.error_statement()
+    whole.close()
+
+
+def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
+    turned = np.diag([1.0, -1.0, -1.0])
+    ticks = TICKS[0], TICKS[1], np.asarray(TICKS[2]) - TICKS[2][-1]
+    beside = write_box(tmp_path / "beside.msh", ticks, turn=turned, shift=(0.0, -0.01, 0.0))
+    with pytest.raises(InputError, match=r"counter_body\.contact: .* no part in common"):
+        Run(scene(mesh, law={"kind": "representative"}, counter_body=body(beside)))

@@ -8,6 +8,7 @@ from helpers.contact_laws import Spring
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import FacePair, LawContactProblem, Material
+from macro.linear_solvers import selection
 from macro.linear_solvers.joint import joint_solver
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 
@@ -42,6 +43,13 @@ def faces(cells=("tetrahedron", "tetrahedron"), orders=(1, 1), materials=(STEEL,
 )
 def test_iterations_do_not_depend_on_the_stiffness_of_the_laws(cells, orders, stiffness):
     problem = LawContactProblem(faces(cells, orders), [Spring(stiffness)], "pointwise")
+    state = problem.solve(Control(approach=1e-3))
+    assert state.linear_iterations <= 21 * state.iterations
+
+
+def test_without_hypre_laws_are_known_as_well(monkeypatch):
+    monkeypatch.setattr(selection, "has_hypre", lambda: False)
+    problem = LawContactProblem(faces(), [Spring(1e5)], "pointwise")
     state = problem.solve(Control(approach=1e-3))
     assert state.linear_iterations <= 21 * state.iterations
 

@@ -5,10 +5,11 @@ import pytest
 from petsc4py import PETSc
 
 from macro.linear_solvers import scalar_multigrid as module
+from macro.linear_solvers.options import has_hypre
 from micro.flow.gap_flow import gap_flow
 
 
-@pytest.mark.skipif(not module.has_scalar_multigrid(), reason="PETSc without hypre")
+@pytest.mark.skipif(not has_hypre(), reason="PETSc without hypre")
 def test_flows_are_those_of_a_factorisation():
     """Gaps from 1 to 10⁻⁵, whose g³ differ by 10¹⁵."""
     rng = np.random.default_rng(4)

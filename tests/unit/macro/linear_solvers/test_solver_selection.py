@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from helpers.petsc_build import ALGEBRAIC
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -45,7 +46,7 @@ def options():
     [
         ("Q1", 0.495, "mg"),
         ("Q2", 0.4999, "cholesky"),
-        ("P1*", 0.45, "hypre"),  # * without a lattice
+        ("P1*", 0.45, ALGEBRAIC),  # * without a lattice
         ("P2*", 0.45, "mg"),
         ("P1*", 0.46, "cholesky"),
         ("P2*", 0.46, "cholesky"),
@@ -58,7 +59,7 @@ def test_choice(iterations, element, ratio, kind):
         assert iterations(block) <= 2
 
 
-@pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", "hypre"), ("P2*", "mg")])
+@pytest.mark.parametrize(("element", "kind"), [("Q1", "mg"), ("P1*", ALGEBRAIC), ("P2*", "mg")])
 def test_what_is_too_large_is_not_factorised(monkeypatch, iterations, element, kind):
     monkeypatch.setattr(block_solver, "FACTORISED", 100)
     blocks = [make(element, ratio) for ratio in (0.4975, 0.499375)]

@@ -238,7 +238,7 @@ HARD = 2e-4
 
 def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
     """The rule's meshes are taken, or refused with what they need; no other way is taken."""
-    monkeypatch.setattr(search, "_TRIALS", 1)  # of cells
+    monkeypatch.setattr(search, "TRIALS", 1)  # of cells
     given = scene(error=HARD)
     chosen = make_setup(given, mesh_error=lambda setup: 1e-4)
     assert chosen.scene.kind == "reference"
@@ -248,7 +248,7 @@ def test_a_choice_does_not_know_how_much_memory_there_is(monkeypatch):
 
 def test_meshes_of_more_unknowns_than_are_chosen_are_not(monkeypatch):
     monkeypatch.setattr(search, "_MOST_UNKNOWNS", 1000)
-    monkeypatch.setattr(search, "_TRIALS", 1)
+    monkeypatch.setattr(search, "TRIALS", 1)
     setup = make_setup(scene(error=HARD), mesh_error=lambda setup: 1e-4)
     assert setup.scene.kind == "concurrent"
     assert not setup.decision.kept and "is not kept" in setup.decision.warning

@@ -24,8 +24,8 @@ def scene(tmp_path, monkeypatch):
 @pytest.mark.parametrize("command", ["run", "surface", "laws"])
 def test_results_of_another_scene_are_kept(scene, capsys, command):
     kind = "isolated" if command == "laws" else "analytic"
-    words = [command, "scene.toml", "--set", f"coupling.kind={kind}", "patches.grid=[1, 1]"]
-    words.append("load.steps=1")
+    words = [command, "scene.toml", "--out", "results/scene", "--set", f"coupling.kind={kind}"]
+    words += ["patches.grid=[1, 1]", "load.steps=1"]
     assert main(["run", *words[1:]]) == 0
     capsys.readouterr()
     files = [path for path in (scene.parent / "results").rglob("*") if path.is_file()]
@@ -39,9 +39,20 @@ def test_results_of_another_scene_are_kept(scene, capsys, command):
     assert main([*words, STIFFER, "load.steps=2", "--overwrite"]) == 0
 
 
+def test_keys_that_are_set_make_folders_of_their_own(scene, capsys):
+    for changes in ([], [STIFFER], ["load.steps=1", STIFFER], [STIFFER, "load.steps=1"]):
+        assert main(["run", "scene.toml", "--set", *changes, "output.figures=false"]) == 0
+    assert {path.name for path in (scene.parent / "results").iterdir()} == {
+        "scene",
+        "scene-block.young_modulus=5_GPa",
+        "scene-block.young_modulus=5_GPa-load.steps=1",  # in whatever order
+    }
+
+
 def test_the_same_scene_is_run_again(scene, capsys):
     assert main(["run", "scene.toml"]) == 0
-    assert main(["run", "scene.toml", "--set", "block.young_modulus=4000"]) == 0
+    words = ("--out", "results/scene", "--set", "block.young_modulus=4000")
+    assert main(["run", "scene.toml", *words]) == 0
     # what is written beside the results makes no other scene of it
     assert main(["run", "scene.toml", "--set", "output.report=true"]) == 0
     assert (scene.parent / "results" / "scene" / "report.html").is_file()
@@ -50,7 +61,7 @@ def test_the_same_scene_is_run_again(scene, capsys):
 def test_only_the_first_keys_are_named(scene, capsys):
     assert main(["run", "scene.toml"]) == 0
     changes = ("patches.grid=[3, 3]", "load.steps=3", "surface.spectrum.seed=4")
-    assert main(["run", "scene.toml", "--set", STIFFER, *changes]) == 2
+    assert main(["run", "scene.toml", "--out", "results/scene", "--set", STIFFER, *changes]) == 2
     assert "block.young_modulus was 4000.0" in (error := capsys.readouterr().err)
     assert error.count(" was ") == 3
     assert "and 1 more" in error
@@ -80,7 +91,7 @@ def test_a_killed_run_of_another_scene_is_kept(scene, capsys):
     with CheckpointWriter(folder, run, lambda: None) as checkpoints:
         checkpoints.accept()
     assert (folder / FILE_NAME).is_file()
-    assert main(["run", "scene.toml", "--set", STIFFER]) == 2
+    assert main(["run", "scene.toml", "--out", "results/scene", "--set", STIFFER]) == 2
     error = capsys.readouterr().err
     assert "block.young_modulus = 5000.0: is not what the run in results/scene began with" in error
     assert "--overwrite (allowed: 4000.0)" in error

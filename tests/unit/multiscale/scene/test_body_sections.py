@@ -208,10 +208,6 @@ REFUSED = REFUSED_LOADS | {
         {"body": BODY, "output": {"contact": "last"}, **REPRESENTATIVE},
         "output.contact: does not go with law.kind = 'representative', which has no spots",
     ),
-    "accuracy on a mesh": (
-        {"body": BODY, "accuracy": 0.02},
-        "accuracy: is not kept on [body], nor are surface.grid or coupling.kind chosen there",
-    ),
     "seeds of a file": (
         {
             "body": BODY,
