@@ -30,12 +30,37 @@ class SliderState:
     Args:
         closure: Closures, shape (n,) [mm].
         slip: Tangential displacements of the plane against the samples, shape (n, 2) [mm].
-        stress: Shear stresses of the springs, before they are scaled, shape (n, N, 2) [MPa].
+        stress: Shear stresses of the springs, before they are scaled, shape (n, 2, N) [MPa].
     """
 
     closure: Array
     slip: Array
     stress: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SliderRecord:
+    """What load steps leave behind of friction on a whole face, on any number of ranks.
+
+    Attributes:
+        place: Places of the samples in coordinates of the face, shape (m, 2) [mm].
+        shear: Shear stresses there, shape (m, 2) [MPa].
+        closure: Their closures, shape (m,) [mm].
+        slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
+        stress: Shear stresses of their springs, before they are scaled, shape (m, 2, N) [MPa].
+        shift: Shift of the plane, shape (2,) [mm].
+        direction: Unit vector of its last change, shape (2,).
+        dissipated: Energy lost to friction since the start [N mm].
+    """
+
+    place: Array
+    shear: Array
+    closure: Array
+    slip: Array
+    stress: Array
+    shift: Array
+    direction: Array
+    dissipated: float
 
 
 class SliderResponse(NamedTuple):
@@ -46,21 +71,33 @@ class SliderResponse(NamedTuple):
         by_slip: Their derivatives by the tangential displacement, shape (n, 2, 2) [MPa/mm].
         by_closure: Their derivatives by the closure, which make tangents unsymmetric, shape (n, 2)
             [MPa/mm].
-        after: The sliders after the step.
-        lost: Energy per area that friction took up in the step, ≥ 0, shape (n,) [N/mm].
-        stuck: Tangential stiffness of the springs that stick, shape (n,) [MPa/mm].
         sticking: Tangential stiffness that all springs would have, shape (n,) [MPa/mm].
-        stick_closure: Closure at which springs as stiff as those that stick have touched: area in
-            contact there sticks, shape (n,) [mm].
+        after: The sliders after the step.
+        trial: Stresses of the springs if none slipped, shape (n, 2, N) [MPa].
+        scale: What stresses of springs are scaled by, shape (n,).
     """
 
     stress: Array
     by_slip: Array
     by_closure: Array
+    sticking: Array
     after: SliderState
+    trial: Array
+    scale: Array
+
+
+class SliderStep(NamedTuple):
+    """What a step did to n samples.
+
+    Attributes:
+        lost: Energy per area that friction took up in the step, ≥ 0, shape (n,) [N/mm].
+        stuck: Tangential stiffness of the springs that stick, shape (n,) [MPa/mm].
+        stick_closure: Closure at which springs as stiff as those that stick have touched: area in
+            contact there sticks, shape (n,) [mm].
+    """
+
     lost: Array
     stuck: Array
-    sticking: Array
     stick_closure: Array
 
 
@@ -80,6 +117,9 @@ class Sliders:
         ratios: Mindlin's ratio r of every law.
         patch: Law of every sample, shape (n,).
         coefficient: Coefficient of friction μ.
+
+    Attributes:
+        ratio: r of every sample, shape (n,).
     """
 
     def __init__(
@@ -97,10 +137,10 @@ class Sliders:
                 row[: len(bed)] = getattr(bed, name)
             return rows[patch]
 
+        self.ratio = np.asarray(ratios, float)[patch]
         self._beds, self._patch = tuple(beds), patch
         self._start, self._width = padded("start", np.inf), padded("width", 0.0)
         self._stiffness = padded("stiffness", 0.0)
-        self._ratio = np.asarray(ratios, float)[patch]
         self._coefficient = coefficient
 
     @property
@@ -108,10 +148,17 @@ class Sliders:
         """The sliders where nothing has touched yet."""
         n, springs = self._start.shape
         closure = np.full(n, -1e30)  # far from touching, and a number
-        return SliderState(closure=closure, slip=np.zeros((n, 2)), stress=np.zeros((n, springs, 2)))
+        return SliderState(closure=closure, slip=np.zeros((n, 2)), stress=np.zeros((n, 2, springs)))
 
     def respond(
-        self, before: SliderState, closure: Array, slip: Array, pressure: Array, rate: Array
+        self,
+        before: SliderState,
+        closure: Array,
+        slip: Array,
+        pressure: Array,
+        rate: Array,
+        *,
+        sticks: bool = False,
     ) -> SliderResponse:
         """Return the shear stresses after a step.
 
@@ -121,41 +168,59 @@ class Sliders:
             slip: Tangential displacements there, shape (n, 2) [mm].
             pressure: Pressures p of the laws there, shape (n,) [MPa].
             rate: dp/dc there, shape (n,) [MPa/mm].
+            sticks: Whether springs stick whatever they bear, as a first guess of a step takes them.
         """
         springs, mu = self._at(closure), self._coefficient
-        moved = (slip - before.slip) / self._ratio[:, None]
-        trial = before.stress + springs.stiffness[..., None] * moved[:, None]
-        size = np.hypot(trial[..., 0], trial[..., 1])
-        bound = mu * springs.force
-        slips = size > bound
-        share = np.where(slips, bound / np.where(slips, size, 1.0), 1.0)
-        after = trial * share[..., None]
-        ahead = np.where(slips[..., None], trial / np.where(slips, size, 1.0)[..., None], 0.0)
+        moved = (slip - before.slip) / self.ratio[:, None]
+        mx, my = moved[:, :1], moved[:, 1:]
+        trial = before.stress + springs.stiffness[:, None] * moved[..., None]
+        tx, ty = trial[:, 0], trial[:, 1]
+        square, bound = tx * tx + ty * ty, mu * springs.force
+        slips = (square > bound * bound) & (not sticks)
+        least = 1.0 / np.sqrt(np.where(slips, square, 1.0))
+        share = np.where(slips, bound * least, 1.0)
+        least *= slips  # directions of slip, 0 for springs that stick
+        ax, ay = tx * least, ty * least
+        after = trial * share[:, None]
 
         of_springs = springs.force.sum(axis=1)
-        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=of_springs > 0.0)
-        stress = after.sum(axis=1)
-        along = share * springs.stiffness
-        by_slip = along.sum(axis=1)[:, None, None] * np.eye(2)
-        by_slip -= np.einsum("ns,nsi,nsj->nij", along, ahead, ahead)
+        loaded = of_springs > 0.0
+        scale = np.divide(pressure, of_springs, out=np.ones_like(pressure), where=loaded)
+        stress, along = after.sum(axis=2), share * springs.stiffness
+        by_slip = np.empty((len(closure), 2, 2))
+        by_slip[:, 0, 0] = (along * (1.0 - ax * ax)).sum(axis=1)
+        by_slip[:, 1, 1] = (along * (1.0 - ay * ay)).sum(axis=1)
+        by_slip[:, 0, 1] = by_slip[:, 1, 0] = -(along * ax * ay).sum(axis=1)
         new = share * springs.growth
+        turned = mu * springs.stiffness - new * (ax * mx + ay * my)
         by_closure = new.sum(axis=1)[:, None] * moved
-        by_closure -= np.einsum("ns,nsi,nsj,nj->ni", new, ahead, ahead, moved)
-        by_closure += mu * np.einsum("ns,nsi->ni", springs.stiffness, ahead)
-        mean = np.divide(
-            stress, of_springs[:, None], out=np.zeros_like(stress), where=of_springs[:, None] > 0.0
-        )
-        scaling = (rate - scale * springs.stiffness.sum(axis=1))[:, None] * mean
-        sticks = np.hypot(after[..., 0], after[..., 1]) < (1.0 - _AT_BOUND) * bound
-        stuck = np.where(sticks, springs.stiffness, 0.0).sum(axis=1)
+        by_closure += np.stack([(turned * ax).sum(axis=1), (turned * ay).sum(axis=1)], axis=1)
+        stiffness = springs.stiffness.sum(axis=1)
+        scaling = np.divide(rate - scale * stiffness, of_springs, out=0.0 * rate, where=loaded)
         return SliderResponse(
             stress=scale[:, None] * stress,
-            by_slip=(scale / self._ratio)[:, None, None] * by_slip,
-            by_closure=scale[:, None] * by_closure + scaling,
+            by_slip=(scale / self.ratio)[:, None, None] * by_slip,
+            by_closure=scale[:, None] * by_closure + scaling[:, None] * stress,
+            sticking=scale / self.ratio * stiffness,
             after=SliderState(closure=closure, slip=slip, stress=after),
-            lost=scale * self._lost(before, trial, after, springs),
-            stuck=scale / self._ratio * stuck,
-            sticking=scale / self._ratio * springs.stiffness.sum(axis=1),
+            trial=trial,
+            scale=scale,
+        )
+
+    def step(self, before: SliderState, found: SliderResponse) -> SliderStep:
+        """Return what a step did.
+
+        Args:
+            before: The sliders before it.
+            found: What it led to.
+        """
+        now, stress = self._at(found.after.closure), found.after.stress
+        sizes = np.hypot(stress[:, 0], stress[:, 1])
+        sticks = sizes < (1.0 - _AT_BOUND) * self._coefficient * now.force
+        stuck = np.where(sticks, now.stiffness, 0.0).sum(axis=1)
+        return SliderStep(
+            lost=found.scale * self._lost(before, found.trial, stress, now),
+            stuck=found.scale / self.ratio * stuck,
             stick_closure=self._closure_of(stuck),
         )
 
@@ -169,18 +234,16 @@ class Sliders:
             state: Their state.
         """
         then, springs = other._at(state.closure), self._at(state.closure)
-        moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[..., None]
-        stress = np.zeros((len(state.closure), self._start.shape[1], 2))
+        moved = state.stress / np.where(then.stiffness > 0.0, then.stiffness, 1.0)[:, None]
+        stress = np.zeros((len(state.closure), 2, self._start.shape[1]))
         for law in np.unique(self._patch):
             rows, bed, old = self._patch == law, self._beds[law], other._beds[law]
             lines = [np.interp(bed.centre, old.centre, each) for each in np.eye(len(old))]
-            found = np.einsum(
-                "os,noi->nsi", np.reshape(lines, (len(old), -1)), moved[rows][:, : len(old)]
-            )
-            stress[rows, : len(bed)] = found
-        stress *= springs.stiffness[..., None]
-        size, bound = np.hypot(stress[..., 0], stress[..., 1]), self._coefficient * springs.force
-        stress *= np.where(size > bound, bound / np.where(size > bound, size, 1.0), 1.0)[..., None]
+            weights = np.reshape(lines, (len(old), len(bed)))
+            stress[rows, :, : len(bed)] = moved[rows][..., : len(old)] @ weights
+        stress *= springs.stiffness[:, None]
+        size, bound = np.hypot(stress[:, 0], stress[:, 1]), self._coefficient * springs.force
+        stress *= np.where(size > bound, bound / np.where(size > bound, size, 1.0), 1.0)[:, None]
         return SliderState(closure=state.closure, slip=state.slip, stress=stress)
 
     def _at(self, closure: Array) -> _Springs:
@@ -205,19 +268,19 @@ class Sliders:
         """
         then = self._at(before.closure)
         stiffness = np.maximum(now.stiffness, then.stiffness)
-        slip = (trial - after) * self._ratio[:, None, None]
-        slip /= np.where(stiffness > 0.0, stiffness, 1.0)[..., None]
+        slip = (trial - after) * self.ratio[:, None, None]
+        slip /= np.where(stiffness > 0.0, stiffness, 1.0)[:, None]
         rises = now.force > then.force
         mean = np.where(rises, 0.5 + 0.5 * then.force / np.where(rises, now.force, 1.0), 1.0)
-        own = mean * (after * slip).sum(axis=-1)
-        falling = 0.5 * ((before.stress - after) * slip).sum(axis=-1)
+        own = mean * (after * slip).sum(axis=1)
+        falling = 0.5 * ((before.stress - after) * slip).sum(axis=1)
         lost: Array = (np.maximum(own, 0.0) + np.maximum(falling, 0.0)).sum(axis=1)
         return lost
 
     def _closure_of(self, stiffness: Array) -> Array:
         """Return the closures at which the springs have a stiffness, shape (n,) [mm]."""
         if not self._start.shape[1]:
-            return np.full(len(stiffness), -np.inf)
+            return np.full(len(stiffness), np.inf)
         upto = np.cumsum(self._stiffness, axis=1)
         last = np.count_nonzero(self._stiffness, axis=1) - 1
         group = np.minimum((upto <= stiffness[:, None]).sum(axis=1), np.maximum(last, 0))

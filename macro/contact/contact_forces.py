@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from mpi4py import MPI
@@ -90,6 +90,20 @@ class SingleLaws:
     def stiffnesses(self, patch: Indices, closure: Array) -> Array:
         """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
         return by_patch(self._stiffnesses, patch, closure)
+
+
+class StickingFrom(NamedTuple):
+    """Shear stresses of n samples that stick: τ + k/r (s − u), with their displacements u.
+
+    Attributes:
+        stress: τ, of the latest load step, shape (n, 2) [MPa].
+        slip: s, how far the plane has moved since then against where they were, (n, 2) [mm].
+        ratio: r, Mindlin's ratio, shape (n,).
+    """
+
+    stress: Array
+    slip: Array
+    ratio: Array
 
 
 class ContactForces:
@@ -241,6 +255,8 @@ class ContactForces:
         pressure: Array,
         stiffness: Array,
         load: PETSc.Vec,
+        *,
+        first: bool,
     ) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
@@ -250,11 +266,20 @@ class ContactForces:
             pressure: Their pressures on the lines [MPa].
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
+            first: Whether these are the first lines of a load step, which friction tells apart.
         """
         samples = self._sampling.values
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         self.linearise(stiffness)
+
+    def sticking_from_last(self) -> StickingFrom | None:
+        """Return what springs that stick bear from the latest load step on; None without them."""
+        return None
+
+    def along(self, displacement: PETSc.Vec) -> Array:
+        """Return displacements along the face that shear stresses follow, none without friction."""
+        return np.zeros((len(self._sampling.weight), 0))
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step, none without friction.

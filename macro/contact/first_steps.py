@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 NEAR = 0.01
 """Residual over the contact forces from which Newton's method goes on alone."""
+_FAR = 0.1
+"""Residual beyond which the first lines are those of contact that sticks. Nearer, the guess is that
+already, in the basis of earlier solutions."""
 _MOST_STEPS = 8
 _TOLERANCE = 0.001
 """Relative tolerance of linear solves. With 0.01 closures under a prescribed approach were off by a
@@ -68,7 +71,8 @@ class FirstSteps:
         own = solver.getTolerances()[0]
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            self._linearise(displacement, lines)
+            first = len(residuals) == 1 and residuals[0] > _FAR
+            self._linearise(displacement, lines, first=first)
             self._follow()
             solver.setTolerances(rtol=_TOLERANCE)
             solver.solve(self._residual, step)
@@ -97,10 +101,11 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _linearise(self, displacement: PETSc.Vec, lines: Lines) -> None:
+    def _linearise(self, displacement: PETSc.Vec, lines: Lines, *, first: bool) -> None:
         """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
         matrix, forces = self._equilibrium.matrix, self._forces
         closure = self._closure_on(lines, displacement)
-        forces.write_lines(displacement, closure, lines.at(closure), lines.stiffness, self._load)
+        pressure, stiffness = lines.at(closure), lines.stiffness
+        forces.write_lines(displacement, closure, pressure, stiffness, self._load, first=first)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -6,7 +6,6 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,9 +14,9 @@ from scipy.spatial import cKDTree
 
 from geometry.rigid_plane import Control
 from geometry.shear_state import ShearControl
-from geometry.sliders import SliderResponse, Sliders, SliderState
+from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
-from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws, StickingFrom
 from macro.contact.face_contact_state import FaceShear
 from macro.contact.loaded_face import ContactFace, Mode
 from support.arrays import Array
@@ -48,31 +47,6 @@ class SliderMemory(NamedTuple):
     """
 
     sliders: SliderState
-    stress: Array
-    shift: Array
-    direction: Array
-    dissipated: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class SliderRecord:
-    """What load steps leave behind of friction on a whole face, on any number of ranks.
-
-    Attributes:
-        place: Places of the samples in coordinates of the face, shape (m, 2) [mm].
-        shear: Shear stresses there, shape (m, 2) [MPa].
-        closure: Their closures, shape (m,) [mm].
-        slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
-        stress: Shear stresses of their springs, before they are scaled, shape (m, N, 2) [MPa].
-        shift: Shift of the plane, shape (2,) [mm].
-        direction: Unit vector of its last change, shape (2,).
-        dissipated: Energy lost to friction since the start [N mm].
-    """
-
-    place: Array
-    shear: Array
-    closure: Array
-    slip: Array
     stress: Array
     shift: Array
     direction: Array
@@ -168,7 +142,13 @@ class FrictionalForces(ContactForces):
         return self.respond_on(closure, displacement, self.pressure(closure), self._rate(closure))
 
     def respond_on(
-        self, closure: Array, displacement: PETSc.Vec, pressure: Array, rate: Array
+        self,
+        closure: Array,
+        displacement: PETSc.Vec,
+        pressure: Array,
+        rate: Array,
+        *,
+        sticks: bool = False,
     ) -> SliderResponse:
         """Return the same where pressures and stiffnesses are not those of the laws.
 
@@ -177,13 +157,15 @@ class FrictionalForces(ContactForces):
             displacement: Displacements of the body [mm].
             pressure: Pressures, shape (n,) [MPa].
             rate: Their derivatives by the closure, shape (n,) [MPa/mm].
+            sticks: Whether springs stick whatever they bear.
         """
         moved = self.along(displacement)
 
         def respond(shift: Array) -> SliderResponse:
             slip = shift - self.preload - moved
             pressed = np.maximum(pressure, 0.0)
-            return self.sliders.respond(self.memory.sliders, closure, slip, pressed, rate)
+            before = self.memory.sliders
+            return self.sliders.respond(before, closure, slip, pressed, rate, sticks=sticks)
 
         if not self._shifts:
             return respond(self._shift)
@@ -279,11 +261,22 @@ class FrictionalForces(ContactForces):
         pressure: Array,
         stiffness: Array,
         load: PETSc.Vec,
+        *,
+        first: bool,
     ) -> None:
-        """Write the forces on laws that are lines; see `ContactForces.write_lines`."""
-        found = self.respond_on(closure, displacement, pressure, stiffness)
+        """Write the forces on laws that are lines; see `ContactForces.write_lines`.
+
+        First all springs stick: where slip is softer than sticking, later steps do not go too far.
+        """
+        found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
         self.write_stresses(pressure, found.stress, load)
         self.linearise_shear(stiffness, found)
+
+    def sticking_from_last(self) -> StickingFrom | None:
+        """Return what springs that stick bear; unchanged where the shift is not known yet."""
+        slip = self._shift - self.preload - self.memory.sliders.slip
+        ratio = np.full_like(self.sliders.ratio, np.inf) if self._shifts else self.sliders.ratio
+        return StickingFrom(self.memory.stress, slip, ratio)
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step."""
@@ -315,15 +308,17 @@ class FrictionalForces(ContactForces):
         tangent[:, 1:, 0], tangent[:, 1:, 1:] = response.by_closure, response.by_slip
         self._take(stiffness, tangent)
 
-    def linearise_sticking(self, response: SliderResponse) -> None:
-        """Move the derivative to that of springs that stick, under unchanging pressures.
+    def linearise_sticking(self, stiffness: Array, stuck: Array) -> None:
+        """Move the derivative to that of springs that stick, under a given shift.
 
         Args:
-            response: The shear stresses.
+            stiffness: Stiffnesses of the laws at this rank's samples, shape (n,) [MPa/mm].
+            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
         """
-        tangent = np.zeros((len(response.stuck), 3, 3))
-        tangent[:, 1:, 1:] = response.stuck[:, None, None] * np.eye(2)
-        self._take(np.zeros(len(response.stuck)), tangent)
+        tangent = np.zeros((len(stuck), 3, 3))
+        tangent[:, 1:, 1:] = stuck[:, None, None] * np.eye(2)
+        self._shear = _HELD
+        self._take(stiffness, tangent)
 
     def _take(self, stiffness: Array, tangent: Array) -> None:
         weight = self._sampling.weight
@@ -386,6 +381,7 @@ class FrictionalForces(ContactForces):
             displacement: Displacements there [mm].
         """
         found, before = self.respond(closure, displacement), self.memory
+        lost = self.sliders.step(before.sliders, found).lost
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         self.memory = SliderMemory(
@@ -393,7 +389,7 @@ class FrictionalForces(ContactForces):
             found.stress,
             self._shift.copy(),
             moved / size if size else before.direction,
-            before.dissipated + float(self.total(found.lost[:, None])[0]),
+            before.dissipated + float(self.total(lost[:, None])[0]),
         )
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear:
@@ -404,14 +400,16 @@ class FrictionalForces(ContactForces):
             displacement: Displacements [mm].
         """
         found = self.respond(closure, displacement)
-        lost = float(self.total(found.lost[:, None])[0])
+        step = self.sliders.step(self.memory.sliders, found)
+        lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
         return FaceShear(
             shift=(float(shift[0]), float(shift[1])),
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
-            stick_closure=np.minimum(found.stick_closure, closure),
+            stick_closure=np.minimum(step.stick_closure, closure),
+            stuck=step.stuck,
         )
 
     def record(self) -> SliderRecord:
@@ -439,11 +437,11 @@ class FrictionalForces(ContactForces):
         """
         sampling, size = self._sampling, self.levers.half
         own = np.column_stack([sampling.x, sampling.y])
-        springs = self.sliders.at_rest.stress.shape[1]
+        springs = self.sliders.at_rest.stress.shape[2]
 
         def found() -> Any:
             far, index = cKDTree(record.place).query(own) if len(own) else (np.zeros(0), [])
-            if np.any(far > _SAME_PLACE * size) or record.stress.shape[1] != springs:
+            if np.any(far > _SAME_PLACE * size) or record.stress.shape[2] != springs:
                 raise InputError("the sliders are those of another face, or of other laws")
             return np.asarray(index, np.intp)
 

@@ -16,6 +16,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from macro.contact.contact_forces import StickingFrom
 from macro.contact.equations import Equilibrium
 from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
@@ -60,6 +61,7 @@ class DisplacementBasis:
         self.vectors: list[Array] = []
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
         self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
+        self._along: list[Array] = []  # displacements of samples along the axes, (n, 2) each
         self._last: Array = np.empty(0)  # the latest solution in the basis
 
     def __len__(self) -> int:
@@ -99,6 +101,7 @@ class DisplacementBasis:
         first = max(0, len(self) + 1 - self._size)
         self.vectors = [*self.vectors, vector.copy()][first:]
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
+        self._along = [*self._along, self._equilibrium.forces.along(work)][first:]
         self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
         self._last = self._last[first:]
 
@@ -113,8 +116,8 @@ class DisplacementBasis:
     def write_guess(self, into: PETSc.Vec) -> Lines:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
-        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution. Shear
-        stresses stay those of that solution.
+        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution. What
+        stuck then sticks on.
 
         Returns:
             The lines of the next step from there.
@@ -124,7 +127,7 @@ class DisplacementBasis:
         pressure = y @ self._pressures
         closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
         lines = law_lines(forces, closure, pressure, stiffness)
-        sheared = self._work_of_shear()
+        sheared = self._equilibrium.forces.sticking_from_last()
         for _ in range(_STEPS):
             change = self._step(y, lines, sheared)
             y = y - change
@@ -142,13 +145,7 @@ class DisplacementBasis:
         displaced = (y @ self._sampled) / self._sampling.weight
         return self._equilibrium.forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _work_of_shear(self) -> Array:
-        """Return the work of the latest shear stresses along the basis, shape (k,)."""
-        load = self._equilibrium.matrix.createVecLeft()
-        self._equilibrium.forces.write_last_shear(load)
-        return np.asarray(self._sum(np.array([load.array_r @ each for each in self.vectors])))
-
-    def _step(self, y: Array, lines: Lines, sheared: Array) -> Array:
+    def _step(self, y: Array, lines: Lines, sheared: StickingFrom | None) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
         forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
         pressure = lines.at(self._closure_on(lines, y))
@@ -157,9 +154,21 @@ class DisplacementBasis:
             (columns * (lines.stiffness / weight)) @ columns.T,
             (columns @ forces.border(lines.stiffness)).T,
         ])  # fmt: skip
+        if sheared is not None:
+            parts[: len(y) + 1] += self._sticking(y, lines, sheared)
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
-        return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y - sheared + parts[0])
+        return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
+
+    def _sticking(self, y: Array, lines: Lines, last: StickingFrom) -> Array:
+        """Return the gradient and the stiffness of springs that stick, shape (k + 1, k)."""
+        stiffness = (lines.stiffness / last.ratio)[:, None]
+        along = np.array(self._along)
+        stress = last.stress + stiffness * (last.slip - np.einsum("k,kni->ni", y, along))
+        weighted = along * self._sampling.weight[:, None]
+        work = -np.einsum("kni,ni->k", weighted, stress)
+        stiff = np.einsum("kni,lni->kl", weighted * stiffness, along)
+        return np.vstack([work, stiff])
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

@@ -17,12 +17,13 @@ from petsc4py import PETSc
 from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactTangent
 from macro.contact.face_contact_state import FaceContactState, FaceShear
 from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
-from macro.contact.frictional_forces import FrictionalForces, SliderRecord, contact_forces
+from macro.contact.frictional_forces import FrictionalForces, contact_forces
 from macro.contact.interface_parts import (
     InterfaceLaws,
     chosen_face,

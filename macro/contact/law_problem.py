@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.rigid_plane import Control, RigidPlane
+from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactLaws
@@ -39,7 +40,7 @@ Indices = NDArray[np.intp]
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
 
-_STIFFNESS = 1e-6
+_STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
 
 _ROUGHLY = 1e-3
@@ -181,7 +182,7 @@ class LawContactProblem:
         if not isinstance(forces, FrictionalForces):
             return None
         shear = forces.shear_state(self._closure, solution)
-        self._sticking = forces.respond(self._closure, solution)
+        self._stuck = shear.stuck
         forces.accept(self._closure, solution)
         return shear
 
@@ -195,11 +196,37 @@ class LawContactProblem:
         if isinstance(self.forces, FrictionalForces) and memory is not None:
             self.forces.memory = memory
 
+    def slider_record(self) -> SliderRecord | None:
+        """Return what the load steps so far left behind of friction, of all ranks together."""
+        return self.forces.record() if isinstance(self.forces, FrictionalForces) else None
+
+    def restore_sliders(self, record: SliderRecord) -> None:
+        """Go on from what load steps left behind, on any number of ranks.
+
+        Args:
+            record: What `slider_record` returned.
+
+        Raises:
+            InputError: When it is that of another face, or of other laws.
+        """
+        assert isinstance(self.forces, FrictionalForces)
+        self.forces.restore(record)
+
+    def follow_sliders(self, other: LawContactProblem) -> None:
+        """Go on from what load steps left behind under other laws on the same face.
+
+        Args:
+            other: The problem with these laws.
+        """
+        mine, theirs = self.forces, other.forces
+        if isinstance(mine, FrictionalForces) and isinstance(theirs, FrictionalForces):
+            mine.follow(theirs)
+
     def tangential_stiffness(self) -> tuple[float, int]:
         """Return the derivative of the shear force along the plane's shift, body included [N/mm].
 
-        The shift changes on in the direction of its last change. Springs that stick follow it,
-        those that slip keep their stresses, and pressures stay as they are.
+        The shift changes on in the direction of its last change, under what else is prescribed of
+        the plane. Springs that stick follow it, those that slip keep their stresses.
 
         Returns:
             The derivative, and the linear iterations that it took.
@@ -212,22 +239,24 @@ class LawContactProblem:
         """
         forces, equilibrium = self.forces, self.equilibrium
         assert isinstance(forces, FrictionalForces)
-        found, ahead = self._sticking, forces.memory.direction
-        forces.linearise_sticking(found)
+        stuck, ahead = self._stuck, forces.memory.direction
+        forces.linearise_sticking(forces.stiffness(self._closure), stuck)
         self._preconditioner.update()
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        stress = found.stuck[:, None] * ahead
+        stress = stuck[:, None] * ahead
         forces.write_stresses(np.zeros(len(stress)), stress, load)
         solver = self.newton.snes.ksp
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_STIFFNESS)
         iterations = solve_linear(solver, load, moved) if load.norm() else 0
-        relaxed = found.stuck[:, None] * forces.along(moved)
+        relaxed = stuck[:, None] * forces.along(moved)
         compat.collect_garbage(load.comm)
         return float(forces.total(stress - relaxed) @ ahead), iterations
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
+
+        Shear stresses are those of the latest load step.
 
         Args:
             pressure: Pressures, shape (N,) [MPa].
@@ -237,7 +266,7 @@ class LawContactProblem:
         """
         if pressure.any():
             samples = pressure[self._sampling.patch]
-            self.basis.add(self._displacement(samples)[0], samples)
+            self.basis.add(self._displacement(samples, sheared=True)[0], samples)
 
     def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
         """Take a displacement for the latest solution, such as that on other elements.
@@ -313,14 +342,17 @@ class LawContactProblem:
         return iterations
 
     def _displacement(
-        self, pressure: Array, tolerance: float | None = None
+        self, pressure: Array, tolerance: float | None = None, *, sheared: bool = False
     ) -> tuple[PETSc.Vec, int]:
-        """Solve for the displacement by pressures of this rank's samples."""
+        """Solve for the displacement by pressures of this rank's samples, and the latest shear."""
         body, sampling = self.equilibrium.body, self._sampling
         load = body.stiffness.createVecLeft()
         sampling.values.array[:] = pressure
         sampling.operator.mult(sampling.values, load)
         displacement = load.duplicate()
+        if sheared:
+            self.forces.write_last_shear(displacement)
+            load.axpy(1.0, displacement)
         return displacement, solve_linear(body.solver, load, displacement, tolerance=tolerance)
 
     def patch_means(self, function: Callable[[Indices, Array], Array]) -> Array:

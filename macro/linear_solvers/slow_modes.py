@@ -29,6 +29,14 @@ _SMALL = 1e-8
 _SLOW = 0.3
 """Eigenvalue of the preconditioned matrix below which a mode counts as slow."""
 _MOST_MODES = 24
+_FIRST_LOOK, _NO_SLOW = 6, 0.4
+"""Iterations after which the search ends if its smallest Ritz value is at least so large. It then
+is 0.45 to 0.56 on bodies that need up to 12 iterations, and at most 0.06 on those that need more
+than 20 (pads, flanges, L shapes, rings of flat cells; 11,000 to 83,000 unknowns). Between them,
+with 14 to 20 iterations, it is 0.25 to 0.33: there the search goes on."""
+_HIDDEN = 0.1
+"""Part of the share 1/√n of one mode in the random residual of n unknowns. What is left of the
+residual must be less: Ritz values do not show a single slow mode so soon, the residual does."""
 _SAME = 1e-8
 """Share of a mode's energy below which it is a copy of another one, by rounding."""
 
@@ -63,19 +71,34 @@ def slow_modes(matrix: PETSc.Mat, preconditioner: PETSc.PC) -> Array:
         energy, before = residual.dot(corrected), energy
         ratios.append(energy / before)
         step.aypx(ratios[-1], corrected)
+        left = residual.norm() / first * residual.size**0.5
+        if len(basis) == _FIRST_LOOK and left <= _HIDDEN:
+            if _ritz(lengths, ratios)[0][0] >= _NO_SLOW:
+                break
     if len(basis) <= _ENOUGH:
         return np.zeros((residual.local_size, 0))
-    length, ratio = np.array(lengths), np.array(ratios[:-1])
-    diagonal = 1.0 / length
-    diagonal[1:] += ratio / length[:-1]
-    beside = -np.sqrt(ratio) / length[:-1]
-    values, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
+    values, vectors = _ritz(lengths, ratios)
     slow = np.flatnonzero(values < _SLOW)[:_MOST_MODES]
     modes = np.zeros((residual.local_size, slow.size), order="F")
     for vector, shares in zip(basis, vectors[:, slow], strict=True):
         for k, share in enumerate(shares):
             modes[:, k] += share * vector
     return modes
+
+
+def _ritz(lengths: list[float], ratios: list[float]) -> tuple[Array, Array]:
+    """Return Ritz values, ascending, and their vectors by the steps of conjugate gradients.
+
+    Args:
+        lengths: Lengths of the n steps.
+        ratios: Energy of each new residual over that of the one before, shape (n,).
+    """
+    length, ratio = np.array(lengths), np.array(ratios[:-1])
+    diagonal = 1.0 / length
+    diagonal[1:] += ratio / length[:-1]
+    beside = -np.sqrt(ratio) / length[:-1]
+    values, vectors = np.linalg.eigh(np.diag(diagonal) + np.diag(beside, 1) + np.diag(beside, -1))
+    return values, vectors
 
 
 class Balanced:

@@ -134,10 +134,11 @@ class FiniteSlopes:
         waves, heights, below = self._waves, self._heights, self._below
         nu, modulus = self.material.poisson_ratio, self.material.young_modulus
         loaded = waves.alone(waves.coarsened(pressure))
-        stresses = self._stresses(loaded)
+        directed, curvatures = self._directed(loaded)
+        stresses = self._stresses(loaded, directed)
         strains = self._strains(stresses)
         pushed = heights * loaded / modulus
-        value, more = self._second(loaded, stresses)
+        value, more = self._second(stresses, curvatures)
         energy = loaded**2 / modulus - _product(stresses, strains)
         share = _share(float(np.sum(below * energy)), value)
         weights = share * more - heights * strains
@@ -146,8 +147,9 @@ class FiniteSlopes:
         # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
         pushed -= 2.0 * nu * (weights[0] + weights[1])
         bent = share * below**2 * stresses
-        fields = np.concatenate([pushed[None], (2.0 * nu - 1.0) * weights, bent])
+        fields = np.concatenate([(2.0 * nu - 1.0) * weights, bent])
         moved = waves.changed(fields, self._displaced, 1, inside=True)[0]
+        moved += pushed[: moved.shape[0], : moved.shape[1]]
         if self._periodic:
             moved -= moved.mean()
         return waves.refined(moved)
@@ -167,12 +169,13 @@ class FiniteSlopes:
         """
         waves, nu = self._waves, self.material.poisson_ratio
         below, loaded = self._below, waves.alone(waves.coarsened(pressure))
-        stresses = self._stresses(loaded)
+        directed, curvatures = self._directed(loaded)
+        stresses = self._stresses(loaded, directed)
         of_load = loaded**2 / self.material.young_modulus
         of_stresses = _product(stresses, self._strains(stresses))
         first = abs(float(np.sum(below * (of_load - of_stresses))))
-        second = abs(self._second(loaded, stresses)[0])
-        along, across = self._directed(loaded)
+        second = abs(self._second(stresses, curvatures)[0])
+        along, across = directed
         near = np.sqrt(along**2 + (loaded - along) ** 2 + 2.0 * across**2)
         squares = sum(np.square(part) for part in np.gradient(below, *self.spacing))
         steepness = float(np.sum(near * squares)) / (float(np.sum(near)) or 1.0)
@@ -185,69 +188,77 @@ class FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
         return FiniteSlopes(self._surface, self.material, periodic=self._periodic, grid=self.grid)
 
-    def _second(self, loaded: Array, stresses: Array) -> tuple[float, Array]:
+    def _second(self, stresses: Array, curvatures: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses in it.
 
         The adjoint of the weights gives one part of its displacement.
 
         Args:
-            loaded: Pressures.
-            stresses: The stresses by them.
+            stresses: The stresses by the pressures.
+            curvatures: The curvatures of the displacements by them.
         """
         below = self._below
-        fields = np.concatenate([loaded[None], below * stresses])
-        parts = self._waves.changed(fields, self._curvatures_and_strains, 6)
-        curvatures, strains = below * parts[:3], parts[3:]
-        value = float(np.sum(_product(below * stresses, curvatures - strains)))
-        return value, below * (0.5 * curvatures - strains)
+        moments, bent = below * stresses, below * curvatures
+        strains = self._waves.changed(moments, self._strained, 3)
+        value = float(np.sum(_product(moments, bent - strains)))
+        return value, below * (0.5 * bent - strains)
 
-    def _stresses(self, pressure: Array) -> Array:
-        """Return σ_xx, σ_yy, σ_xy by pressures."""
+    def _stresses(self, pressure: Array, directed: Array) -> Array:
+        """Return σ_xx, σ_yy, σ_xy by pressures.
+
+        Args:
+            pressure: The pressures.
+            directed: The same with their directions, see `_directed`.
+        """
         nu = self.material.poisson_ratio
-        along, across = (1.0 - 2.0 * nu) * self._directed(pressure)
+        along, across = (1.0 - 2.0 * nu) * directed
         total = np.stack([-2.0 * nu * pressure - along, along - pressure, -across])
         for term in self.edge_stresses:
             total += term.stresses(pressure)
         return total
 
-    def _directed(self, pressure: Array) -> Array:
-        """Return pressures with their waves times k_x k_x/k² and k_x k_y/k²."""
-        directions = self._waves.directions
+    def _directed(self, pressure: Array) -> tuple[Array, Array]:
+        """Return pressures with their directions, and the curvatures ∂_α ∂_β u_z by them.
 
-        def along_and_across(waves: Spectrum, here: slice) -> Spectrum:
-            return np.asarray(waves * directions[::2, :, here])
-
-        return self._waves.changed(pressure[None], along_and_across, 2)
-
-    def _curvatures_and_strains(self, waves: Spectrum, here: slice) -> Spectrum:
-        """Return waves of ∂_α ∂_β u_z by those of pressures, and of strains by moments h σ_αβ.
-
-        The strains are those by tractions ∂_α (h σ_αβ) on the plane.
+        The first are their waves times k_x k_x/k² and k_x k_y/k².
         """
+        waves, stiffness = self._waves, self.material.shear_modulus
+        stiffness /= 1.0 - self.material.poisson_ratio
+
+        def changed(loads: Spectrum, here: slice) -> Spectrum:
+            directions = waves.directions[:, :, here]
+            parts = np.empty((5, *loads.shape[1:]), complex)
+            np.multiply(loads, directions[::2], out=parts[:2])
+            curved = loads * (waves.wave_number[:, here] / stiffness)
+            np.multiply(curved, directions, out=parts[2:])
+            return parts
+
+        parts = waves.changed(pressure[None], changed, 5)
+        return parts[:2], parts[2:]
+
+    def _strained(self, waves: Spectrum, here: slice) -> Spectrum:
+        """Return the waves of strains by tractions ∂_α (h σ_αβ), by those of moments h σ_αβ."""
         nu, shear = self.material.poisson_ratio, self.material.shear_modulus
         along_x, along_y, across = directions = self._waves.directions[:, :, here]
-        number = self._waves.wave_number[:, here] / shear
-        loads, (xx, yy, xy) = waves[0], waves[1:]
-        parts = np.empty((6, *loads.shape), complex)
-        parts[:3] = ((1.0 - nu) * number * loads) * directions
-        both = nu * _lengthwise(waves[1:], directions)
+        xx, yy, xy = waves
+        both = nu * _lengthwise(waves, directions)
         crossed = across * xy
-        parts[3] = along_x * (xx - both) + crossed
-        parts[4] = along_y * (yy - both) + crossed
-        parts[5] = across * (0.5 * (xx + yy) - both) + 0.5 * xy
-        parts[3:] *= -number
+        parts = np.empty_like(waves)
+        parts[0] = along_x * (xx - both) + crossed
+        parts[1] = along_y * (yy - both) + crossed
+        parts[2] = across * (0.5 * (xx + yy) - both) + 0.5 * xy
+        parts *= self._waves.wave_number[:, here] / -shear
         return parts
 
     def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
-        """Return the waves of the displacement by one of a scalar and those of two tensors.
+        """Return the waves of the displacement by those of two tensors.
 
         Each tensor t contributes k · t k/k², the second one times (1 − ν) |k|/(2 G).
         """
-        directions = self._waves.directions[:, :, here]
-        moved = waves[0] + _lengthwise(waves[1:4], directions)
         stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
         bending = 0.5 / stiffness * self._waves.wave_number[:, here]
-        return np.asarray((moved + bending * _lengthwise(waves[4:], directions))[None])
+        both = waves[:3] + bending * waves[3:]
+        return _lengthwise(both, self._waves.directions[:, :, here])[None]
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""

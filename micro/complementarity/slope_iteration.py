@@ -72,7 +72,9 @@ class AndersonMixing:
         if not self._steps:
             return moved
         changes = np.stack([change.ravel() for _, change in self._steps])
-        shares = np.linalg.lstsq(changes.T, residual.ravel(), rcond=_DEPENDENT)[0]
+        # least squares by the normal equations: the changes are few, and their lengths are 1
+        products = np.linalg.pinv(changes @ changes.T, _DEPENDENT**2, hermitian=True)
+        shares = products @ (changes @ residual.ravel())
         for share, (step, change) in zip(shares, self._steps, strict=True):
             moved = moved - share * (step + change)
         return moved

@@ -123,7 +123,8 @@ def _place(problem: CellProblem, touchable: Flags) -> Place:
     if problem.compliance.periodic:
         return _whole(touchable)
     box = box_around(touchable)
-    depth = problem.undeformed.max() - problem.undeformed
+    undeformed = problem.undeformed
+    depth = undeformed.max() - undeformed
     if deepest := float(depth[touchable].max()):
         deepest = _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS))
     within = touchable | (depth <= deepest)

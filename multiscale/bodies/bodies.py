@@ -29,7 +29,7 @@ from multiscale.bodies.mesh import MeshTerms, PairTerms
 from multiscale.inputs.bodies import SceneBody, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.laws.consistent import Displacements
-from support.arrays import Array
+from support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ElasticBody, FacePair, FieldStep, LoadedFace
@@ -64,17 +64,30 @@ class Bodies:
     def contact_face(self) -> LoadedFace | FacePair:
         """Return the patches or regions on the contact face of the body, or of two on meshes.
 
-        A block is meshed for it.
+        A block is meshed for it, once.
 
         Note:
             Collective.
         """
+        return self._contact_face
+
+    @cached_property
+    def _contact_face(self) -> LoadedFace | FacePair:
+        """The contact face: whatever loads it shares one mesh, one stiffness, one solver."""
         from macro import FacePair
 
         first = self._first_face()
         if self.counter is None:
             return first
         return FacePair(first, self._on_mesh(self.counter))
+
+    @property
+    def made_bodies(self) -> list[ElasticBody]:
+        """The bodies whose contact face has been made."""
+        face: Any = self.__dict__.get("_contact_face")
+        if face is None:
+            return []
+        return [face.body.body, face.body.counter] if hasattr(face, "first") else [face.body]
 
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
@@ -102,7 +115,7 @@ class Bodies:
         return LoadedFace.of_regions(mesh.body, mesh.facets, self.parts.body.lengths)
 
     def terms(self, *, side_term: bool) -> FaceTerms:
-        """Return the terms of the bodies in contact problems of the whole surface.
+        """Return the terms of the bodies in contact problems of the whole surface, made once.
 
         Args:
             side_term: Whether free sides that bound the interface are a term of their own.
@@ -113,6 +126,15 @@ class Bodies:
         Note:
             Collective where a body is a mesh.
         """
+        if side_term not in self._terms:
+            self._terms[side_term] = self._make_terms(side_term)
+        return self._terms[side_term]
+
+    @cached_property
+    def _terms(self) -> dict[bool, FaceTerms]:
+        return {}
+
+    def _make_terms(self, side_term: bool) -> FaceTerms:
         first: FaceTerms
         parts, shape = self.parts, self.parts.body.shape
         lengths = parts.surface.lengths
@@ -159,37 +181,55 @@ class Bodies:
         Args:
             solutions: Patches that are loaded one by one, at most.
         """
+        from macro import displacements_under
+
+        def displacements(pressures: Array) -> Array:
+            loaded = np.flatnonzero(pressures.any(axis=0)).tolist()
+            if len(loaded) > solutions:
+                return displacements_under(self.contact_face(), pressures)
+            total = np.zeros(pressures.shape)
+            for patch in loaded:
+                total += pressures[:, [patch]] * self._by_unit_load(patch)
+            return total
+
+        return displacements
+
+    def loaded_compliance(self, loaded: Indices) -> Array:
+        """Return the compliance of the mesh under some patches alone, shape (N, N) [mm/MPa].
+
+        Args:
+            loaded: Indices of the patches that can carry load; the columns of others are zero.
+
+        Note:
+            Collective; one solution of the mesh for each patch that has not been loaded before.
+        """
+        compliance = np.zeros(2 * (self.parts.patches.count,))
+        for patch in loaded.tolist():
+            compliance[:, patch] = self._by_unit_load(patch)
+        return compliance
+
+    def _by_unit_load(self, patch: int) -> Array:
+        """Return the mean displacements of the mesh by unit pressure on one patch, shape (N,)."""
         from mpi4py import MPI
 
         from macro import displacements_under
         from macro.compliance.cache import cached
         from macro.linear_solvers.options import users_options
 
-        key = (*self._as_text(), self.parts.patches, users_options())
-        faces: list[Any] = []  # meshed when a column is missing
-        columns: dict[int, Array] = {}
-
-        def under(pressures: Array) -> Array:
-            if not faces:
-                faces.append(self.contact_face())
-            return displacements_under(faces[0], pressures)
-
-        def by_unit_load(patch: int) -> Array:
+        def compute() -> dict[str, Array]:
             one = np.eye(1, self.parts.patches.count, patch)
-            comm = self.comm or MPI.COMM_SELF
-            return cached("column", (*key, patch), lambda: {"column": under(one)}, comm)["column"]
+            return {"column": displacements_under(self.contact_face(), one)[0]}
 
-        def displacements(pressures: Array) -> Array:
-            loaded = np.flatnonzero(pressures.any(axis=0)).tolist()
-            if len(loaded) > solutions:
-                return under(pressures)
-            columns.update((patch, by_unit_load(patch)) for patch in loaded if patch not in columns)
-            total = np.zeros(pressures.shape)
-            for patch in loaded:
-                total += pressures[:, [patch]] * columns[patch]
-            return total
+        if patch not in self._columns:
+            key = (*self._as_text(), self.parts.patches, users_options(), patch)
+            found = cached("column", key, compute, self.comm or MPI.COMM_SELF)
+            self._columns[patch] = found["column"]
+        return self._columns[patch]
 
-        return displacements
+    @cached_property
+    def _columns(self) -> dict[int, Array]:
+        """Displacements by unit pressure on single patches, as far as they were asked for."""
+        return {}
 
     def patch_compliance(self) -> Array:
         """Return the compliance of both sides under the patches, shape (N, N) [mm/MPa].

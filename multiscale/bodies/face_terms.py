@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -85,6 +86,10 @@ def free_sides(
     )
 
 
+_KEPT_MODES = 24
+"""Modes along a side up to which a solution is kept: 13 MB."""
+
+
 class FaceTerms(ABC):
     """A finite body under a contact.
 
@@ -107,17 +112,31 @@ class FaceTerms(ABC):
     def modes(self) -> int:
         """Modes along a side that resolve the body correction."""
 
-    @abstractmethod
     def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
-        """Return the compliance of the face in modes.
+        """Return the compliance of the face in modes, which is solved for once where it is small.
 
         Args:
-            comm: MPI communicator; None for this process alone.
+            comm: MPI communicator; None for this process alone. Where the body is a mesh its ranks
+                are those of the mesh.
             modes: Modes along a side; by default those of the shape.
 
         Note:
             Collective.
         """
+        count = modes or self.modes
+        found = self._faces.get(count) or self._solved_face(comm, count)
+        if count <= _KEPT_MODES:
+            self._faces[count] = found
+        return found
+
+    @abstractmethod
+    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
+        """Solve for the compliance of the face in K × K modes; collective."""
+
+    @cached_property
+    def _faces(self) -> dict[int, FaceCompliance]:
+        """What has been solved for, by the number of modes along a side."""
+        return {}
 
     def resolving_modes(self, depth: float, least: int) -> int:
         """Return the modes along a side that resolve the body correction; see the constants above.
@@ -253,15 +272,15 @@ class BlockTerms(FaceTerms):
             self.shape.height, LEAST_WITH_MARGIN if self.shape.margin else least
         )
 
-    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
-        """Return the compliance of the top in modes, from finite elements; see `FaceTerms.face`.
+    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
+        """Solve for the compliance of the top in modes by finite elements; see `FaceTerms.face`.
 
         Raises:
             InputError: When the modes of so flat a block do not fit into memory.
         """
         from macro import face_compliance
 
-        count, shape = modes or self.modes, self.shape
+        shape = self.shape
         needed, memory = _BYTES * float(count) ** 4, process_memory()
         if needed > memory:
             ratio = ((memory / _BYTES) ** 0.25 / _CUBE_MODES) ** (1.0 / _FLATNESS_POWER)

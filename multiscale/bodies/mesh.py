@@ -109,21 +109,13 @@ class MeshTerms(FaceTerms):
             least = LEAST_WITH_SIDES
         return self._resolved(self.resolving_modes(self.around.thickness, least))
 
-    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
-        """Return the compliance of the rectangle in modes, from the mesh.
-
-        Args:
-            comm: MPI communicator; ranks are those of the mesh.
-            modes: Modes along a side; by default those of the shape.
-
-        Note:
-            Collective.
-        """
+    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
+        """Solve for the compliance of the rectangle in modes on the mesh; see `FaceTerms.face`."""
         from macro import FaceCompliance
         from macro.compliance.cache import cached
         from macro.compliance.mesh_face import mesh_face_compliance, raised, turned
 
-        count, body = self._resolved(modes or self.modes), raised(self.body)
+        count, body = self._resolved(count), raised(self.body)
 
         def of(one: MeshedBody) -> FaceCompliance:
             fields = RectangleFields(
@@ -209,17 +201,8 @@ class PairTerms(FaceTerms):
             share += contact_modulus / self.second.material.contact_modulus
         return share
 
-    def face(self, comm: Any, *, modes: int | None = None) -> FaceCompliance:
-        """Return the compliance of the first body, and what the other adds to a half-space.
-
-        Args:
-            comm: MPI communicator; ranks are those of the meshes.
-            modes: Modes along a side; by default those of both shapes.
-
-        Note:
-            Collective.
-        """
-        count = modes or self.modes
+    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
+        """Solve for the compliance of the first body, and what the other adds to a half-space."""
         face = self.first.face(comm, modes=count)
         other = self._behind.face(comm, modes=face.count)
         term = self._behind.term(other)

@@ -53,8 +53,10 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         def write() -> list[Path]:
             conducts = conducts_of(run.coupling)
             exports: dict[str, str] = {}
+            section = run.scene.friction
+            friction = None if section is None else section.coefficient
             for name in choice.export:
-                exports |= export_texts(table, name, conducts=conducts)
+                exports |= export_texts(table, name, conducts=conducts, friction=friction)
             files = [write_laws(folder / "laws.h5", table)]
             kinds = file_kinds(run.scene.output.figures)
             drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)

@@ -46,6 +46,8 @@ from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
 
+NOT_WITH_FRICTION = "the measure does not know what has slipped under laws"
+
 Facts = tuple[BodyFacts | None, BodyFacts | None]
 """What is known of the meshes of a body and of its counter-body."""
 Meshes = tuple[SceneBody | None, SceneBody | None]
@@ -588,6 +590,8 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         bodies = [] if self.made_solver is None else self.made_solver.meshed_bodies
+        if not bodies and "bodies" in self.__dict__:
+            bodies = self.bodies.made_bodies
         self._meshes = (None, None)
         for name in ("solver", "bodies", "put_on_body"):  # they hold the bodies' matrices
             self.__dict__.pop(name, None)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
+from geometry import Friction
 from multiscale.couplings.coupling import Coupling
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -39,6 +40,12 @@ class LawCoupling(Coupling):
         Args:
             table: The laws, once made.
         """
+
+    @property
+    def law_friction(self) -> Friction | None:
+        """Friction of the laws; None without."""
+        section = self.scene.friction
+        return None if section is None else Friction(coefficient=section.coefficient)
 
     @property
     def table_tolerance(self) -> float:
@@ -79,3 +86,9 @@ class LawCoupling(Coupling):
         choice = self.newton()
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
         yield "newton", f"{way}: {choice.why}"
+        if self.law_friction is not None:
+            yield (
+                "friction",
+                f"coefficient {self.law_friction.coefficient:g}; the laws are beds of springs with "
+                "a slider each; GMRES, as tangents are unsymmetric",
+            )

@@ -25,7 +25,7 @@ from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.couplings.coupling import Source
+from multiscale.couplings.coupling import NOT_WITH_FRICTION, Source
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.loading.load_step import LoadStep
@@ -174,6 +174,8 @@ class MicroCoupling(PressedSurface):
         """Return why a run does not measure the errors of its load steps; empty where it does."""
         if self.cells is None:
             return f"{self.micro.name} contacts have no measure of it, half-space has"
+        if self.scene.rubs_on_mesh:
+            return NOT_WITH_FRICTION
         if self.scene.loads_bodies:
             return "the measure does not know of loads of the body besides the contact"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""

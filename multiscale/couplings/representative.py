@@ -19,7 +19,7 @@ from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.couplings.coupling import Meshes, Source
+from multiscale.couplings.coupling import NOT_WITH_FRICTION, Meshes, Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.loads import check_load, load_history_on
@@ -190,6 +190,8 @@ class RepresentativeCoupling(LawCoupling):
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
+        if self.scene.rubs_on_mesh:
+            return NOT_WITH_FRICTION
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     def error_statement(self) -> str:
@@ -338,7 +340,8 @@ class RepresentativeCoupling(LawCoupling):
         """Return a face with laws at its points."""
         from macro import LawContactProblem
 
-        return LawContactProblem(face, table.together(), mode="pointwise", crown=self._crown())
+        laws, crown, friction = table.together(), self._crown(), self.law_friction
+        return LawContactProblem(face, laws, mode="pointwise", crown=crown, friction=friction)
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""

@@ -35,11 +35,17 @@ Laws of regions have the scatter of pressures between their samples as a last co
 """
 FLOW_COLUMNS = "transmissivity_x_mm3", "transmissivity_y_mm3"
 """Columns of ``laws.csv`` where laws know what leaks through their gaps."""
+_TANGENTIAL = "tangential_stiffness_MPa_per_mm"
 _STIFFNESS = CSV_COLUMNS.index("stiffness_MPa_per_mm")
 _SEPARATION = CSV_COLUMNS.index("separation_mm")
 
 
-def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None) -> str:
+def csv_text(
+    table: LawTable,
+    tolerance: float,
+    conducts: Conducts | None = None,
+    friction: float | None = None,
+) -> str:
     """Return the text of ``laws.csv``: points on the laws, one after the other, along the approach.
 
     Where the pressure is a function of closure, rows are chosen as for contact programs; beyond,
@@ -49,12 +55,15 @@ def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None
         table: The laws.
         tolerance: Largest error of straight lines between rows, as in `LawSample`.
         conducts: Conductances per area at stiffnesses; further columns where given.
+        friction: Coefficient of friction; where given, the tangential stiffness of sticking is a
+            column.
     """
     text = StringIO()
     writer = csv.writer(text)
     regions = isinstance(table.patches, Regions)
     where, scatter = (("region",), ("pressure_scatter_MPa",)) if regions else (("ix", "iy"), ())
     names = () if conducts is None else tuple(conducts(np.zeros(1)))
+    names = names if friction is None else (_TANGENTIAL, *names)
     leaks = all(law.transmissivity is not None for law in table.laws)
     flows = FLOW_COLUMNS if leaks else ()
     writer.writerow((*where, *CSV_COLUMNS, *names, *flows, *scatter))
@@ -62,7 +71,8 @@ def csv_text(table: LawTable, tolerance: float, conducts: Conducts | None = None
         for row in _rows_of(law, tolerance):
             more = (float(law.pressure_scatter(row[1])),) if regions else ()  # over the closure
             conductances = [] if conducts is None else conducts(np.array(row[_STIFFNESS])).values()
-            further = [float(one) for one in conductances]
+            further = [] if friction is None else [row[_STIFFNESS] / law.stiffness_ratio]
+            further += [float(one) for one in conductances]
             further += _flows_of(law, row[_SEPARATION]) if leaks else []
             writer.writerow((*place.cells, *row, *further, *more))
     return text.getvalue()
@@ -108,6 +118,7 @@ def export_laws(
     *,
     tolerance: float = TOLERANCE,
     conducts: Conducts | None = None,
+    friction: float | None = None,
 ) -> list[Path]:
     """Write patch laws in the form that another program reads.
 
@@ -124,6 +135,9 @@ def export_laws(
         conducts: Conductances per area at stiffnesses of the laws, see
             `Conductances.per_area`; they are columns of the csv file, and the thermal one a
             gap conductance of Abaqus and CalculiX.
+        friction: Coefficient of friction: a keyword of Abaqus and CalculiX, with a stiffness of
+            sticking, and that stiffness as a column of the csv file. Modules of 4C know pressures
+            alone.
 
     Returns:
         The files written.
@@ -133,7 +147,7 @@ def export_laws(
             closure nowhere, which a csv file alone can say.
         NotWritten: When the system refuses.
     """
-    texts = export_texts(table, format, tolerance=tolerance, conducts=conducts)
+    texts = export_texts(table, format, tolerance=tolerance, conducts=conducts, friction=friction)
     remove_exports(Path(folder), (format,))
     return [write_text(Path(folder) / name, text) for name, text in texts.items()]
 
@@ -144,6 +158,7 @@ def export_texts(
     *,
     tolerance: float = TOLERANCE,
     conducts: Conducts | None = None,
+    friction: float | None = None,
 ) -> dict[str, str]:
     """Return the names and contents of the files of an export, see `export_laws`.
 
@@ -152,6 +167,7 @@ def export_texts(
         format: One of `multiscale.exports.FORMATS`.
         tolerance: Error of straight lines between the rows of tables.
         conducts: As for `export_laws`.
+        friction: As for `export_laws`.
 
     Raises:
         InputError: As `export_laws`.
@@ -162,7 +178,7 @@ def export_texts(
     if format == "4c":
         return {f"{_MODULES}/{name}": text for name, text in law_modules(table).items()}
     name, text_of = _TABLES[format]
-    return {name: text_of(table, tolerance, conducts)}
+    return {name: text_of(table, tolerance, conducts, friction)}
 
 
 def remove_exports(folder: Path, formats: tuple[str, ...] = FORMATS) -> None:

@@ -49,6 +49,10 @@ The last row of each table continues the tangent beyond the end of the law, beca
 the last pressure: overclosures beyond the stated end are outside the law.
 Use *CONTACT PAIR, TYPE=NODE TO SURFACE, linear elements, and the rough face as the first surface.
 With the other types CalculiX 2.20 finds no pressure in such a table, and says nothing."""
+_STICKS = """\
+Friction: one stiffness of sticking up to the coefficient times the pressure, that of the law at
+{:.3g} MPa; over the table it goes from {:.3g} to {:.3g} MPa/mm.
+Partial slip within the roughness has no keyword: loops lose less here than the law says."""
 _OPEN = "It stays open: no surface interaction, leave it out of contact. First touch: {:.9g} mm."
 
 
@@ -60,20 +64,28 @@ class Program(NamedTuple):
         rows: Rows of a table at most; beyond the last the tangent continues; None for any.
         heat: What is said before a table of conductance, as a comment.
         mark: What every line of that table begins with.
+        elastic_slip: Whether sticking is stated by the slip at which it ends, not by a stiffness.
     """
 
     remarks: str
     rows: int | None
     heat: str
     mark: str
+    elastic_slip: bool
 
 
-ABAQUS = Program(_ABAQUS, None, "", "")
-CALCULIX = Program(_CALCULIX, 199, _BY_HAND, "** ")  # it stores one more, for the tangent
+ABAQUS = Program(_ABAQUS, None, "", "", elastic_slip=True)
+CALCULIX = Program(
+    _CALCULIX, 199, _BY_HAND, "** ", elastic_slip=False
+)  # it stores one more, for the tangent
 
 
 def keyword_text(
-    program: Program, table: LawTable, tolerance: float, conducts: Conducts | None = None
+    program: Program,
+    table: LawTable,
+    tolerance: float,
+    conducts: Conducts | None = None,
+    friction: float | None = None,
 ) -> str:
     """Return the surface interactions of all laws.
 
@@ -83,6 +95,7 @@ def keyword_text(
         tolerance: Largest error of straight lines between rows, as in `LawSample`; larger where the
             program's rows do not suffice.
         conducts: Conductances per area at stiffnesses; none are written when not given.
+        friction: Coefficient of friction; none is written when not given.
 
     Raises:
         InputError: When the pressure of a law is a function of closure nowhere.
@@ -98,6 +111,8 @@ def keyword_text(
             continue
         name = f"{place.kind}_{place.label}".upper()
         lines += _interaction(name, law, sample, extended=program.rows is not None)
+        if friction is not None:
+            lines += _friction(program, law, sample, friction)
         if conducts is not None:
             lines += _heat(program, law, sample, conducts)
     return "".join(f"{line}\n" for line in lines)
@@ -120,6 +135,24 @@ def _interaction(name: str, law: PatchLaw, sample: LawSample, *, extended: bool)
         slope = float(law.stiffness(end))
         rows.append((rows[-1][0] + max(slope, 0.0) * (further - end), further))
     yield from (f"{pressure:.12e}, {closure:.12e}" for pressure, closure in rows)
+
+
+def _friction(
+    program: Program, law: PatchLaw, sample: LawSample, coefficient: float
+) -> Iterator[str]:
+    """Yield the lines of friction, with the stiffness of sticking at half the largest pressure."""
+    row = int(np.searchsorted(sample.pressure, 0.5 * sample.pressure[-1]))
+    pressure = float(sample.pressure[row])
+    stiffness = law.stiffness(sample.closure[[1, row, -1]]) / law.stiffness_ratio
+    yield from _comments(_STICKS.format(pressure, *stiffness[[0, 2]]))
+    if not np.isfinite(stiffness).all():
+        yield from _comments("The law does not know its tangential stiffness.")
+        yield from ("*FRICTION", f"{coefficient:.9g},")
+    elif program.elastic_slip:
+        yield f"*FRICTION, ELASTIC SLIP={coefficient * pressure / stiffness[1]:.9e}"
+        yield f"{coefficient:.9g},"
+    else:
+        yield from ("*FRICTION", f"{coefficient:.9g}, {stiffness[1]:.9e}")
 
 
 def _heat(program: Program, law: PatchLaw, sample: LawSample, conducts: Conducts) -> Iterator[str]:

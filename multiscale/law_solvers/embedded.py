@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import Control, InputError, NotConverged, PatchGrid
+from geometry import Control, InputError, NotConverged, PatchGrid, ShearControl
+from micro.model import Stiffness
 from multiscale.bodies.bodies import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -130,8 +131,25 @@ class EmbeddedLaws(LawSolver):
         """Degrees of freedom of the body, or of both."""
         return self.face.body.dofs
 
+    @property
+    def past(self) -> Any:
+        """What load steps left behind of friction; set it to take them back."""
+        return self._problem.memory
+
+    @past.setter
+    def past(self, past: Any) -> None:
+        self._problem.memory = past
+
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `StepSolver.press`."""
+        before = self.past
+        try:
+            return self._pressed(control)
+        except Exception:
+            self.past = before
+            raise
+
+    def _pressed(self, control: Control) -> LoadStep:
         try:
             state = self._problem.solve(control)
         except NotConverged as error:
@@ -143,12 +161,17 @@ class EmbeddedLaws(LawSolver):
         self._last, self._body_state = state, control.body_state
         return step
 
+    def tangential_stiffness(self) -> Stiffness:
+        """Return the derivative of the shear force along the shift at the latest load step."""
+        return Stiffness(*self._problem.tangential_stiffness())
+
     def state(self) -> Any:
-        """Return the latest plane and pressures, which determine the displacements."""
+        """Return the latest plane, pressures and sliders, which determine the displacements."""
         last = self._last
         if last is None:
             return None
-        return last.approach, last.tilt, last.patch_pressure, self._body_state
+        sliders = self._problem.slider_record()
+        return last.approach, last.tilt, last.patch_pressure, self._body_state, sliders
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -156,10 +179,22 @@ class EmbeddedLaws(LawSolver):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
-            approach, tilt, pressure, body_state = state
-            self._problem.start_from(pressure)
-            control = Control(approach=approach, tilt=tilt, body_state=body_state)
-            self._last, self._body_state = self._problem.solve(control), body_state
+            sliders = state[-1]
+            if sliders is not None:
+                self._problem.restore_sliders(sliders)
+            self._solve_again(state)
+
+    def _solve_again(self, state: Any) -> None:
+        """Find an equilibrium again, where nothing slips further."""
+        approach, tilt, pressure, body_state, sliders = state
+        memory, shear = self.past, None
+        if sliders is not None:
+            x, y = map(float, sliders.shift)
+            shear = ShearControl(shift=(x, y))
+        self._problem.start_from(pressure)
+        control = Control(approach=approach, tilt=tilt, body_state=body_state, shear=shear)
+        self._last, self._body_state = self._problem.solve(control), body_state
+        self.past = memory
 
     def _step(self, control: Control, state: FaceContactState) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
@@ -186,11 +221,36 @@ class EmbeddedLaws(LawSolver):
             separation=separation,
             stiffness=stiffness,
             **self._of_contacts(state),
+            **self._of_shear(state, area_fraction),
             newton_iterations=state.iterations,
             linear_iterations=state.linear_iterations,
             reason=state.reason,
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
+
+    def _of_shear(self, state: FaceContactState, area_fraction: Array) -> dict[str, Any]:
+        """Return the columns of the shear; none without friction.
+
+        Args:
+            state: The contact.
+            area_fraction: Contact area fractions of the patches, shape (N,).
+        """
+        shear, laws = state.shear, self._laws
+        if shear is None:
+            return {}
+        sticks = self._problem.patch_means(
+            lambda patch, _: laws.at(patch, shear.stick_closure, extend=True).contact_area_fraction
+        )
+        return {
+            "shear_force_x_N": shear.force[0],
+            "shear_force_y_N": shear.force[1],
+            "shear_x_mm": shear.shift[0],
+            "shear_y_mm": shear.shift[1],
+            "slip_area_fraction": float(
+                np.average(area_fraction - sticks, weights=self.face.areas)
+            ),
+            "dissipated_mJ": shear.dissipated,
+        }
 
     def _of_contacts(self, state: FaceContactState) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.
@@ -243,6 +303,8 @@ class ExtendedLaws(EmbeddedLaws):
             except BeyondLaws:
                 if (longer := self._longer(self.table)) is None:
                     raise
-                last = self.state()
+                last, shorter = self.state(), self._problem
                 self._take(self._problem_of(longer), longer)
-                self.restore(last)
+                self._problem.follow_sliders(shorter)
+                if last is not None:
+                    self._solve_again(last)

@@ -19,6 +19,7 @@ from multiscale.readable import Caution, Detail, column, number, percent, quanti
 from support.displayed import Displayed, Table, of_columns, spread
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""
@@ -95,6 +96,11 @@ class LawTable(Displayed):
     def rows(self) -> int:
         """Number of rows of all laws together."""
         return sum(len(law.rows) for law in self.laws)
+
+    @property
+    def touched(self) -> Indices:
+        """Indices of the patches that do not stay open, ascending."""
+        return np.flatnonzero([not law.is_open for law in self.laws])
 
     @property
     def largest_pressure(self) -> float:

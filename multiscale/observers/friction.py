@@ -14,7 +14,7 @@ from micro.friction.goodman import NeglectedCoupling
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
-from multiscale.readable import Caution, number, percent, quantity
+from multiscale.readable import Caution, Detail, number, percent, quantity
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""
@@ -76,6 +76,9 @@ class FrictionObserver(StepObserver):
     def _body_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what the shift leaves out of the body below the contact."""
         coupling = self._coupling
+        if coupling.scene.rubs_on_mesh:
+            yield from self._law_notes()
+            return
         if not coupling.has_body:
             return
         text = "shift and tangential stiffness are those of the contact on a half-space"
@@ -90,6 +93,33 @@ class FrictionObserver(StepObserver):
             f"{text}; a block sheared as a whole would add up to "
             f"{quantity(flexibility * force, 'mm', 2)} at the largest shear force"
         )
+
+    def _law_notes(self) -> Iterator[str]:
+        """Yield how close the springs of laws are, and what they leave out."""
+        table, beta = self._coupling.table, self._coupling.materials.dundurs_beta
+        beds = [law.springs for law in table.laws if not law.is_flat] if table else []
+        beds = [bed for bed in beds if len(bed)]
+        if not beds:
+            return
+        fewest, most = min(map(len, beds)), max(map(len, beds))
+        count = f"{most}" if fewest == most else f"{fewest} to {most}"
+        yield Detail(
+            f"friction of laws: {count} springs each, within {percent(max(b.error for b in beds))} "
+            "of the bound of friction; shift and tangential stiffness are those of contact and body"
+        )
+        missed = max(bed.missed for bed in beds)
+        if missed > _MUCH:
+            yield Caution(
+                f"friction of laws: a law whose stiffness falls is no bed of springs; they are "
+                f"scaled by up to {percent(missed)} to bear its pressure, and partial slip is as "
+                "uncertain"
+            )
+        if beta:
+            yield (
+                "friction of laws after Goodman: that pressures of single contacts pull the "
+                f"surface sideways (Dundurs' β = {number(beta, 3)}) is left out, and not measured; "
+                "what pressures on the whole face do is part of the mesh"
+            )
 
 
 def last_loop(steps: Sequence[LoadStep]) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.shear_state import ShearState
+from geometry.sliders import SliderRecord
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
@@ -75,6 +76,7 @@ _KINDS = (
     LawPoint,
     RigidPlane,
     ShearState,
+    SliderRecord,
     Start,
 )
 """What a checkpoint may consist of: its own records, and those of the states of couplings."""

@@ -98,9 +98,15 @@ class SceneSections:
     @property
     def decomposed(self) -> bool:
         """Whether the body is the half-space and what the finite body adds to it, in modes."""
-        if self.law.representative:
+        if self.law.representative or self.rubs_on_mesh:
             return False
         return self.kind == "concurrent" if self.body is not None else self.coupling.decomposed
+
+    @property
+    def rubs_on_mesh(self) -> bool:
+        """Whether laws have friction, whose shear stresses deform the mesh of the body."""
+        by_laws = self.kind in ("consistent", "isolated", "representative")
+        return self.friction is not None and by_laws
 
     @property
     def loads_bodies(self) -> bool:
@@ -328,24 +334,48 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
         yield f"load.{key}", "needs friction", "friction.coefficient, as in 0.3"
     if not given:
         return
-    if scene.kind not in ("concurrent", "analytic"):
+    if scene.rubs_on_mesh:
+        yield from _friction_on_mesh(scene)
+    elif scene.kind not in ("concurrent", "analytic"):
         kind = f"coupling.kind = '{scene.coupling.kind}'"
-        if scene.law.representative:
-            kind = "law.kind = 'representative'"
         problem = f"does not go with {kind}, which has no tangential tractions"
-        yield "friction", problem, "coupling.kind = 'concurrent' or 'analytic'"
-    if scene.micro.model != "half-space":
+        yield "friction", problem, "another coupling.kind, or laws of samples"
+    elif scene.micro.model != "half-space":
         problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
-        yield "friction", problem, "micro.model = 'half-space'"
-    if not loading.shear_points:
+        yield "friction", problem, "micro.model = 'half-space'; or laws"
+    elif not loading.shear_points:
         yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
     yield from _sliding(scene)
+
+
+def _friction_on_mesh(scene: SceneSections) -> Iterator[Problem]:
+    """Yield what has no tangential displacements, which friction of laws needs."""
+    reason = "but friction of laws needs the mesh of the body"
+    if scene.coupling.newton == "condensed":
+        yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
+    if scene.coupling.compliance == "decomposed":
+        yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
+    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
+    if half_space and scene.kind == "isolated":
+        yield (
+            "friction",
+            "does not go with isolated laws against a half-space",
+            "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
+        )
+    if scene.output.contact in ("last", "all"):
+        yield (
+            "output.contact",
+            "the contact problem behind laws does not know what has slipped under them",
+            "'none' or 'auto'; or coupling.kind = 'concurrent'",
+        )
 
 
 def _sliding(scene: SceneSections) -> Iterator[Problem]:
     """Yield shear forces that friction does not transmit under the prescribed forces."""
     loading, friction = scene.loading, scene.friction
     if friction is None or loading.shear_force is None or loading.force is None:
+        return
+    if scene.loads_bodies:  # bolts press as well
         return
     along = loading.shear_path == "along"
     forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)

@@ -63,8 +63,10 @@ class MicroSection:
 class FrictionSection:
     """Coulomb friction of the interface; without this section it is frictionless.
 
-    It needs half-space contacts that load steps solve themselves: the couplings ``concurrent`` and
-    ``analytic``. What shears the interface are ``load.shear`` or ``load.shear_force``.
+    Cells stick and slip where load steps solve half-space contacts themselves, with the couplings
+    ``concurrent`` and ``analytic``. Laws have friction on the mesh of the body: ``consistent``,
+    ``isolated`` and laws of samples. What shears the interface are ``load.shear`` or
+    ``load.shear_force``; with laws the body itself as well, as it bulges or expands.
 
     Args:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.

@@ -9,7 +9,8 @@ pressed on the part in place of a rigid plane.
 
 ``--pad FILE`` takes the mesh of the demo `brake_pad.py` instead: four load steps up to 8 kN on
 quadratic elements, as many times as long as one linear solution of the pad to 1e-8, whose matrix
-and multigrid are there in both cases.
+and multigrid are there in both cases. With ``--friction 0.3`` they are taken with friction as well,
+in CPU time, and then four steps of shear up to three quarters of what slides, and back.
 """
 
 import os
@@ -30,7 +31,7 @@ from body_solvers import COMM, LINING, PARTS, iterations
 from helpers.body_meshes import HIGH, LOW, box
 from helpers.machine_parts import STEEL, part_body, read_part
 
-from geometry import PatchGrid
+from geometry import Friction, PatchGrid, ShearControl
 from geometry.rigid_plane import Control
 from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
 from macro.mesh.contact_face import contact_facets
@@ -46,6 +47,7 @@ class ExponentialLaw:
 
     def __init__(self, roughness):
         self._length = 0.4 * roughness
+        self.range = 0.0, 8.0 * self._length  # to 30 MPa
 
     def pressure(self, closure):
         return 1e-2 * np.expm1(np.clip(closure / self._length, 0.0, 200.0))
@@ -103,7 +105,7 @@ def slab_on(face, plane, degree, size):
     return FacePair(face, LoadedFace(body, facets, face.patches))
 
 
-def press_pad(file):
+def press_pad(file, friction=None):
     """Print the time of the demo's load steps as a multiple of that of one linear solution."""
     tagged = read_mesh(file, COMM)
     names, volumes = tagged.facet_names, tagged.cell_names
@@ -118,6 +120,9 @@ def press_pad(file):
     body.solver.setTolerances(rtol=1e-10)
     if COMM.rank == 0:
         print(f"{body.dofs} unknowns: set-up {set_up:.1f} s, solution {one:.2f} s, {alone} its")
+    if friction is not None:
+        rub_pad(face, friction)
+        return
     for roughness in (16.0, 4.0, 1.0):
         problem = LawContactProblem(face, [ExponentialLaw(1e-3 * roughness)], "pointwise")
         loads = [Control(force=2e3 * k) for k in (1, 2, 3, 4)]
@@ -130,6 +135,37 @@ def press_pad(file):
                 f"{newton}, linear {linear}",
                 flush=True,
             )
+
+
+def rub_pad(face, friction):
+    """Print the CPU time of the pad's load steps with friction over that without, and of shear."""
+    loads = [Control(force=2e3 * k) for k in (1, 2, 3, 4)]
+    for roughness in (16.0, 4.0, 1.0):
+        law = [ExponentialLaw(1e-3 * roughness)]
+        spent, counts = {}, {}
+        for name in (None, friction):
+            problem = LawContactProblem(face, law, "pointwise", friction=name)
+            began = time.process_time()
+            states = list(map(problem.solve, loads))
+            spent[name], counts[name] = time.process_time() - began, work_of(states)
+        most, began = friction.coefficient * 8e3, time.process_time()
+        shears = [ShearControl(force=(part * most, 0.0)) for part in (0.25, 0.5, 0.75, 0.25)]
+        states = [problem.solve(replace(loads[-1], shear=shear)) for shear in shears]
+        sheared = time.process_time() - began
+        if COMM.rank == 0:
+            print(
+                f"  {roughness:4.0f} µm: {spent[None]:.1f} s ({counts[None]}); with friction "
+                f"{spent[friction]:.1f} s ({counts[friction]}), "
+                f"{spent[friction] / spent[None]:.2f} times; "
+                f"sheared {sheared:.1f} s ({work_of(states)})",
+                flush=True,
+            )
+
+
+def work_of(states):
+    """Return Newton steps and linear iterations of load steps, as text."""
+    newton = sum(state.iterations for state in states)
+    return f"{newton} Newton, {sum(state.linear_iterations for state in states)} linear"
 
 
 def timed(work):
@@ -147,9 +183,11 @@ def main():
     parser.add_argument("--scale", type=float, default=0.6)
     parser.add_argument("--slab", action="store_true")
     parser.add_argument("--pad", metavar="FILE")
+    parser.add_argument("--friction", type=float)
     choice = parser.parse_args()
     if choice.pad:
-        press_pad(choice.pad)
+        mu = choice.friction
+        press_pad(choice.pad, mu and Friction(coefficient=mu, poisson_ratio=0.25))
         return
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]

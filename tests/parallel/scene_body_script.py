@@ -33,6 +33,9 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
+    shear = {"shear": [["0.3 um", "0.1 um"], ["-0.3 um", "0 um"]], "shear_steps": 1}
+    rubbed = {"load": load["load"] | shear, "friction": {"coefficient": 0.3}}
+    yield "friction", {**sample, **rubbed, "body": body, "output": QUIET}
     leak = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
     edges = {"inlet": "left", "outlet": "right"}
     yield "leak", {**sample, **load, "body": body, "leak": leak | edges, "output": QUIET}
@@ -71,6 +74,8 @@ def main(folder):
             getattr(last.leak("face"), "rate", 0.0),
             *errors,
         )
+        if last.shear_force_x_N is not None:
+            found[name] += last.shear_force_x_N, last.shear_force_y_N, last.dissipated_mJ
         run.close()
     if comm.rank == 0:
         print(json.dumps(found))

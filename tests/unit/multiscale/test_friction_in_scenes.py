@@ -187,8 +187,6 @@ SHEARED = {"force": "0.9 N", "steps": 1, "shear": ["1 um", "0 um"]}
             "needs friction",
         ),
         ({"load": {"force": 1.0}}, "friction", "has no effect without shear"),
-        ({"kind": "consistent"}, "friction", "does not go with coupling.kind = 'consistent'"),
-        ({"kind": "isolated"}, "friction", "does not go with coupling.kind = 'isolated'"),
         ({"kind": "reference"}, "friction", "does not go with coupling.kind = 'reference'"),
         ({"kind": "auto"}, "friction", "does not go with coupling.kind = 'auto'"),
         ({"micro": {"model": "elliptic"}}, "friction", "which has no cells"),
@@ -225,17 +223,6 @@ def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
         scene(**({"load": SHEARED} | changes))
     assert caught.value.key == key
     assert text in str(caught.value)
-
-
-def test_laws_of_samples_have_no_friction():
-    with pytest.raises(InputError, match=r"law\.kind = .representative., which has no tang"):
-        scene(
-            load=SHEARED,
-            law={"kind": "representative"},
-            coupling={},
-            patches={},
-            block={"young_modulus": 4e3, "poisson_ratio": 0.15, "lengths": [4.0, 4.0]},
-        )
 
 
 def test_a_force_that_slides_ends_the_run_with_what_was_found(tmp_path, capsys):

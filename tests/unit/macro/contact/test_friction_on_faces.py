@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem
+from helpers.body_meshes import box as block
+from helpers.body_meshes import hanging, standing
 from helpers.user_problems import (
     HEXAHEDRA,
     LAWS,
@@ -24,7 +26,15 @@ from geometry.materials import mindlin_ratio
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.shear_state import ShearControl
 from geometry.spring_bed import Friction
-from macro import ContactProblem, Interface, LawsAtPoints, compat
+from macro import (
+    ContactProblem,
+    FacePair,
+    Interface,
+    LawContactProblem,
+    LawsAtPoints,
+    Material,
+    compat,
+)
 from support.errors import InputError, NotConverged
 
 MU, NU = 0.41, 0.2
@@ -246,3 +256,25 @@ def test_a_plane_without_shear_does_not_slide(body):
     plain, _ = problem_on(body, friction=None)
     with pytest.raises(InputError, match="has no friction"):
         plain.slip_record  # noqa: B018
+
+
+@pytest.mark.parametrize("mode", ["patchwise", "pointwise"])
+def test_a_stiff_counter_body_shears_as_the_plane_does(mode):
+    """Its supports shift; the meshes do not match."""
+    soft, rigid = (Material(young_modulus=e, poisson_ratio=0.3) for e in (4e3, 4e9))
+    below = block((0, 0, -1), (1, 1, 0), (4, 4, 3))
+    counter = block((0, 0, 0), (1, 1, 1), (3, 5, 2))
+    face = standing(below, soft, PATCHES)
+    pair = FacePair(standing(below, soft, PATCHES), hanging(counter, rigid, PATCHES))
+    steps = [Control(force=2.0), shifted(4e-4, 2e-4, force=2.0), shifted(-1e-4, 4e-4, force=1.5)]
+    states = []
+    for one in (face, pair):
+        problem = LawContactProblem(one, RANGED, mode, friction=FRICTION)
+        states.append([problem.solve(control) for control in steps])
+    for plane, body in zip(*states, strict=True):
+        # the counter-body is a millionth as soft
+        assert body.force == pytest.approx(plane.force, rel=1e-5)
+        assert body.shear.force == pytest.approx(plane.shear.force, rel=2e-5, abs=1e-5)
+        assert body.shear.dissipated == pytest.approx(plane.shear.dissipated, rel=1e-4)
+        assert body.reaction == pytest.approx(body.force, rel=1e-8)
+    assert np.hypot(*states[1][1].shear.force) > 0.2

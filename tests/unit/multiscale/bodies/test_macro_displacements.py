@@ -5,6 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import macro
+from geometry import Control
+from macro import displacements_under
 from multiscale import Scene, make_setup, run
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -35,3 +38,27 @@ def test_laws_on_the_mesh_are_those_of_the_condensed_block():
     )
     np.testing.assert_allclose(full, condensed, rtol=1e-6)
     assert condensed[-1] == pytest.approx(3.0, rel=0.1)
+
+
+def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch):
+    """Rows need these solutions, load steps no others; a second run of rows would find them."""
+    monkeypatch.setenv("PATCHLAW_CACHE", "off")
+    given = []
+
+    def counted(face, pressures):
+        given.append(pressures)
+        return displacements_under(face, pressures)
+
+    monkeypatch.setattr(macro, "displacements_under", counted)
+    setup = make_setup(Scene.load(PAPER, [*SMALL, *COARSE]))
+    assert setup.newton().condensed
+    step = setup.press(Control(approach=0.008))
+    touched = setup.table.touched
+    assert 0 < len(touched) < setup.patches.count
+    np.testing.assert_array_equal(sum(given), np.isin(range(8), touched)[None].astype(float))
+    # what the load step is in equilibrium with: the whole mesh under its pressures
+    pressure = step.patches.pressure_MPa
+    (moved,) = displacements_under(setup.bodies.contact_face(), pressure[None])
+    closure = 0.008 - moved
+    np.testing.assert_allclose(step.patches.closure_mm, closure, rtol=1e-8)  # solved to 1e-10
+    setup.release()

@@ -2,6 +2,7 @@
 
 import csv
 import importlib.util
+import re
 import subprocess
 import sys
 
@@ -290,3 +291,40 @@ def test_conductance_per_area_is_exported(tmp_path):
     for format in FORMATS:
         for path in export_laws(table, tmp_path, format):
             assert "onductance" not in path.read_text().replace("gap conductance", "")
+
+
+@pytest.mark.parametrize(
+    ("format", "name"), [("calculix", "laws_calculix.inp"), ("abaqus", "laws_abaqus.inp")]
+)
+def test_friction_is_exported_in_the_words_of_the_program(tmp_path, format, name):
+    ratio, law = 1.3, hertzian()
+    table = table_of(law).with_stiffness_ratios([ratio])
+    export_laws(table, tmp_path, format, friction=0.37)
+    text = (tmp_path / name).read_text()
+    lines = text.splitlines()
+    at = next(k for k, line in enumerate(lines) if line.startswith("*FRICTION"))
+    values = [float(value) for value in lines[at + 1].split(",") if value]
+    assert values[0] == 0.37
+    # the first row of the table from half of the largest pressure on
+    stated = float(re.search(r"([0-9.e+]+) MPa; over", text).group(1))
+    assert 0.5 <= stated / hertz(9e-3) <= 0.52
+    if format == "calculix":
+        stiffness = values[1]
+    else:  # the slip over which sticking goes up to the bound
+        stiffness = 0.37 * stated / float(lines[at].split("=")[1])
+    closure = TOUCH + (stated / 4e3) ** (2 / 3)
+    # the pressure is stated in three digits
+    assert stiffness == pytest.approx(float(law.stiffness(closure)) / ratio, rel=0.01)
+    export_laws(table, tmp_path, format)
+    assert "*FRICTION" not in (tmp_path / name).read_text()
+
+
+def test_tangential_stiffness_is_a_column_with_friction(tmp_path):
+    table = table_of(hertzian()).with_stiffness_ratios([1.25])
+    (path,) = export_laws(table, tmp_path, "csv", friction=0.2)
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) > 10
+    for row in rows:
+        along = float(row["tangential_stiffness_MPa_per_mm"])
+        assert along == pytest.approx(float(row["stiffness_MPa_per_mm"]) / 1.25)

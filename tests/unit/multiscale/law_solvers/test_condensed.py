@@ -160,7 +160,7 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
         list(whole.load_steps())
         whole.write_fields(Path("fields.xdmf"))
         interface, steps = written.pop()
-        ((number, displacement, pressure, _),) = steps
+        ((number, displacement, pressure, *_),) = steps
         assert number == len(whole.steps)
         np.testing.assert_array_equal(pressure, whole.steps[-1].patches.pressure_MPa)
         fields.append(displacement)

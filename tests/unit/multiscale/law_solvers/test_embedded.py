@@ -32,6 +32,11 @@ def law(end=1.0, **columns):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
+    memory = None  # no friction
+
+    def slider_record(self):
+        return None
+
     def solve(self, control):
         self.approach = approach = control.approach
         return SimpleNamespace(
@@ -47,6 +52,7 @@ class EasyBlock:
             linear_iterations=10,
             residuals=np.array([1.0, 1e-11]),
             reason="CONVERGED_FNORM_RELATIVE",
+            shear=None,
         )
 
     def patch_means(self, function):

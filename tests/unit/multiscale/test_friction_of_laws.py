@@ -1,0 +1,219 @@
+"""Scenes with friction of laws: columns, paths, restart, files, what is said and refused."""
+
+from functools import cache
+
+import h5py
+import numpy as np
+import pytest
+
+from multiscale import Run, Scene, make_setup, run
+from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from support.errors import InputError, NotConverged
+
+MU, SHIFT = 0.3, 4e-4
+LOAD = {
+    "force": "2.1 N",
+    "steps": 1,
+    "shear": [["0.4 um", "0 um"], ["-0.4 um", "0.1 um"], ["0.4 um", "0 um"]],
+    "shear_steps": 2,
+}
+CUBE = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
+SLAB = CUBE | {"lengths": [5.0, 4.0], "height": 2.0}
+
+
+def scene(kind="consistent", *, load=LOAD, friction=MU, **sections):
+    spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_height": "1 um", "seed": 3}
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
+        "friction": {"coefficient": friction},
+        "load": load,
+        "output": {"check": "none", "figures": False, "report": False},
+    }
+    if kind == "representative":
+        many = load | {"force": "42 N"} if load is LOAD else load
+        slab = {"block": SLAB, "law": {"kind": kind}, "load": many}
+        return Scene.from_dict(data | slab | sections)
+    patches = {"patches": {"grid": [2, 2]}, "coupling": {"kind": kind}}
+    return Scene.from_dict(data | {"block": CUBE} | patches | sections)
+
+
+@cache
+def ran(kind):
+    return run(scene(kind))
+
+
+KINDS = ["consistent", "isolated", "representative"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_plane_presses_then_shifts_there_and_back(kind):
+    history = ran(kind)
+    assert len(history) == 1 + 3 * 2
+    force = 42.0 if kind == "representative" else 2.1
+    assert history.force_N == pytest.approx(force, rel=1e-9)
+    assert history.shear_x_mm[[0, 2, 4, 6]] == pytest.approx([0.0, SHIFT, -SHIFT, SHIFT])
+    assert history.shear_y_mm[[2, 4, 6]] == pytest.approx([0.0, SHIFT / 4, 0.0])
+    assert (history.shear_force_x_N[[2, 6]] > 0.0).all()
+    assert history.shear_force_x_N[4] < 0.0
+    assert np.hypot(history.shear_force_x_N, history.shear_force_y_N).max() < MU * force
+    assert (np.diff(history.dissipated_mJ) >= 0.0).all()
+    assert history.dissipated_mJ[-1] > 0.0
+    slip, area = history.slip_area_fraction, history.contact_area_fraction
+    assert ((slip >= 0.0) & (slip <= area)).all()
+    stiffness = history.tangential_stiffness_N_per_mm
+    assert (stiffness > 0.0).all()
+    assert stiffness[2] < stiffness[1]  # more slips
+    assert "friction of laws" in " ".join(history.notes)
+
+
+def test_full_sliding_is_the_coefficient_times_the_force():
+    far = {"force": "2.1 N", "steps": 1, "shear": [["5 um", "2 um"]], "shear_steps": 1}
+    history = run(scene(load=far))
+    forces = history.shear_force_x_N[-1], history.shear_force_y_N[-1]
+    # points whose bodies turn over slide in directions of their own, by parts of a degree
+    assert np.hypot(*forces) == pytest.approx(MU * 2.1, rel=1e-3)
+    assert history.slip_area_fraction[-1] == pytest.approx(
+        history.contact_area_fraction[-1], rel=1e-6
+    )
+    assert history.tangential_stiffness_N_per_mm[-1] == 0.0
+
+
+def test_the_stiffness_is_that_of_a_small_shift_back():
+    """Where the plane turns back everything sticks, what slid included."""
+    load = {"force": "30 N", "steps": 1, "shear": [[0.0, 2e-4], [0.0, 1.999e-4]], "shear_steps": 1}
+    history = run(scene("representative", load=load))
+    change = (history.shear_force_y_N[1] - history.shear_force_y_N[2]) / 1e-7
+    # what little slips sideways on the way back, and springs between their nodes
+    assert history.tangential_stiffness_N_per_mm[2] == pytest.approx(change, rel=2e-3)
+    assert history.tangential_stiffness_N_per_mm[1] < 0.98 * change
+
+
+def test_a_shear_force_is_prescribed_under_a_free_plane():
+    load = {
+        "force": ["1 N", "2 N"],
+        "steps": 1,
+        "tilt": "free",
+        "shear_force": [["0.1 N", "0 N"], ["0.2 N", "-0.3 N"]],
+        "shear_path": "along",
+    }
+    history = run(scene(load=load))
+    assert history.shear_force_x_N == pytest.approx([0.1, 0.2], abs=1e-9)
+    assert history.shear_force_y_N == pytest.approx([0.0, -0.3], abs=1e-9)
+    assert history.moment_x_N_mm == pytest.approx([0.0, 0.0], abs=1e-8)
+    assert history.shear_y_mm[1] < history.shear_y_mm[0]
+
+
+@pytest.mark.parametrize("kind", ["consistent", "representative"])
+def test_a_run_goes_on_with_its_sliders(kind, tmp_path):
+    whole, path = ran(kind), tmp_path / "run.state"
+    first = Run(scene(kind))
+    for step in first.load_steps():
+        if step.step == 4:
+            break
+    write_checkpoint(path, checkpoint_of(first, first.state()))
+    first.close()
+    stored, second = read_checkpoint(path), Run(scene(kind))
+    second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)
+    rest = list(second.load_steps())
+    second.close()
+    assert [step.step for step in rest] == [5, 6, 7]
+    for name in ("shear_force_x_N", "shear_force_y_N", "dissipated_mJ", "force_N"):
+        found = [getattr(step, name) for step in rest]
+        # Newton's method leaves 1e-9 of the forces
+        assert found == pytest.approx(list(getattr(whole, name)[4:]), rel=1e-7, abs=1e-9)
+
+
+def test_steps_that_change_the_force_by_too_much_leave_no_slip_behind():
+    load = {"approach": ["4 um", "1 um"], "steps": 1, "force_change": 0.3}
+    load |= {"shear": [[SHIFT, 0.0], [0.0, SHIFT]], "shear_path": "along"}
+    divided = Run(scene(load=load))
+    steps = list(divided.load_steps())
+    assert len(steps) > 4
+    plain = {"approach": [f"{1e3 * step.approach_mm!r} um" for step in steps], "steps": 1}
+    plain |= {"shear": [[step.shear_x_mm, step.shear_y_mm] for step in steps]}
+    # the same steps, none of which was tried at more than its size
+    other = Run(scene(load=plain | {"shear_path": "along"}))
+    other.coupling.table = divided.coupling.table
+    for one, same in zip(steps, other.load_steps(), strict=True):
+        assert same.shear_force_x_N == pytest.approx(one.shear_force_x_N, rel=1e-6, abs=1e-9)
+        assert same.dissipated_mJ == pytest.approx(one.dissipated_mJ, rel=1e-6, abs=1e-12)
+    divided.close()
+    other.close()
+
+
+def test_laws_are_extended_under_shear_with_what_has_slipped():
+    load = {"force": ["6 N", "12 N"], "steps": 1, "shear": [[SHIFT, 0.0], [2 * SHIFT, 0.0]]}
+    load |= {"shear_path": "along"}
+    long = run(scene("representative", load=load))
+    little = {"kind": "representative", "largest_pressure": "0.5 MPa"}
+    short = run(scene("representative", load=load, law=little))
+    assert "the laws were extended" in " ".join(short.notes)
+    # other springs stand for the same law
+    assert short.shear_force_x_N == pytest.approx(long.shear_force_x_N, rel=0.01)
+    assert short.dissipated_mJ == pytest.approx(long.dissipated_mJ, rel=0.1)
+
+
+def test_law_files_have_springs_and_their_tangential_stiffness(tmp_path):
+    table = make_setup(scene()).make_laws()
+    path = write_laws(tmp_path / "laws.h5", table)
+    ratio = 1.85 / 1.7
+    again = read_laws(path)
+    with h5py.File(path) as file:
+        springs = file["patch_0_0/springs"]
+        assert springs["normal_stiffness"].attrs["unit"] == "MPa/mm"
+        normal, along = springs["normal_stiffness"][:], springs["tangential_stiffness"][:]
+        assert normal == pytest.approx(ratio * along)
+        assert normal.sum() >= float(table.laws[0].stiffness(table.laws[0].range[1])) * 0.999
+    for law, same in zip(table.laws, again.laws, strict=True):
+        assert same.stiffness_ratio == pytest.approx(ratio)
+        assert same.springs.stiffness == pytest.approx(law.springs.stiffness, rel=1e-12)
+
+
+def test_the_plan_says_friction_and_that_errors_are_not_measured():
+    said = dict(make_setup(scene(output={"check": "last"})).statements())
+    assert "coefficient 0.3; the laws are beds of springs" in said["friction"]
+    assert "what has slipped under laws" in said["error"]
+
+
+PRESSED = {"force": "1 N", "steps": 1}
+HALF_SPACE = {"young_modulus": 2e5, "poisson_ratio": 0.3}
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "text"),
+    [
+        ({"coupling": {"kind": "consistent", "newton": "condensed"}}, "coupling.newton", "mesh of"),
+        (
+            {"coupling": {"kind": "consistent", "compliance": "decomposed"}},
+            "coupling.compliance",
+            "needs the mesh of the body",
+        ),
+        ({"output": {"contact": "last"}}, "output.contact", "does not know what has slipped"),
+        (
+            {"coupling": {"kind": "isolated"}, "counter_body": HALF_SPACE},
+            "friction",
+            "isolated laws against a half-space",
+        ),
+        ({"load": {"force": 1.0, "shear_force": [0.4, 0.0]}}, "load.shear_force", "slides"),
+        ({"friction": -1.0}, "friction.coefficient", "greater than 0"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_with_its_key(changes, key, text):
+    with pytest.raises(InputError) as caught:
+        scene(**({"load": PRESSED} | changes))
+    assert caught.value.key == key
+    assert text in str(caught.value)
+
+
+def test_friction_without_shear_holds_the_body():
+    history = run(scene("representative", load=PRESSED))
+    assert history.shear_x_mm[-1] == 0.0
+    assert history.dissipated_mJ[-1] > 0.0
+
+
+def test_a_force_that_slides_under_an_approach_ends_the_run():
+    whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
+    with pytest.raises(NotConverged, match="SLIDES"):
+        list(whole.load_steps())
+    whole.close()
