@@ -9,9 +9,10 @@
 #                           │ ring        │      ∇·(T/(12 η) ∇P) = 0 from rim to bore
 #
 # A quarter of the ring of `bodies/seal_ring.py` is pressed with up to 135 N, for three finishes of
-# the same pattern of roughness. Error bars: cells, rows of the table of T, scatter of the samples.
+# the same pattern of roughness. Error bars: elements of the face, cells, rows of T, and the scatter
+# among three samples.
 #
-# Run time: six minutes. `--quick` for a coarse mesh and small samples, `--out DIR` for the figure.
+# Run time: four minutes. `--quick` for a coarse mesh and small samples, `--out DIR` for the figure.
 
 # %%
 import argparse

@@ -108,11 +108,13 @@ class LeakingFace:
             frame.in_plane(found[np.abs(frame.height(found)) < _ON_FACE * max(spans)])
         )
 
-    def flow(self, transmissivity: Array) -> FaceFlow:
+    def flow(self, transmissivity: Array, *, harmonic: bool = False) -> FaceFlow:
         """Solve for the flow.
 
         Args:
             transmissivity: T along x and y of the face at this rank's points, (n, 2) [mm³].
+            harmonic: Whether a facet has the harmonic mean over its points, as where T varies along
+                the flow, instead of the mean, as where it varies across.
 
         Returns:
             The flow, on every rank, with the pressures at the corners of the triangles of all
@@ -121,11 +123,12 @@ class LeakingFace:
         Raises:
             NotConverged: When what enters and leaves the nodes does not balance.
         """
-        sums = [
-            np.bincount(self._facet, self._weight * one, len(self._area))
-            for one in transmissivity.T
-        ]
-        own = np.stack(sums, axis=1) / self._area[:, None]
+        with np.errstate(divide="ignore"):  # closed points close their facet
+            values = 1.0 / transmissivity.T if harmonic else transmissivity.T
+            values = np.where(self._weight > 0.0, values, 0.0)
+            sums = [np.bincount(self._facet, self._weight * one, len(self._area)) for one in values]
+            own = np.stack(sums, axis=1) / self._area[:, None]
+            own = 1.0 / own if harmonic else own
         whole = np.concatenate(self.comm.allgather(own))[self._triangle_facet]
         return on_root(self.comm, lambda: self._face.flow(whole))
 

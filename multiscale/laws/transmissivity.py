@@ -15,7 +15,7 @@ from support.arrays import Array
 from support.errors import InputError
 
 CAUSES = "grid", "rows", "samples"
-"""Causes of the error of a leak under laws."""
+"""Causes of the error of a transmissivity."""
 _OF_ROWS = 3.0
 """Error by the rows over the change where every second one is left out."""
 

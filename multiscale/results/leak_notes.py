@@ -12,6 +12,7 @@ _UNCERTAIN = 0.3
 """Error over the leak from which on a report warns."""
 
 _REMEDIES = {
+    "mesh": "it varies within facets of the contact face, and may differ by {} (finer mesh there)",
     "grid": "on half as many cells a side it differs by {}, as channels are few cells wide (finer "
     "surface.grid)",
     "rows": "between the rows of its table it may differ by {}",
