@@ -33,6 +33,13 @@ HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
 _CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
+_SHAPES = {
+    4: ("tetrahedron", 1),
+    8: ("hexahedron", 1),
+    10: ("tetrahedron", 2),
+    27: ("hexahedron", 2),
+}
+"""Cells and the degree of their shape, by the number of their nodes."""
 
 
 @contextmanager
@@ -99,11 +106,11 @@ def mesh_from_cells(
     neighbours: tuple[NDArray[np.int64], NDArray[np.int64]] | None,
     comm: Any,
 ) -> Any:
-    """Make a mesh of straight cells.
+    """Make a mesh of hexahedra or tetrahedra, straight or of second order.
 
     Args:
-        cells: Numbers of the nodes of this rank's share of the hexahedra or tetrahedra in the order
-            of dolfinx, shape (cells, 8 or 4); there may be none.
+        cells: Numbers of the nodes of this rank's share of the cells in the order of dolfinx, shape
+            (cells, 8 or 4), or (cells, 27 or 10) with edges that may be curved; there may be none.
         points: This rank's share of the nodes, numbered through the ranks, shape (n, 3).
         neighbours: None to let dolfinx distribute the cells, with ghosts in 0.5 and none later. For
             cells that stay on their rank, without ghosts: indices of this rank's cells next to
@@ -114,9 +121,9 @@ def mesh_from_cells(
     Note:
         Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
     """
-    kind = {8: "hexahedron", 4: "tetrahedron"}[cells.shape[1]]
+    kind, degree = _SHAPES[cells.shape[1]]
     older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5
-    options: dict[str, Any] = {"domain" if older else "e": _straight_domain(kind, older)}
+    options: dict[str, Any] = {"domain" if older else "e": _shape_domain(kind, degree, older)}
     if neighbours is not None:
         rows, ranks = np.arange(len(cells)), np.full(len(cells), comm.rank)
         if older:  # it finds common vertices through ghosts, which it drops afterwards
@@ -127,14 +134,15 @@ def mesh_from_cells(
     return dmesh.create_mesh(comm, cells=cells, x=points, **options)
 
 
-def _straight_domain(kind: str, older: bool) -> Any:
-    """Return the coordinate element of straight hexahedra or tetrahedra, as UFL's mesh."""
+def _shape_domain(kind: str, degree: int, older: bool) -> Any:
+    """Return the coordinate element of hexahedra or tetrahedra, as UFL's mesh."""
     if older:
         cell = ufl.Cell(kind, geometric_dimension=3)
-        straight = ufl.FiniteElement("Lagrange", cell, 1, variant="equispaced")
-        return ufl.Mesh(ufl.VectorElement(straight))
+        element = ufl.FiniteElement("Lagrange", cell, degree, variant="equispaced")
+        return ufl.Mesh(ufl.VectorElement(element))
     variant = basix.LagrangeVariant.equispaced
-    return ufl.Mesh(basix.ufl.element("Lagrange", kind, 1, variant, shape=(3,), dtype=np.float64))
+    element = basix.ufl.element("Lagrange", kind, degree, variant, shape=(3,), dtype=np.float64)
+    return ufl.Mesh(element)
 
 
 def _adjacency(rows: NDArray[np.int64], values: NDArray[np.int64]) -> Any:

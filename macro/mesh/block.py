@@ -167,30 +167,31 @@ def rough_block_mesh(
 
 
 def move_onto(mesh: Any, surface: Surface, depth: float) -> MeshQuality:
-    """Move the nodes below a planar face onto the roughness; see `rough_block_mesh`.
+    """Move the nodes around a planar face onto the roughness; see `rough_block_mesh`.
 
-    The face is the rectangle [0, Lx] × [0, Ly] at z = 0. Down to a depth below it the body must be
-    a block with vertical sides; the movement decays to that depth, and nothing moves below it.
+    The rough part of the face is the rectangle [0, Lx] × [0, Ly] at z = 0. The movement decays into
+    the depth, and beside the rectangle within half of its shorter side.
 
     Args:
         mesh: The dolfinx mesh of a body with a flat face.
-        surface: The rough surface, which covers the face.
-        depth: Height of the block under the face [mm].
+        surface: The rough surface, which covers the rectangle.
+        depth: Depth below the face from which on nothing moves [mm].
 
     Raises:
-        InputError: When the body is no such block below the face, a valley is too deep for it, the
-            roughness is too steep for the mesh, or it turns a cell inside out.
+        InputError: When a valley is too deep for the body, the roughness is too steep for the mesh,
+            or it turns a cell inside out.
 
     Note:
         Collective.
     """
     points, comm = mesh.geometry.x, mesh.comm
     _check_depth(depth, surface)
-    _check_sides(mesh, surface, depth)
-    x, y = (np.clip(points[:, k], 0.0, surface.lengths[k]) for k in (0, 1))
-    rise = surface.height_at(x, y) - surface.mean_height if len(points) else np.empty(0)
+    places = np.clip(points[:, :2], 0.0, surface.lengths)
+    rise = surface.height_at(*places.T) - surface.mean_height if len(points) else np.empty(0)
+    beside = np.linalg.norm(points[:, :2] - places, axis=1) / (0.5 * min(surface.lengths))
+    rise = rise * np.maximum(1.0 - beside, 0.0) ** _DECAY
     moved = points.copy()
-    moved[:, 2] += rise * np.maximum(1.0 + points[:, 2] / depth, 0.0) ** _DECAY
+    moved[:, 2] += rise * np.maximum(1.0 - np.abs(points[:, 2]) / depth, 0.0) ** _DECAY
     if compat.geometry_degree(mesh) == 2:
         _straighten(mesh, moved)
     quality = MeshQuality(
@@ -218,24 +219,9 @@ def _check_depth(depth: float, surface: Surface) -> None:
     deepest = (1.0 - _LEAST_VOLUME) * depth / _DECAY
     if valley > deepest:
         raise InputError(
-            "a valley of the roughness is too deep for the block",
+            "a valley of the roughness is too deep for the body",
             value=valley,
-            allowed=f"{deepest:.6g} mm below the mean, for a block {depth:g} mm high",
-        )
-
-
-def _check_sides(mesh: Any, surface: Surface, depth: float) -> None:
-    """Refuse bodies that are wider, or higher, than the block under their face; collective."""
-    points, slack = mesh.geometry.x, FLAT * max(*surface.lengths, depth)
-    above = points[points[:, 2] > -depth + slack]
-    beyond = np.maximum(-above, above - np.array([*surface.lengths, 0.0]))
-    beyond[:, 2] = above[:, 2]
-    worst = mesh.comm.allreduce(float(beyond.max(initial=0.0)), max)
-    if worst > slack:
-        raise InputError(
-            "the body is wider than its rough face within the depth that the roughness decays in",
-            value=worst,
-            allowed=f"a block of {surface.lengths} mm, from z = 0 to {-depth:g} mm",
+            allowed=f"{deepest:.6g} mm below the mean, where the body is {depth:g} mm thick",
         )
 
 

@@ -13,34 +13,44 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from scipy.optimize import brentq
 
-from geometry import Control, PatchGrid
+from geometry import Control, PatchGrid, RefinedShape, RigidPlane
 from geometry.contact_state import ContactState, Spots, peaks_of
-from micro import HalfSpaceModel
+from micro import HalfSpaceModel, influence_matrix
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from multiscale.couplings.cost import SET_UP_CYCLES, Work
-from multiscale.couplings.coupling import Source
+from multiscale.couplings.coupling import Meshes, Source
 from multiscale.couplings.pressed_surface import PressedSurface
-from multiscale.inputs.bodies import Cells, block_section
+from multiscale.inputs.bodies import Cells, SceneBody, block_section
 from multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
+    check_reference_memory,
     reference_meshes,
     reference_requests,
 )
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
-from multiscale.machine import MemoryRequest
+from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.scene.scene import Scene
+from support.arrays import Array
+from support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceContactState, MeshQuality, UnilateralContactProblem
+    from geometry.meshes.families import Shape
+    from macro import Block, FaceContactState, MeshQuality, RoughFace, UnilateralContactProblem
+    from macro.contact.rough_body import FlatBody
+
+
+_COUNTED = 0.9
+"""Part of what the face of a body moves that its meshes count on."""
 
 
 class RoughMesh(NamedTuple):
-    """A meshed rough block.
+    """A body meshed with its roughness.
 
     Attributes:
         problem: Its contact problem.
@@ -170,35 +180,91 @@ class ReferenceSolver(StepSolver):
 
 @dataclass(kw_only=True, eq=False)
 class ReferenceCoupling(PressedSurface):
-    """The rough surface of a block, meshed ever finer and pressed alike at every load step.
+    """The rough surface of a body, meshed ever finer and pressed alike at every load step.
 
     All meshes see the same loads, halved steps included, and every accepted step has its error bar.
     The patches are what results are summed over; they do not change the solution.
 
     Attributes:
-        rough_meshes: The meshes, from coarse to fine.
+        arranged: The meshes; None on a body from a mesh until the coupling is attached to it.
+        nodes: The nodes of the run.
     """
 
     meshes_roughness: ClassVar[bool] = True
     patches_interact: ClassVar[bool] = False
 
-    rough_meshes: ReferenceMeshes
+    nodes: ClusterNodes
+    arranged: ReferenceMeshes | None = None
 
     @classmethod
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         parts, scene = cls._parts(source), source.scene
         began, surface = time.perf_counter(), parts["surface"]
-        model = HalfSpaceModel(
-            surface,
-            contact_modulus=parts["materials"].contact_modulus,
-            periodic=scene.surface.periodic,
-        )
+        model = HalfSpaceModel(surface, contact_modulus=parts["materials"].contact_modulus)
         plane = plane_at_largest_load(parts["load_history"], on_few_cells(model), surface)
         assert plane is not None
         parts["seconds"]["load estimate"] = time.perf_counter() - began
-        meshes = reference_meshes(scene, surface, plane, source.nodes)
-        return cls(plane_at_largest_load=plane, rough_meshes=meshes, **parts)
+        coupling = cls(plane_at_largest_load=plane, nodes=source.nodes, **parts)
+        if scene.block is not None:
+            coupling.arranged = coupling._arranged(plane)
+        return coupling
+
+    def attach(self, comm: Any, meshes: Meshes) -> None:
+        """Put the coupling on its body, and arrange the meshes by how far its face sinks."""
+        super().attach(comm, meshes)
+        first = self._meshes[0]
+        if first is None:
+            return
+        compliance = _face_compliance(first, self.surface.lengths)
+        self.arranged = on_root(comm, lambda: self._arranged(self._plane_over_face(compliance)))
+
+    def _arranged(self, plane: RigidPlane) -> ReferenceMeshes:
+        """Return the meshes under a plane in coordinates of the rough face; on one process."""
+        scene, surface = self.scene, self.surface
+        check_reference_memory(scene, surface, plane, self.nodes)
+        found = reference_meshes(scene, surface, self.body, plane)
+        check_reference_memory(scene, surface, plane, self.nodes, found)
+        return found
+
+    @property
+    def rough_meshes(self) -> ReferenceMeshes:
+        """The meshes, from coarse to fine."""
+        assert self.arranged is not None
+        return self.arranged
+
+    def _plane_over_face(self, compliance: Array) -> RigidPlane:
+        """Return the rigid plane at the largest load in coordinates of the face that has moved.
+
+        Under a prescribed force the plane on a half-space is that. At a prescribed approach the
+        body takes a part of it; a tenth of that is kept in reserve.
+
+        Args:
+            compliance: Displacement of the face and its slopes by a mean pressure of 1 MPa, beyond
+                those of a half-space, shape (3,).
+        """
+        plane = self.plane
+        if self.load_history.quantity != "approach":
+            return plane
+        model = HalfSpaceModel(self.surface, contact_modulus=self.materials.contact_modulus)
+        solver = on_few_cells(model)
+        turns = np.array([1.0, 0.0, 0.0] if self.scene.loading.tilt == "free" else [1.0, 1.0, 1.0])
+
+        def over_face(pressure: float) -> RigidPlane:
+            moved = _COUNTED * pressure * compliance * turns
+            tilt = plane.tilt[0] - moved[1], plane.tilt[1] - moved[2]
+            return RigidPlane.above(self.surface, plane.approach - float(moved[0]), tilt)
+
+        def excess(pressure: float) -> float:
+            """Return what a half-space bears under the plane over the face, less the pressure."""
+            at = over_face(pressure)
+            step = solver.press(Control(approach=at.approach, tilt=at.tilt))
+            return step.force_N / self.area - pressure
+
+        most = excess(0.0)
+        if most <= 0.0:
+            return plane
+        return over_face(brentq(excess, 0.0, most, rtol=0.01) if excess(most) < 0.0 else most)
 
     @classmethod
     def block_cells(cls, scene: Scene) -> Cells | None:
@@ -221,24 +287,46 @@ class ReferenceCoupling(PressedSurface):
 
     def _make_solver(self) -> ReferenceSolver:
         """Mesh the rough blocks."""
-        from mpi4py import MPI
+        from macro import UnilateralContactProblem
 
-        from macro import Block, UnilateralContactProblem, rough_block_mesh
-
-        made, surface = [], self.surface
-        material, sides = block_section(self.scene).material, block_section(self.scene).sides
+        made, surface, flat = [], self.surface, self._flat_body()
         for shape in self.rough_meshes.shapes:
             finest = shape is self.rough_meshes.shapes[-1]
             with located(self.scene, "surface"):
-                mesh, quality = rough_block_mesh(shape, surface, self.comm or MPI.COMM_SELF)
+                body, quality = self._rough(shape, flat)
             problem = UnilateralContactProblem(
-                Block(mesh, material, sides=sides),
+                body,
                 surface.highest - surface.mean_height,
                 method=self.scene.reference.method,
                 patches=self.patches if finest else None,
             )
             made.append(RoughMesh(problem, quality))
         return ReferenceSolver(made, self.patches)
+
+    def _flat_body(self) -> FlatBody | None:
+        """Return the body from a mesh; None of a block."""
+        first, section = self._meshes[0], self.scene.body
+        if first is None or section is None:
+            return None
+        from macro.contact.rough_body import FlatBody
+
+        tag = first.body.mesh.facet_tag(section.contact)
+        return FlatBody(
+            body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
+        )
+
+    def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
+        """Return a body with its roughness meshed."""
+        from mpi4py import MPI
+
+        from macro import Block, rough_block_mesh
+
+        if flat is not None:
+            assert isinstance(shape, RefinedShape)
+            return flat.rough(shape, self.surface)
+        mesh, quality = rough_block_mesh(shape, self.surface, self.comm or MPI.COMM_SELF)
+        section = block_section(self.scene)
+        return Block(mesh, section.material, sides=section.sides), quality
 
     def with_mesh_errors(
         self, steps: Sequence[LoadStep]
@@ -339,8 +427,17 @@ class ReferenceCoupling(PressedSurface):
 
     def body_statements(self) -> Iterator[tuple[str, str]]:
         """Yield what the meshes are."""
-        sides = block_section(self.scene).sides
-        yield "block", f"{self.rough_meshes.statement}; {sides} sides"
+        if self.scene.block is None:
+            own = f"bisected from the {self.body.cells} of {self._mesh_name}"
+            yield "body", f"{self.rough_meshes.statement}; {own}"
+        else:
+            sides = self.scene.block.sides
+            yield "block", f"{self.rough_meshes.statement}; {sides} sides"
+
+    @property
+    def _mesh_name(self) -> str:
+        """Name of the file of the body's mesh."""
+        return "" if self.scene.body is None else Path(self.scene.body.mesh).name
 
     def error_statement(self) -> str:
         """Say how the run will know its error."""
@@ -349,6 +446,35 @@ class ReferenceCoupling(PressedSurface):
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""
-        yield from describe.proportions(self)
+        if not self.body.on_mesh:
+            yield from describe.proportions(self)
+        yield from self.body.notes
         yield from self.rough_meshes.warnings()
-        yield from describe.locking(self.materials.first.poisson_ratio, self.rough_meshes.degree)
+        yield from describe.locking(self.body.poisson_ratio, self.rough_meshes.degree)
+
+
+def _face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
+    """Return what a body adds to a half-space under a uniform pressure on its rough rectangle.
+
+    Args:
+        body: The body, placed.
+        lengths: Sides of the rectangle [mm].
+
+    Returns:
+        Displacement of the middle into the body [mm/MPa], at least 0, and its slopes along x and y
+        [1/MPa], shape (3,): the plane through the mean displacements of 4 × 4 parts.
+
+    Note:
+        Collective.
+    """
+    from macro import LoadedFace, displacements_under
+
+    parts = PatchGrid(grid=(4, 4), lengths=lengths)
+    face = LoadedFace(body.body, body.facets[0], parts)
+    uniform = np.ones((1, parts.count))
+    moved = displacements_under(face, uniform)[0]
+    material = body.facts.materials[0]
+    moved = moved - influence_matrix(parts) @ uniform[0] * material.surface_compliance / np.pi
+    arms = parts.centres - 0.5 * np.asarray(lengths)
+    plane = np.linalg.lstsq(np.column_stack([np.ones(parts.count), arms]), moved, rcond=None)[0]
+    return np.asarray(plane * (plane[0] > 0.0))

@@ -12,13 +12,16 @@ from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
 from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
-from multiscale.inputs.bodies import block_section, block_unknowns
+from multiscale.inputs.bodies import BodyFacts, block_unknowns
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import listed
 from multiscale.scene.scene import Scene
 from support.arrays import Array
+
+_BISECTED = 1.6
+"""Cells by bisection for one of gmsh's where contact can occur: 1.4 to 2 on cubes and on a foot."""
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""
@@ -120,56 +123,95 @@ class ReferenceMeshes:
 
 
 def reference_meshes(
-    scene: Scene, surface: Surface, plane_at_largest_load: RigidPlane, nodes: ClusterNodes
+    scene: Scene, surface: Surface, body: BodyFacts, plane_at_largest_load: RigidPlane
 ) -> ReferenceMeshes:
     """Return the meshes of a scene's reference.
 
     Args:
         scene: The scene.
         surface: Its surface.
-        plane_at_largest_load: The rigid plane at the largest load.
-        nodes: The nodes of the run.
+        body: What is known of its body.
+        plane_at_largest_load: The rigid plane at the largest load, relative to the rough face.
 
     Raises:
-        InputError: When they cannot be made or would not fit into memory; names file and key.
+        InputError: When they cannot be made; names file and key.
     """
-    _check_block(scene)
-    block, reference = block_section(scene), scene.reference
-    hexahedral, fine = reference.hexahedral, reference.fine
+    _check_body(scene)
+    reference = scene.reference
+    hexahedral = reference.hexahedral
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
-    prescribed = scene.loading.quantity == "approach" and scene.loading.tilt != "free"
-    largest = approach if prescribed else 1.1 * approach  # blocks yield more than half-spaces
+    prescribed = _plane_is_prescribed(scene)
     with located(scene, _key(hexahedral)):
-        if fine is not None and not hexahedral:
-            # the nodes of the top face where contact can occur alone
-            plane = RigidPlane.above(surface, largest, tilt)
-            depth = surface.highest - surface.heights
-            share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
-            least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
-            check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
         radius = contact_radius(surface, approach, tilt=tilt)
+        element = None
+        if scene.block is not None and body.element[0] == ("Q" if hexahedral else "P"):
+            element = body.element
         shapes = reference_shapes(
             surface,
-            largest,
-            block.height_under(surface.lengths),
+            _largest_approach(scene, approach),
+            body.depth,
             count=reference.meshes,
-            fine=fine,
+            fine=reference.fine,
             tilt=tilt,
             mesh="hexahedra" if hexahedral else "tetrahedra",
             cells=reference.cells,
-            grading=block.grading,
-            element=block.element if block.element[0] == ("Q" if hexahedral else "P") else None,
+            grading=1.0 if scene.block is None else scene.block.grading,
+            element=element,
             radius=radius if prescribed else None,
         )
     sizes = np.array([characteristic_size(shape) for shape in shapes])
-    meshes = ReferenceMeshes(
+    return ReferenceMeshes(
         shapes=shapes,
         sizes=sizes,
         across=2.0 * radius / float(sizes[-1]),
-        unknowns=tuple(mesh_unknowns(shape) for shape in shapes),
+        unknowns=tuple(mesh_unknowns(shape, body) for shape in shapes),
     )
-    check_memory(scene, nodes, reference_requests(scene, meshes))
-    return meshes
+
+
+def check_reference_memory(
+    scene: Scene,
+    surface: Surface,
+    plane_at_largest_load: RigidPlane,
+    nodes: ClusterNodes,
+    meshes: ReferenceMeshes | None = None,
+) -> None:
+    """Refuse meshes that do not fit into the memory of the nodes.
+
+    Args:
+        scene: The scene.
+        surface: Its surface.
+        plane_at_largest_load: The rigid plane at the largest load.
+        nodes: The nodes of the run.
+        meshes: The meshes; by default the least that any could be is checked, before their sizes
+            are arranged, which takes memory too.
+
+    Raises:
+        InputError: When they do not fit; names file and key.
+    """
+    if meshes is not None:
+        check_memory(scene, nodes, reference_requests(scene, meshes))
+        return
+    fine = scene.reference.fine
+    if fine is None or scene.reference.hexahedral:
+        return
+    with located(scene, _key(hexahedral=False)):
+        # the nodes of the top face where contact can occur alone
+        largest = _largest_approach(scene, plane_at_largest_load.approach)
+        plane = RigidPlane.above(surface, largest, plane_at_largest_load.tilt)
+        depth = surface.highest - surface.heights
+        share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
+        least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
+        check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
+
+
+def _plane_is_prescribed(scene: Scene) -> bool:
+    """Whether the plane is known, and not estimated on a half-space."""
+    return scene.loading.quantity == "approach" and scene.loading.tilt != "free"
+
+
+def _largest_approach(scene: Scene, approach: float) -> float:
+    """Return the approach that meshes are for; bodies yield more than half-spaces."""
+    return approach if _plane_is_prescribed(scene) else 1.1 * approach
 
 
 def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[MemoryRequest]:
@@ -198,9 +240,18 @@ def _key(hexahedral: bool) -> str:
     return "reference.cells" if hexahedral else "reference.fine"
 
 
-def _check_block(scene: Scene) -> None:
-    """Refuse keys of the block that do not go with a reference."""
-    block = block_section(scene)
+def _check_body(scene: Scene) -> None:
+    """Refuse keys of the body that do not go with a reference."""
+    block = scene.block
+    if block is None:
+        if scene.reference.hexahedral:
+            raise InputError(
+                "does not go with [body], whose meshes of a reference are of tetrahedra",
+                key="reference.cells",
+                value=scene.reference.cells,
+                allowed="reference.fine, or neither",
+            )
+        return
     if block.margin > 0.0:
         raise InputError(
             "does not go with coupling.kind = 'reference', whose rough surface is the whole top",
@@ -217,16 +268,21 @@ def _check_block(scene: Scene) -> None:
         )
 
 
-def mesh_unknowns(shape: Shape) -> int:
+def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
     """Return the degrees of freedom of a mesh; for tetrahedra an estimate from their sizes.
 
     Args:
-        shape: What is meshed.
+        shape: What is meshed: a block, or what lies below the rough part of a body's face.
+        body: What is known of a body from a mesh, which the cells are added to; None of a block.
     """
     if isinstance(shape, BlockShape):
         return block_unknowns(shape)
     nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
-    return round(3.0 * nodes * _cubes(shape))
+    if body is None or not body.on_mesh:
+        return round(3.0 * nodes * _cubes(shape))
+    # a linear mesh has an eighth of the nodes of quadratic displacements
+    own = body.unknowns * 8.0 ** (shape.degree - body.degree)
+    return round(_BISECTED * 3.0 * nodes * _cubes(shape) + own)
 
 
 def _cubes(shape: RefinedShape) -> float:

@@ -188,7 +188,7 @@ def _body_loads(scene: SceneSections) -> Iterator[Problem]:
     key = "load.stage" if any(one.loads_bodies for one in scene.loading.stage) else "body"
     reason = "loads of the body besides the contact need laws on its mesh"
     ways = "coupling.kind = 'consistent' or 'isolated'; or law.kind = 'representative'"
-    if scene.kind in ("analytic", "concurrent", "auto"):
+    if scene.kind in ("analytic", "concurrent", "reference", "auto"):
         yield "coupling.kind", f"is '{scene.kind}', but {reason}", ways
     if scene.law.representative:
         return
@@ -232,13 +232,12 @@ def _surfaces(scene: SceneSections) -> Iterator[Problem]:
 
 def _couplings(scene: SceneSections) -> Iterator[Problem]:
     """Yield what a coupling has no use for, and what it leaves out."""
-    block = "which meshes a block under a rigid, smooth plane"
+    rigid = "which meshes a body under a rigid, smooth plane"
     mapped = "which knows no gaps of cells"
     apart = "whose meshes do not tell the stiffness of the interface from that of the block"
     for key, value, kinds, reason in (
-        ("body", scene.body, {"reference"}, block),
-        ("counter_body", scene.counter_body, {"reference"}, block),
-        ("counter_surface", scene.counter_surface, {"reference"}, block),
+        ("counter_body", scene.counter_body, {"reference"}, rigid),
+        ("counter_surface", scene.counter_surface, {"reference"}, rigid),
         ("conductance", scene.conductance, {"reference"}, apart),
         ("micro.hardness", scene.micro.hardness, {"reference", "isolated"}, "which is elastic"),
         ("leak", scene.leak, _WITHOUT_GAPS, mapped),

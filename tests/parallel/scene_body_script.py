@@ -28,6 +28,8 @@ def sections(folder):
     for name, way in (("full", {"newton": "full"}), ("points", {"interface": "pointwise"})):
         coupling = {"kind": "consistent", "table_tolerance": 5e-3, **way}
         yield name, {**whole, "coupling": coupling}
+    rough = {"coupling": {"kind": "reference"}, "reference": {"fine": 0.06, "meshes": 1}}
+    yield "rough", {**whole, **rough}
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 2, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}

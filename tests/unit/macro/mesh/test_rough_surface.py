@@ -98,7 +98,7 @@ def test_tetrahedra_longer_than_the_waves_are_refused():
     [
         (Surface(heights=np.zeros((8, 8)), lengths=(2.0, 1.0)), "must cover the block's top"),
         (Surface(heights=np.zeros((8, 8)), lengths=(1.0, 0.9)), "must cover the block's top"),
-        (HIGH, "valley of the roughness is too deep for the block"),
+        (HIGH, "valley of the roughness is too deep for the body"),
         (wave(0.28, waves=2), "the roughness is too steep for a mesh"),
     ],
 )

@@ -40,10 +40,22 @@ def test_roughness_moves_the_block_alone():
     assert 0.3 < quality.thinnest < 1.0
 
 
-def test_bodies_that_are_no_block_below_their_face_are_refused():
+def test_roughness_fades_beside_its_rectangle():
+    flat = stepped_mesh(SHAPE, PLANES, COMM).mesh
+    before = flat.geometry.x.copy()
+    narrow = Surface(heights=ROUGH.heights[:, :32], lengths=(1.0, 0.5))
+    move_onto(flat, narrow, 0.75)
+    rise = flat.geometry.x[:, 2] - before[:, 2]
+    inside, far = before[:, 1] <= 0.5, before[:, 1] >= 0.75
+    top = np.abs(before[:, 2]) < 1e-12
+    places = np.clip(before[top & inside, :2], 0.0, narrow.lengths)
+    heights = narrow.height_at(*places.T) - narrow.mean_height
+    np.testing.assert_allclose(rise[top & inside], heights, atol=1e-12)
+    np.testing.assert_array_equal(rise[far], 0.0)
+    assert np.abs(rise[top & ~inside & ~far]).max() > 1e-3
+
+
+def test_roughness_needs_a_body_that_is_thick_enough():
     mesh = stepped_mesh(SHAPE, PLANES, COMM).mesh
-    with pytest.raises(InputError, match="wider than its rough face"):
-        move_onto(mesh, ROUGH, 1.0)
-    narrow = Surface(heights=np.zeros((8, 8)), lengths=(1.0, 0.9))
-    with pytest.raises(InputError, match="wider than its rough face"):
-        move_onto(mesh, narrow, 0.5)
+    with pytest.raises(InputError, match=r"too deep for the body .*below the mean, where"):
+        move_onto(mesh, ROUGH, 0.05)

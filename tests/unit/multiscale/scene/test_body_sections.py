@@ -12,6 +12,7 @@ SURFACE = {**SAMPLE, "lengths": ["1 mm", "1 mm"]}
 STEEL = {"young_modulus": "210 GPa", "poisson_ratio": 0.3}
 HELD = [{"surface": "back", "displacement": ["0", "free", "0.1 um"]}]
 BODY = {"mesh": "part.msh", "contact": "face", "supports": HELD, **STEEL}
+PULLED = {"surface": 1, "stress": ["0", "0", "1 MPa"]}
 REPRESENTATIVE = {"law": {"kind": "representative"}}
 
 
@@ -164,11 +165,11 @@ REFUSED = REFUSED_LOADS | {
     ),
     "reference": (
         {"counter_body": STEEL, "coupling": {"kind": "reference"}},
-        "counter_body: does not go with coupling.kind = 'reference', which meshes a block",
+        "counter_body: does not go with coupling.kind = 'reference', which meshes a body",
     ),
-    "meshed roughness on a mesh": (
-        {"body": BODY, "coupling": {"kind": "reference"}},
-        "body: does not go with coupling.kind = 'reference', which meshes a block under",
+    "meshed roughness under tractions": (
+        {"body": {**BODY, "tractions": [PULLED]}, "coupling": {"kind": "reference"}},
+        "coupling.kind: is 'reference', but loads of the body besides the contact need laws",
     ),
     "isolated on the mesh": (
         {"counter_body": STEEL, "coupling": {"kind": "isolated", "newton": "full"}},
