@@ -95,7 +95,8 @@ def test_full_sliding_transmits_the_friction_of_the_force(poisson_ratio, rel):
     (state,) = case.along(1.6, direction=(0.6, 0.8))
     limit = FRICTION * case.pressed.sum() * np.prod(case.model.spacing)
     assert np.hypot(*state.force) <= limit * (1.0 + 1e-12)
-    # 1e-8 is the tolerance; with ν > 0 slip turns near the rim, so that tractions are not quite parallel
+    # with ν > 0 slip turns near the rim, so that tractions are not quite parallel; 1e-8 is the
+    # tolerance
     assert np.array(state.force) == pytest.approx(limit * np.array([0.6, 0.8]), rel=rel)
     assert not state.sticking.any()
     assert case.model.stiffness(state)[0] == 0.0
