@@ -1,6 +1,7 @@
 """The structure that README draws: imports go down only, and heavy packages stay where they are."""
 
 import ast
+import re
 import subprocess
 import sys
 from graphlib import TopologicalSorter
@@ -170,3 +171,17 @@ def test_micro_scene_loads_no_finite_elements():
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert shown.stdout.strip() == "[]"
+
+
+def test_no_two_test_files_have_one_name():
+    """Without packages of tests, pytest imports the first of them for both."""
+    names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
+    assert sorted(names) == sorted(set(names))
+
+
+def test_helpers_of_tests_exist():
+    """A test that imports a helper that has gone fails where it is marked long, too."""
+    known = {path.stem for path in (ROOT / "tests" / "helpers").glob("*.py")}
+    for path in (ROOT / "tests").rglob("*.py"):
+        text = path.read_text(encoding="utf-8")
+        assert set(re.findall(r"^from helpers\.(\w+) import", text, re.MULTILINE)) <= known, path

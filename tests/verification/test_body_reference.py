@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 from helpers.l_shape import LENGTHS, SPECTRUM, Reference, reach, scene, write_foot
-from helpers.random_bodies import arrays_of, drawn
-from helpers.refined_mesh import tagged
+from helpers.random_bodies import drawn, mesh_of
 from mpi4py import MPI
 
 from geometry import Spectrum, synthesise
@@ -67,7 +66,7 @@ def test_bodies_with_meshed_roughness_bear_what_contact_problem_and_laws_say(num
 def random_scene(number, path):
     """Return a scene of a surface in the middle of a random body's face, and write the body."""
     drawn_body = drawn(number, coarser=0.7)
-    mesh = tagged(arrays_of(drawn_body), MPI.COMM_SELF)
+    mesh = mesh_of(drawn_body, MPI.COMM_SELF)
     write_mesh(mesh, path)
     side = 0.5 * min(planar_face(mesh, mesh.facet_names["contact"]).lengths)
     materials = {
