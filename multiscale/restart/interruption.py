@@ -97,7 +97,12 @@ def _quietly() -> Iterator[None]:
     def repeat(lost: Any) -> None:
         if isinstance(lost.exc_value, Ended):
             again = os.getpid(), lost.exc_value.exit_code - 128
+            # what another signal raises here would be lost as well, and the repetition with it
+            with suppress(Ended):
+                signal.pthread_sigmask(signal.SIG_BLOCK, ENDING)
             threading.Timer(_SOON, os.kill, again).start()
+            with suppress(Ended):
+                signal.pthread_sigmask(signal.SIG_UNBLOCK, ENDING)
         else:
             unraisable(lost)
 

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -198,6 +199,20 @@ def test_a_signal_while_something_is_freed_is_not_lost(capsys):
         time.sleep(30.0)
     assert ended.value.exit_code == 130
     assert capsys.readouterr().err == ""
+
+
+def test_a_second_signal_while_the_first_is_repeated_loses_none(monkeypatch):
+    start = threading.Timer.start
+
+    def interrupted(timer):
+        signal.raise_signal(signal.SIGINT)
+        start(timer)
+
+    monkeypatch.setattr(threading.Timer, "start", interrupted)
+    with pytest.raises(Ended), signals_raise():
+        Resource()
+        for _ in range(200):
+            time.sleep(0.01)
 
 
 def test_what_a_compiled_module_prints_of_a_signal_is_not_shown(capsys):
