@@ -10,6 +10,7 @@ def found(waiting_ranks):
     return OnRanks(waiting_ranks, "choice_ranks_script.py")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
 @pytest.mark.parametrize("body", ["block", "plate"])
 def test_a_choice_does_not_depend_on_the_number_of_ranks(found, body, ranks):

@@ -141,6 +141,7 @@ def test_bad_edges(box, leak, text):
         Run(scene(box, leak))
 
 
+@pytest.mark.long
 def test_two_bodies_leak_as_their_sample(box):
     """Evenly pressed: one separation everywhere; the counter-body is the same box upside down."""
     above = {"mesh": str(box), "contact": "bottom", "young_modulus": "8 GPa", "poisson_ratio": 0.3}

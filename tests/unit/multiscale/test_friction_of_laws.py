@@ -89,6 +89,7 @@ def test_the_stiffness_is_that_of_a_small_shift_back():
     assert history.tangential_stiffness_N_per_mm[1] < 0.98 * change
 
 
+@pytest.mark.long
 def test_a_shear_force_is_prescribed_under_a_free_plane():
     load = {
         "force": ["1 N", "2 N"],
@@ -124,6 +125,7 @@ def test_a_run_goes_on_with_its_sliders(kind, tmp_path):
         assert found == pytest.approx(list(getattr(whole, name)[4:]), rel=1e-7, abs=1e-9)
 
 
+@pytest.mark.long
 def test_steps_that_change_the_force_by_too_much_leave_no_slip_behind():
     load = {"approach": ["4 um", "1 um"], "steps": 1, "force_change": 0.3}
     load |= {"shear": [[SHIFT, 0.0], [0.0, SHIFT]], "shear_path": "along"}

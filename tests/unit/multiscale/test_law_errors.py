@@ -108,6 +108,7 @@ def test_an_accuracy_is_kept_or_said_not_to_be(mesh, accuracy, kept):
     assert ("is not kept" in history.notes[0]) is not kept
 
 
+@pytest.mark.long
 def test_blocks_of_many_linear_cells_are_compared_with_fewer(mesh, monkeypatch):
     monkeypatch.setattr(law_errors, "MOST_CHECKED_UNKNOWNS", 500)
     block = {**CONSTANTS, "lengths": [1.1, 0.9], "height": 0.8}
@@ -180,6 +181,7 @@ def test_laws_err_by_a_share_of_their_pressure_or_of_their_largest(mesh):
     assert found == pytest.approx([0.01 * max(law.rows.pressure[1], 0.03 * end), 0.01 * end])
 
 
+@pytest.mark.long
 def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
     stages = [
         {"force": "5 N", "steps": 2, "body": {"pretension": [{"surface": "right", "pull": "2 N"}]}},

@@ -154,6 +154,7 @@ def test_after_unloading_cells_that_yielded_leak_more_and_have_no_error():
     assert any("error of the leak after unloading is not measured" in one for one in history.notes)
 
 
+@pytest.mark.long
 def test_one_patch_leaks_as_the_cells_and_more_of_them_roughly():
     """One patch is the whole surface, whose laws reproduce it; sixteen are walls and means."""
     cells = run(scene(kind="concurrent", micro={"finite_slopes": False}))

@@ -129,6 +129,7 @@ def test_elements_heights_and_rows_are_chosen_by_the_errors_of_load_steps(plate)
     whole.close()
 
 
+@pytest.mark.long
 def test_tighter_accuracies_take_finer_meshes_and_say_what_they_took(plate):
     found = [make_setup(of_sample(accuracy=a, body=on_mesh(plate))) for a in (0.3, 0.004)]
     coarse, fine = found
@@ -155,6 +156,7 @@ def test_elements_that_are_stated_stay(plate):
     assert not setup.decision.kept and "is not kept" in setup.decision.warning
 
 
+@pytest.mark.long
 def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     steep = {**SAMPLE, "spectrum": {**SPECTRUM, "rms_slope": 0.2}}
     load = {"pressure": 3.7, "steps": 1}
@@ -168,6 +170,7 @@ def test_finite_slopes_are_taken_into_account_where_they_matter(plate):
     assert make_setup(given).scene.micro.finite_slopes is False
 
 
+@pytest.mark.long
 def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     block = {**CONSTANTS, "lengths": [3.0, 1.0], "height": 0.5}
     given = of_sample(accuracy=0.03, block=block)
@@ -190,6 +193,7 @@ def test_every_stage_is_looked_at(plate):
     assert setup.load_history.decisive_legs == {0, 1}
 
 
+@pytest.mark.long
 def test_bodies_on_both_sides_are_refined_where_that_is_open(plate, tmp_path):
     other = box(
         tmp_path, (3.0, 1.0, 0.5), (4, 2, 1), turn=np.diag([1.0, -1.0, -1.0]), shift=(0, 1, 0)
