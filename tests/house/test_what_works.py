@@ -22,7 +22,7 @@ def test_page_says_what_is_refused(script):
     assert PAGE.partition("## Reasons\n")[2].startswith(reasons), ANEW
 
 
-@pytest.mark.long
+@pytest.mark.slow  # minutes: hundreds of scenes
 def test_page_says_which_choices_do_not_go_together(script):
     assert script["page"]() == PAGE, ANEW
 
