@@ -373,15 +373,18 @@ class FrictionalForces(ContactForces):
 
     # --- load steps
 
-    def accept(self, closure: Array, displacement: PETSc.Vec) -> None:
+    def accept(self, closure: Array, displacement: PETSc.Vec) -> FaceShear:
         """Move the sliders on to the end of a load step that has converged.
 
         Args:
             closure: Closures at its end, shape (n,) [mm].
             displacement: Displacements there [mm].
+
+        Returns:
+            The shear of the face there.
         """
         found, before = self.respond(closure, displacement), self.memory
-        lost = self.sliders.step(before.sliders, found).lost
+        shear = self._shear_of(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         self.memory = SliderMemory(
@@ -389,8 +392,9 @@ class FrictionalForces(ContactForces):
             found.stress,
             self._shift.copy(),
             moved / size if size else before.direction,
-            before.dissipated + float(self.total(lost[:, None])[0]),
+            shear.dissipated,
         )
+        return shear
 
     def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear:
         """Return the shear of the face at closures and displacements.
@@ -399,7 +403,10 @@ class FrictionalForces(ContactForces):
             closure: Closures of this rank's samples, shape (n,) [mm].
             displacement: Displacements [mm].
         """
-        found = self.respond(closure, displacement)
+        return self._shear_of(self.respond(closure, displacement))
+
+    def _shear_of(self, found: SliderResponse) -> FaceShear:
+        """Return the shear of the face by a response of the sliders."""
         step = self.sliders.step(self.memory.sliders, found)
         lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
@@ -408,7 +415,7 @@ class FrictionalForces(ContactForces):
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
-            stick_closure=np.minimum(step.stick_closure, closure),
+            stick_closure=np.minimum(step.stick_closure, found.after.closure),
             stuck=step.stuck,
         )
 

@@ -181,9 +181,8 @@ class LawContactProblem:
         forces = self.forces
         if not isinstance(forces, FrictionalForces):
             return None
-        shear = forces.shear_state(self._closure, solution)
+        shear = forces.accept(self._closure, solution)
         self._stuck = shear.stuck
-        forces.accept(self._closure, solution)
         return shear
 
     @property

@@ -5,10 +5,11 @@ from functools import cache
 import h5py
 import numpy as np
 import pytest
+from helpers.pressed_cells import pressed_cells
 
 from geometry import Control
 from micro import HalfSpaceModel
-from multiscale import Run, Scene, make_setup, run, sweep
+from multiscale import Run, make_setup, run, sweep
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.observers.step_observers import FieldRecorder
 from multiscale.output.results import write_results
@@ -20,19 +21,9 @@ HARDNESS = 300.0
 UP_AND_DOWN = {"approach": [0.008, 0.004], "steps": 2}
 
 
-def scene(kind="analytic", *, hardness=HARDNESS, load=UP_AND_DOWN, periodic=False, **sections):
-    spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
-    grid = {"grid": [24, 24], "lengths": [1.0, 1.0], "periodic": periodic}
-    data = {
-        "surface": {"spectrum": spectrum, **grid},
-        "block": {"young_modulus": 4000.0, "poisson_ratio": 0.15},
-        "patches": {"grid": [2, 2]},
-        "micro": {} if hardness is None else {"hardness": hardness},
-        "coupling": {"kind": kind},
-        "load": load,
-        "output": {"check": "none", "figures": False, "report": False},
-    }
-    return Scene.from_dict(data | sections)
+def scene(kind="analytic", *, hardness=HARDNESS, load=UP_AND_DOWN, **sections):
+    micro = {} if hardness is None else {"hardness": hardness}
+    return pressed_cells(kind, load, **{"micro": micro, **sections})
 
 
 @cache
