@@ -306,6 +306,11 @@ class ContactForces:
         return bool(both[0] > _MOVED * both[1])
 
     @property
+    def weight(self) -> Array:
+        """Areas of this rank's samples, shape (n,) [mm²]."""
+        return self._sampling.weight
+
+    @property
     def normal_slope(self) -> Array:
         """p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵]."""
         return self.slope

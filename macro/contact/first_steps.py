@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
+from macro.contact.face_layer import FaceLayer
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
@@ -37,16 +38,21 @@ class FirstSteps:
         equilibrium: The equations.
         sampling: The samples that laws are evaluated at.
         follow: Lets the preconditioner follow the tangent.
+        layer: The body near its face, for laws at points; None: laws of whole patches.
 
     Note:
         Everything is collective.
     """
 
     def __init__(
-        self, equilibrium: Equilibrium, sampling: Sampling, follow: Callable[[], None]
+        self,
+        equilibrium: Equilibrium,
+        sampling: Sampling,
+        follow: Callable[[], None],
+        layer: FaceLayer | None = None,
     ) -> None:
         self._equilibrium, self._sampling, self._follow = equilibrium, sampling, follow
-        self._forces = equilibrium.forces
+        self._forces, self._layer = equilibrium.forces, layer
         self._residual, self._load = equilibrium.matrix.createVecs()
 
     def take(
@@ -81,13 +87,19 @@ class FirstSteps:
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
             closure = self._closure_on(lines, displacement)
-            lines = law_lines(self._forces, closure, lines.at(closure), basis.stiffness)
+            lines = self._lines(closure, lines.at(closure), basis.stiffness)
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
                 displacement.copy(best)
         best.copy(displacement)
         solver.setTolerances(rtol=own)
         return residuals[:-1], spent
+
+    def _lines(self, closure: Array, pressure: Array, stiffness: float) -> Lines:
+        """Linearise the laws anew, from what lines and the body predict."""
+        if self._layer is None:
+            return law_lines(self._forces, closure, pressure, stiffness)
+        return self._layer.lines(closure, pressure, stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:

@@ -52,14 +52,16 @@ class Lines(NamedTuple):
         return self.pressure + self.stiffness * (closure - self.closure)
 
 
-def law_lines(forces: ContactForces, closure: Array, pressure: Array, stiffness: float) -> Lines:
+def law_lines(
+    forces: ContactForces, closure: Array, pressure: Array, stiffness: float | Array
+) -> Lines:
     """Linearise the laws where samples reach their curves along the body's stiffness.
 
     Args:
         forces: The laws.
         closure: Predicted closures c of this rank's samples, shape (n,) [mm].
         pressure: Predicted pressures p [MPa].
-        stiffness: k [MPa/mm].
+        stiffness: k, one for all or one for each [MPa/mm].
 
     Note:
         Collective.

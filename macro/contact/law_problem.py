@@ -21,6 +21,7 @@ from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactLaws
 from macro.contact.equations import Equilibrium
 from macro.contact.face_contact_state import FaceContactState, FaceShear
+from macro.contact.face_layer import FaceLayer
 from macro.contact.first_steps import FirstSteps
 from macro.contact.frictional_forces import FrictionalForces, SliderMemory, contact_forces
 from macro.contact.initial_guess import DisplacementBasis
@@ -129,7 +130,10 @@ class LawContactProblem:
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
         update = self._preconditioner.update
-        self._first_steps = FirstSteps(self.equilibrium, sampling, update)
+        layer = None
+        if mode == "pointwise":
+            layer = FaceLayer(self.equilibrium, sampling, face.points_by_dofs)
+        self._first_steps = FirstSteps(self.equilibrium, sampling, update, layer)
         condensed = " or, on a very soft body, coupling.newton = 'condensed'"
         steps = "take more load steps (load.steps)"
         self._remedies = {"": steps + condensed if mode == "patchwise" else steps}

@@ -119,6 +119,12 @@ def joined(blocks: Sequence[Sequence[PETSc.Mat | None]]) -> PETSc.Mat:
     return matrix
 
 
+def joined_diagonal(parts: Sequence[PETSc.Mat]) -> PETSc.Mat:
+    """Return the block diagonal matrix of some matrices, see `joined`; collective."""
+    count = range(len(parts))
+    return joined([[one if i == k else None for k in count] for i, one in enumerate(parts)])
+
+
 def for_displacements(
     weights: csr_matrix, stay: Indices, free: PETSc.Vec, *, blocks: bool = False
 ) -> tuple[PETSc.Mat, PETSc.Vec]:
@@ -267,8 +273,7 @@ def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:
         matrix.axpy(1.0, springs, structure=structure.SUBSET_NONZERO_PATTERN)
         matrix.setNearNullSpace(parts[0].getNearNullSpace())
         return matrix
-    diagonal = [[one if i == k else None for k in range(len(parts))] for i, one in enumerate(parts)]
-    matrix = joined(diagonal)
+    matrix = joined_diagonal(parts)
     matrix.setBlockSizes(3, 3)  # algebraic multigrid asks for the components of a node
     matrix.axpy(1.0, springs, structure=structure.DIFFERENT_NONZERO_PATTERN)
     return matrix
