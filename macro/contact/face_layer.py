@@ -70,10 +70,13 @@ class FaceLayer:
         square = forces.comm.tompi4py().allreduce(float(sampling.weight @ moved**2))
         return float(forces.dot(rough)) / square
 
-    def lines(self, closure: Array, pressure: Array, stiffness: float) -> Lines:
+    def lines(
+        self, displaced: Array, closure: Array, pressure: Array, stiffness: float
+    ) -> Lines:
         """Linearise the laws where samples reach their curves along the body's stiffness.
 
         Args:
+            displaced: Predicted displacements of this rank's samples into the body, (n,) [mm].
             closure: Predicted closures of this rank's samples, shape (n,) [mm].
             pressure: Predicted pressures [MPa].
             stiffness: That of the whole body [MPa/mm].
@@ -89,24 +92,30 @@ class FaceLayer:
             return law_lines(forces, closure, pressure, stiffness)
         layer = _Layer(self._equilibrium, self._points, self._nodes(off))
         along = np.where(layer.sampled, self.stiffness, stiffness)
-        return self._solved(layer, closure, pressure, along, _CLOSE * scale)
+        lines = law_lines(forces, closure, pressure, along)
+        return self._solved(layer, displaced, pressure, lines, along, _CLOSE * scale)
 
     def _solved(
-        self, layer: _Layer, closure: Array, pressure: Array, along: Array, close: float
+        self,
+        layer: _Layer,
+        start: Array,
+        pressure: Array,
+        lines: Lines,
+        along: Array,
+        close: float,
     ) -> Lines:
         """Solve the laws on a layer; elsewhere the body resists like springs.
 
         Args:
             layer: The layer.
-            closure: Predicted closures of this rank's samples, shape (n,) [mm].
+            start: Predicted displacements of this rank's samples into the body, shape (n,) [mm].
             pressure: Predicted pressures [MPa].
+            lines: The laws at first.
             along: Stiffness of the body at the samples, shape (n,) [MPa/mm].
             close: Change of pressures that ends the steps [MPa].
         """
         forces, sampled = self._forces, layer.sampled
-        start = forces.levers.matrix @ forces.plane - forces.gap - closure
-        lines = law_lines(forces, closure, pressure, along)
-        moved, before = np.zeros_like(closure), pressure
+        moved, before = np.zeros_like(start), pressure
         for _ in range(_MOST_STEPS):
             softer = _softened(lines, pressure, np.where(sampled, np.inf, along))
             at = forces.closure_on_lines(start + moved, softer.at, softer.stiffness)

@@ -26,9 +26,9 @@ _FAR = 0.1
 """Residual beyond which the first lines are those of contact that sticks. Nearer, the guess is that
 already, in the basis of earlier solutions."""
 _MOST_STEPS = 8
-_TOLERANCE = 0.001
+_TOLERANCE = 1e-4
 """Relative tolerance of linear solves. With 0.01 closures under a prescribed approach were off by a
-stiff law's roughness, and ten steps were taken instead of four."""
+stiff law's roughness; with 0.001 as many linear iterations were taken in a few more steps."""
 
 
 class FirstSteps:
@@ -69,15 +69,16 @@ class FirstSteps:
             The residuals before every step, relative to the contact forces, and the number of
             linear iterations.
         """
-        lines = basis.write_guess(displacement)
+        predicted = basis.write_guess(displacement)
         residuals = [self._relative_residual(displacement)]
         if residuals[0] <= NEAR or self._forces.control.force == 0.0:
             return [], 0
         best, step, spent = displacement.copy(), displacement.duplicate(), 0
-        own = solver.getTolerances()[0]
+        own, layer = solver.getTolerances()[0], self._layer if len(basis) > 1 else None
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
             first = len(residuals) == 1 and residuals[0] > _FAR
+            lines = self._lines(displacement, *predicted, basis.stiffness, layer)
             self._linearise(displacement, lines, first=first)
             self._follow()
             solver.setTolerances(rtol=_TOLERANCE)
@@ -86,8 +87,8 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            closure = self._closure_on(lines, displacement)
-            lines = self._lines(closure, lines.at(closure), basis.stiffness)
+            closure, layer = self._closure_on(lines, displacement), self._layer
+            predicted = closure, lines.at(closure)
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
                 displacement.copy(best)
@@ -95,11 +96,19 @@ class FirstSteps:
         solver.setTolerances(rtol=own)
         return residuals[:-1], spent
 
-    def _lines(self, closure: Array, pressure: Array, stiffness: float) -> Lines:
-        """Linearise the laws anew, from what lines and the body predict."""
-        if self._layer is None:
+    def _lines(
+        self,
+        displacement: PETSc.Vec,
+        closure: Array,
+        pressure: Array,
+        stiffness: float,
+        layer: FaceLayer | None,
+    ) -> Lines:
+        """Linearise the laws from predicted closures and pressures."""
+        if layer is None:
             return law_lines(self._forces, closure, pressure, stiffness)
-        return self._layer.lines(closure, pressure, stiffness)
+        displaced = self._sampling.displacements(displacement)
+        return layer.lines(displaced, closure, pressure, stiffness)
 
     def _relative_residual(self, displacement: PETSc.Vec) -> float:
         try:

@@ -113,14 +113,15 @@ class DisplacementBasis:
         square = self._sum((self._sampling.weight * pressure) @ pressure)
         return float(square / self._sum(pressure @ (y @ self._sampled)))
 
-    def write_guess(self, into: PETSc.Vec) -> Lines:
+    def write_guess(self, into: PETSc.Vec) -> tuple[Array, Array]:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
         It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution. What
         stuck then sticks on.
 
         Returns:
-            The lines of the next step from there.
+            Closures of this rank's samples there [mm], and the pressures that the displacements
+            follow from [MPa], shape (n,) each.
         """
         forces, stiffness = self._equilibrium.forces, self.stiffness
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
@@ -138,7 +139,7 @@ class DisplacementBasis:
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
-        return law_lines(forces, closure, y @ self._pressures, stiffness)
+        return closure, y @ self._pressures
 
     def _closure_on(self, lines: Lines, y: Array) -> Array:
         """Bring the plane into equilibrium on linearised laws, and return the closures."""
