@@ -32,7 +32,9 @@ Grid = tuple[int, ...]
 Pair = tuple[float, float]
 """Lengths along x and y [mm]."""
 
-_ROUNDING = 4e-16
+_ROUNDING, _NEARBY = 4e-16, 1e-6
+"""Relative changes of pressures over which what finite slopes add is the same, and its derivative.
+"""
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
@@ -266,9 +268,12 @@ class Compliance:
             pressure: Pressures / E* of all cells, shape (nx, ny).
             rate: Their change by whatever the derivative is by, shape (nx, ny).
         """
+        if self._last is None or not np.allclose(self._last[0], pressure, _NEARBY, _NEARBY * pressure.max()):
+            self.slope_displacement(pressure)
+        assert self._last is not None
+        pressure, there = self._last
         step = 1e-6 * float(pressure.max()) / float(np.abs(rate).max())
-        moved = self._by_slopes(pressure + step * rate)
-        return np.asarray((moved - self.slope_displacement(pressure)) / step)
+        return np.asarray((self._by_slopes(pressure + step * rate) - there) / step)
 
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""

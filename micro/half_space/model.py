@@ -318,7 +318,14 @@ class HalfSpaceModel:
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
+            nearby = tuple(
+                (self.interference(one.plane) - one.by_slopes, one.by_slopes)
+                for one in (start.between or (start,))
+                if one.by_slopes is not None and one.plastic_depth is None
+            )
+            first = ContactPressures(
+                known, motion_there, by_slopes=start.by_slopes, nearby=nearby
+            )
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
@@ -338,6 +345,9 @@ class HalfSpaceModel:
         free = np.array([False, turns, turns])
         interference = self.interference(state.plane, state.earlier_depth)
         problem = self._problem(interference, free, np.zeros(3))
+        if state.by_slopes is not None:
+            lowered = state.by_slopes
+            problem = replace(problem, interference=interference - lowered, lowered=lowered)
         with blas_threads(1):
             rate, products = approach_stiffness(problem, state.pressures / self.contact_modulus)
         return rate * self.contact_modulus * float(np.prod(self.surface.spacing)), products
