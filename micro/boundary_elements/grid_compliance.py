@@ -33,8 +33,8 @@ Pair = tuple[float, float]
 """Lengths along x and y [mm]."""
 
 _ROUNDING, _NEARBY = 4e-16, 1e-6
-"""Relative changes of pressures over which what finite slopes add is the same, and its derivative.
-"""
+"""Changes of pressures, over them and over the largest, that leave what finite slopes add as it is,
+and its derivative, which is almost constant."""
 
 _MOST_GRIDS = 24
 """Half-spaces that are cached: three sizes of box with their coarse grids."""
@@ -268,11 +268,11 @@ class Compliance:
             pressure: Pressures / E* of all cells, shape (nx, ny).
             rate: Their change by whatever the derivative is by, shape (nx, ny).
         """
-        if self._last is None or not np.allclose(self._last[0], pressure, _NEARBY, _NEARBY * pressure.max()):
-            self.slope_displacement(pressure)
-        assert self._last is not None
+        largest = float(pressure.max())
+        if self._last is None or np.abs(self._last[0] - pressure).max() > _NEARBY * largest:
+            self._last = pressure, self._by_slopes(pressure)
         pressure, there = self._last
-        step = 1e-6 * float(pressure.max()) / float(np.abs(rate).max())
+        step = 1e-6 * largest / float(np.abs(rate).max())
         return np.asarray((self._by_slopes(pressure + step * rate) - there) / step)
 
     def _by_slopes(self, pressure: Array) -> Array:

@@ -60,14 +60,15 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
 
     # conjugate gradients; solutions of the elastic body without finite slopes precondition them
     left = np.ones(len(flat))
-    rate, direction, before = np.zeros_like(left), np.zeros_like(left), np.inf
+    rate, direction, answer = np.zeros((3, len(flat)))
+    before = np.inf
     for _ in range(_MOST_PASSES):
         size = float(np.abs(contact.balanced(left)).max())
         if size <= _RESIDUAL:
             return float(rate.sum() + rate @ left), part.grid.products - used
         stop = max(_FORCING * size, 0.25 * _RESIDUAL)
         step = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
-        direction = step - float(step @ answer) / before * direction if rate.any() else step
+        direction = step - float(step @ answer) / before * direction
         answer = displacement(direction)
         before = float(direction @ answer)
         length = float(direction @ left) / before

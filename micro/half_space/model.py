@@ -320,12 +320,10 @@ class HalfSpaceModel:
             motion_there = np.array([start.plane.approach])
             nearby = tuple(
                 (self.interference(one.plane) - one.by_slopes, one.by_slopes)
-                for one in (start.between or (start,))
+                for one in start.nearby or (start,)
                 if one.by_slopes is not None and one.plastic_depth is None
             )
-            first = ContactPressures(
-                known, motion_there, by_slopes=start.by_slopes, nearby=nearby
-            )
+            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
