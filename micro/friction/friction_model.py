@@ -17,11 +17,12 @@ import numpy as np
 from geometry.materials import MaterialPair
 from geometry.shear_state import ShearControl, ShearState
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.traction_modes import TractionModes, TractionsOnCells
 from micro.complementarity.rigid_motions import Box
 from micro.complementarity.solver import box_around
 from micro.friction.goodman import CrossCompliance, NeglectedCoupling, variation
 from micro.friction.stick_slip import FreeTractions, solve_tractions
-from micro.friction.tangential_grid import TangentialGrid, tangential_grid
+from micro.friction.tangential_grid import BodyGrid, TangentialGrid, tangential_grid
 from micro.friction.traction_problem import TractionProblem
 from support.arrays import Array, Flags
 from support.cores import blas_threads
@@ -49,6 +50,7 @@ class FrictionModel:
             half-space is not determined: shifts count from the mean of the displaced surface.
         tolerance: Largest residual of a solution: it is exact for a shift that varies from cell to
             cell by no more than this part.
+        body: What a finite body adds to the half-space; a half-space when not given.
 
     Raises:
         InputError: When coefficient or tolerance are not positive.
@@ -59,6 +61,7 @@ class FrictionModel:
     spacing: tuple[float, float]
     periodic: bool = False
     tolerance: float = 1e-6
+    body: TractionModes | None = None
 
     def __post_init__(self) -> None:
         for what in ("coefficient", "tolerance"):
@@ -192,11 +195,20 @@ class FrictionModel:
         """Return the box of cells that products are made on: around some, or a whole period."""
         return box_around(cells | self.periodic | ~cells.any())
 
-    def grid(self, box: Box) -> TangentialGrid:
+    def grid(self, box: Box) -> TangentialGrid | BodyGrid:
         """Return the tangential compliance of the cells of a box."""
         counts = box[0].stop - box[0].start, box[1].stop - box[1].start
         ratio = self.materials.tangential_poisson_ratio
-        return tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+        found = tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+        return found if self.body is None else BodyGrid(found, self._on(self.body, box))
+
+    def _on(self, body: TractionModes, box: Box) -> TractionsOnCells:
+        """Return what a body adds on the cells of a box."""
+        borders = (
+            step * np.arange(part.start, part.stop + 1)
+            for part, step in zip(box, self.spacing, strict=True)
+        )
+        return body.on(*borders, self._modulus)
 
     @property
     def _modulus(self) -> float:
