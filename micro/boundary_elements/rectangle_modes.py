@@ -45,15 +45,12 @@ def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     Returns:
         (1/A²) ∫∫ φ_m(x) φ_n(x') / (π |x − x'|) dA dA', symmetric, shape (K², K²) [1/mm].
     """
-    parts = _products, _products
-    matrix = 4.0 / np.pi * _integrated(lengths, count, parts, (1.0, 1.0), lambda x, _: np.ones_like(x))
+    matrix = direction_modes(lengths, (0, 0), count)
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
 @_of_few_modes
-def direction_modes(
-    lengths: tuple[float, float], powers: tuple[int, int], count: int
-) -> Array:
+def direction_modes(lengths: tuple[float, float], powers: tuple[int, int], count: int) -> Array:
     """Return what kernels of a direction displace by modes, in modes.
 
     Args:

@@ -95,7 +95,7 @@ class TractionModes:
         some = some[:, :, :count, :count, :count, :count].reshape(3, 3, count**2, count**2)
         return TractionModes(self.lengths, some, self.origin)
 
-    def on(self, borders_x: ArrayLike, borders_y: ArrayLike, modulus: float) -> TractionsOnCells:
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
         """Return the compliance of cells of uniform tractions, by means over the cells.
 
         Args:
@@ -107,7 +107,10 @@ class TractionModes:
             np.asarray(borders, float) - start
             for borders, start in zip((borders_x, borders_y), self.origin, strict=True)
         )
-        means = (mode_means(at, length, self.count) for at, length in zip((x, y), self.lengths))
+        means = (
+            mode_means(at, length, self.count)
+            for at, length in zip((x, y), self.lengths, strict=True)
+        )
         force = modulus * (x[1] - x[0]) * (y[1] - y[0])
         return TractionsOnCells(self.matrix * force, *means)
 
@@ -139,7 +142,7 @@ class TractionsOnCells:
         return self._by(pressure[None], slice(0, 2), slice(2, 3))
 
     def across(self, tractions: Array) -> Array:
-        """Return the displacements into the body by tractions along it (2, nx, ny), (nx, ny) [mm]."""
+        """Return the displacements into the body by tractions (2, nx, ny), shape (nx, ny) [mm]."""
         return self._by(tractions, slice(2, 3), slice(0, 2))[0]
 
     def among(self, rows: Indices, columns: Indices) -> TractionsOnCells:
@@ -153,6 +156,7 @@ class TractionsOnCells:
 
     def _by(self, loads: Array, seen: slice, by: slice) -> Array:
         moments = self.means_x @ loads @ self.means_y.T
-        amplitudes = np.einsum("abmn,bn->am", self.matrix[seen, by], moments.reshape(len(loads), -1))
+        flat = moments.reshape(len(loads), -1)
+        amplitudes = np.einsum("abmn,bn->am", self.matrix[seen, by], flat, optimize=True)
         amplitudes = amplitudes.reshape(-1, *moments.shape[1:])
         return np.asarray(self.means_x.T @ amplitudes @ self.means_y)

@@ -48,7 +48,9 @@ class FreeInverse:
 
     accurate = True
 
-    def __init__(self, grid: TangentialGrid | BodyGrid, cells: Cells, normal: Array, stiffness: Array) -> None:
+    def __init__(
+        self, grid: TangentialGrid | BodyGrid, cells: Cells, normal: Array, stiffness: Array
+    ) -> None:
         self._normal, self._inverse = normal, grid.inverse
         slips, own = normal.any(axis=0), grid.self_compliance
         self._known = np.where(slips, own / (own + stiffness), 1.0)

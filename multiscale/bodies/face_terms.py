@@ -316,9 +316,7 @@ class BlockTerms(FaceTerms):
         from macro import face_tractions
 
         shape, count = self.shape, min(replace(self, side_term=None).modes, _KEPT_MODES)
-        whole = face_tractions(
-            self.lengths, shape.height, self.material, self.sides, count, comm
-        )
+        whole = face_tractions(self.lengths, shape.height, self.material, self.sides, count, comm)
         without = half_space_traction_modes(self.lengths, self.material.poisson_ratio, count)
         matrix = whole - without / self.material.contact_modulus
         return TractionModes(self.lengths, matrix, (-self.margin, -self.margin))

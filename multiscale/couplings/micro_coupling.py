@@ -140,6 +140,7 @@ class MicroCoupling(PressedSurface):
             spacing=self.surface.spacing,
             periodic=self.scene.surface.periodic,
             body=body,
+            coupled=self.scene.friction.coupled,
         )
 
     # --- errors

@@ -58,8 +58,11 @@ class FrictionObserver(StepObserver):
     def _coupling_notes(self) -> Iterator[str]:
         if self._neglected is None:
             return
-        found = self._neglected
-        if found.beta == 0.0:
+        found, friction = self._neglected, self._coupling.scene.friction
+        if friction is not None and friction.coupled:
+            yield "friction: pressures and tractions were solved in turn at every load step"
+            return
+        if not (found.beta or found.sideways):
             yield "friction: two like bodies, whose pressures and tractions do not see each other"
             return
         change = found.force_change / found.force if found.force else 0.0
@@ -81,7 +84,7 @@ class FrictionObserver(StepObserver):
             return
         if not coupling.has_body:
             return
-        model = coupling.friction_model
+        model = getattr(coupling, "friction_model", None)
         if model is not None and model.body is None:
             yield (
                 "shift and tangential stiffness are those of the contact on a half-space; the "
