@@ -13,7 +13,6 @@
 
 # %%
 import argparse
-from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
@@ -63,21 +62,13 @@ for force in FORCES:
 
 # %%
 CLAMPED = 200.0
-PARTS = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)
-if choice.quick:
-    PARTS = (0.1, 0.2, 0.4, 0.8, 3.2)
+PARTS = (0.0125, 0.025, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6, 3.2)[3 * choice.quick :]
 pressures = normal.press(Control(force=CLAMPED)).pressures
 stuck = sideways.advance(None, pressures, ShearControl(shift=(0.0, 0.0)))
 sticking = sideways.stiffness(stuck)[0]
 amplitudes = FRICTION * CLAMPED / sticking * np.array(PARTS)
-slides_at = 1.5 * FRICTION * CLAMPED / sticking
-sphere = MindlinSphere(
-    radius=0.1,  # of no effect on energies
-    approach=MINDLIN * slides_at / FRICTION,
-    force=CLAMPED,
-    coefficient=FRICTION,
-    poisson_ratio=STEEL.poisson_ratio,
-)
+size = {"radius": 0.1, "approach": 1.5 * MINDLIN * CLAMPED / sticking, "force": CLAMPED}
+sphere = MindlinSphere(**size, coefficient=FRICTION, poisson_ratio=STEEL.poisson_ratio)
 
 
 def cycle(amplitude: float) -> tuple[float, float]:
@@ -92,23 +83,18 @@ def cycle(amplitude: float) -> tuple[float, float]:
 forces, lost = np.array([cycle(amplitude) for amplitude in amplitudes]).T
 factors = lost / (np.pi * forces * amplitudes)
 secants = forces / amplitudes
-sliding = amplitudes < slides_at
-mindlin = np.array([sphere.energy_per_cycle(each) for each in amplitudes[sliding]])
-
-
-def exponents(energies: np.ndarray) -> np.ndarray:
-    """Return the powers with which energies grow from amplitude to amplitude."""
-    return np.diff(np.log(energies)) / np.diff(np.log(amplitudes[: len(energies)]))
-
-
-print("amplitude [nm]  stiffness [N/µm]  lost per cycle [nJ]  loss factor  exponent   Mindlin's")
-powers = [["", *(f"{power:.3f}" for power in exponents(each))] for each in (lost, mindlin)]
-columns = 1e6 * amplitudes, 1e-3 * secants, 1e6 * lost, factors, *powers
-for row in zip_longest(*columns, fillvalue=""):
-    print("{:14.1f} {:17.1f} {:20.4g} {:12.4f} {:>9} {:>11}".format(*row))
+short = amplitudes[amplitudes < sphere.sliding_shift]
+mindlin = np.array([sphere.energy_per_cycle(amplitude) for amplitude in short])
+print("amplitude [nm]  stiffness [N/µm]  lost per cycle [nJ]  loss factor")
+for row in zip(1e6 * amplitudes, 1e-3 * secants, 1e6 * lost, factors, strict=True):
+    print("{:14.1f} {:17.1f} {:20.4g} {:12.4f}".format(*row))
 small = 2 if choice.quick else 4
-exponent = float(np.polyfit(np.log(amplitudes[:small]), np.log(lost[:small]), 1)[0])
-print(f"exponent of the energy up to {1e6 * amplitudes[small - 1]:.0f} nm: {exponent:.2f}")
+exponent, of_sphere = (
+    np.polyfit(np.log(amplitudes[:small]), np.log(energies[:small]), 1)[0]
+    for energies in (lost, mindlin)
+)
+print(f"up to {1e6 * amplitudes[small - 1]:.0f} nm the energy grows with the power {exponent:.3f},")
+print(f"that of Mindlin's sphere with {of_sphere:.3f}")
 
 # %%
 use_style()
@@ -120,10 +106,9 @@ left.text(FORCES[0], MINDLIN - 0.004, "2 (1 − ν)/(2 − ν)", color=VERMILLIO
 left.set_xticks(FORCES, [f"{force:g}" for force in FORCES])
 left.minorticks_off()
 left.set(xlabel="clamping force [N]", ylabel="tangential over normal stiffness", ylim=(0.75, 0.9))
-for energies, look, name in ((lost, "o-", "joint"), (mindlin, "-", "Mindlin's sphere")):
-    size = 1e3 * amplitudes[: len(energies)]  # [µm]
-    colour = BLUE if look == "o-" else VERMILLION
-    middle.semilogx(1e3 * size, 1e3 * energies / size**3, look, color=colour, label=name)
+per_cube = 1e-6 * lost / amplitudes**3, 1e-6 * mindlin / short**3  # [µJ/µm³]
+middle.semilogx(1e6 * amplitudes, per_cube[0], "o-", color=BLUE, label="joint")
+middle.semilogx(1e6 * short, per_cube[1], color=VERMILLION, label="Mindlin's sphere")
 middle.legend()
 middle.set(xlabel="amplitude [nm]", ylim=(0.0, None))
 middle.set_ylabel("energy per cycle / amplitude³ [µJ/µm³]")
@@ -136,8 +121,7 @@ factor.set_ylabel("loss factor", color=VERMILLION)
 figure.savefig(choice.out / "joint_damping.png")
 
 # %% [markdown]
-# The ratio is that of Mindlin's sphere; small vibrations lose with the third power. Below the
-# smallest amplitude here rims slip that are narrower than a third of a cell.
+# The ratio is that of Mindlin's sphere; small vibrations lose with the third power.
 
 # %%
 assert np.abs(np.array(ratios) / MINDLIN - 1.0).max() < 0.03
