@@ -36,7 +36,7 @@ class Column:
             it. Empty for none.
         table: The table that the column stands in: ``"curve"``, ``"more"`` for what some runs
             alone know, ``"solver"``.
-        in_report: Whether reports show the value of the last load step among their results.
+        in_report: What reports call the value of the last load step, where they list it.
 
     Attributes:
         name: Name of the column and of the attribute.
@@ -50,7 +50,7 @@ class Column:
     digits: int = 4
     error: str = ""
     table: str = "curve"
-    in_report: bool = False
+    in_report: str = ""
     name: str = field(default="", init=False)
     place: int = field(default_factory=_places.__next__, init=False)
 
