@@ -117,7 +117,8 @@ class LoadStep(Displayed):
     )
     stiffness_N_per_mm: float | None = column(
         "Interfacial stiffness dF/dδ, force over approach", "N/mm",
-        heading="stiffness", table="more", error="stiffness_error_N_per_mm", in_report=True,
+        heading="stiffness", table="more", error="stiffness_error_N_per_mm",
+        in_report="interfacial stiffness",
     )  # fmt: skip
     elastic_energy_mJ: float | None = column(
         "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
@@ -132,11 +133,11 @@ class LoadStep(Displayed):
     )  # fmt: skip
     plastic_depth_mm: float | None = column(
         "Largest plastic depth that the loads so far have left", "mm",
-        heading="plastic depth", table="more", in_report=True,
+        heading="plastic depth", table="more", in_report="plastic depth",
     )  # fmt: skip
     thermal_conductance_W_per_K: float | None = column(
         "Thermal conductance of contacts and gaps", "W/K",
-        heading="thermal conductance", table="more", in_report=True,
+        heading="thermal conductance", table="more", in_report="thermal conductance",
     )  # fmt: skip
     gap_conductance_W_per_K: float | None = column(
         "Part of it through gas and radiation", "W/K",
@@ -144,7 +145,7 @@ class LoadStep(Displayed):
     )  # fmt: skip
     electrical_conductance_S: float | None = column(
         "Electrical conductance of the contacts", "S",
-        heading="electrical conductance", table="more", in_report=True,
+        heading="electrical conductance", table="more", in_report="electrical conductance",
     )  # fmt: skip
     stiffness_error_N_per_mm: float | None = column(
         "Error of the stiffness, where cells yield further", "N/mm"
@@ -156,19 +157,19 @@ class LoadStep(Displayed):
     )  # fmt: skip
     shear_force_x_N: float | None = column(
         "Shear force on the plane along x", "N",
-        heading="shear force x", table="more", in_report=True,
+        heading="shear force x", table="more", in_report="shear force along x",
     )  # fmt: skip
     shear_force_y_N: float | None = column(
         "Shear force on the plane along y", "N",
-        heading="shear force y", table="more", in_report=True,
+        heading="shear force y", table="more", in_report="shear force along y",
     )  # fmt: skip
     shear_x_mm: float | None = column(
         "Shift of the plane along x from where it first touched", "mm",
-        heading="shift x", table="more", in_report=True,
+        heading="shift x", table="more", in_report="shift along x",
     )  # fmt: skip
     shear_y_mm: float | None = column(
         "Shift of the plane along y from where it first touched", "mm",
-        heading="shift y", table="more", in_report=True,
+        heading="shift y", table="more", in_report="shift along y",
     )  # fmt: skip
     slip_area_fraction: float | None = column(
         "Area that bears the traction μ p over nominal contact area",
@@ -176,11 +177,12 @@ class LoadStep(Displayed):
     )  # fmt: skip
     tangential_stiffness_N_per_mm: float | None = column(
         "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
-        heading="tangential stiffness", table="more", in_report=True,
+        heading="tangential stiffness", table="more", in_report="tangential stiffness",
     )  # fmt: skip
     dissipated_mJ: float | None = column(
-        "Energy lost to friction", "mJ", heading="lost to friction", table="more", in_report=True
-    )
+        "Energy lost to friction", "mJ",
+        heading="lost to friction", table="more", in_report="lost to friction",
+    )  # fmt: skip
     stage: int | None = column(
         "Number of the stage, where the load history has stages", heading="stage", table="more"
     )

@@ -155,7 +155,7 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         yield from ((name, value, "") for name, value in observer.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
-            yield column.heading, quantity(value, column.unit), ""
+            yield column.in_report, quantity(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
