@@ -267,20 +267,6 @@ class PatchLeakObserver(LeakObserver):
             )
 
 
-def leak_observer(coupling: Coupling) -> LeakObserver:
-    """Return what adds the leak to load steps: through gaps, patches, or over a face.
-
-    Args:
-        coupling: What finds the load steps, of a scene that asks for the leak.
-    """
-    section = coupling.scene.leak
-    if section is not None and section.between_edges:
-        from multiscale.observers.face_leak import FaceLeakObserver  # others do without
-
-        return FaceLeakObserver(coupling)
-    return PatchLeakObserver(coupling) if coupling.has_laws else GapLeakObserver(coupling)
-
-
 def leak_text(leak: Leak) -> str:
     """Return a leak with its error, or that the gap is closed.
 

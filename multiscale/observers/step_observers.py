@@ -277,12 +277,16 @@ class FieldRecorder(StepObserver):
         solver.past = past
 
 
-_OF_SECTIONS = {
-    "conductance": "conductance.ConductanceObserver",
-    "leak": "leak.leak_observer",
-    "friction": "friction.FrictionObserver",
-}
-"""What makes the observer of a section, by name; a scene without the section does not load it."""
+def _places(coupling: Coupling) -> Iterator[str]:
+    """Yield module and class of the observers of the sections of a scene; others are not loaded."""
+    scene = coupling.scene
+    if scene.conductance is not None:
+        yield "conductance.ConductanceObserver"
+    if scene.leak is not None:
+        own = "leak.PatchLeakObserver" if coupling.has_laws else "leak.GapLeakObserver"
+        yield "face_leak.FaceLeakObserver" if scene.leak.between_edges else own
+    if scene.friction is not None:
+        yield "friction.FrictionObserver"
 
 
 def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
@@ -299,9 +303,8 @@ def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
     """
     if coupling.scene.output.contact != "none":
         yield StiffnessObserver(coupling)
-    for section, place in _OF_SECTIONS.items():
-        if getattr(coupling.scene, section) is not None:
-            module, _, name = place.partition(".")
-            yield getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    for place in _places(coupling):
+        module, _, name = place.partition(".")
+        yield getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
