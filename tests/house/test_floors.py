@@ -1,4 +1,4 @@
-"""The structure that README draws: imports go down only, and heavy packages stay where they are."""
+"""The structure that CONTRIBUTING.md draws: imports go down only, heavy packages stay in place."""
 
 import ast
 import re
