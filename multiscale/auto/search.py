@@ -40,7 +40,7 @@ from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import ZERO, ErrorProbe
-from multiscale.results.notes import relative_error
+from multiscale.results.accuracy import relative_error
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone
 from support.errors import InputError, NotConverged

@@ -49,7 +49,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     begun("setting up the problem")
                     run = Run(scene, comm, None if kept is None else kept.resolved)
                 if kept is not None:
-                    run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+                    run.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
                 terminal.show_plan(comm, run.coupling)
                 if notice:
                     terminal.say(comm, notice)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, Detail, number, percent, quantity
+from multiscale.results.history import History
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""
@@ -34,7 +36,7 @@ class FrictionObserver(StepObserver):
         self._finds_stiffness = coupling.scene.output.contact != "none"
         self._neglected: NeglectedCoupling | None = None
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its tangential stiffness."""
         solver = self._coupling.solver
         if last:
@@ -54,6 +56,12 @@ class FrictionObserver(StepObserver):
             yield loop
         yield from self._coupling_notes()
         yield from self._body_notes()
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
+        contact = history.contact
+        if contact is not None and contact.slipping is not None:
+            yield "shear", "shear.shear_figure", (history, contact)
 
     def _coupling_notes(self) -> Iterator[str]:
         if self._neglected is None:

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.figures import by_matplotlib
+from multiscale.loading.load_step import COLUMNS
 from multiscale.progress import case_progress
 from multiscale.readable import column
 from multiscale.results.data_frames import data_frame
-from multiscale.results.history import COLUMNS
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases

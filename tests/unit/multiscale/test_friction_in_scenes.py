@@ -114,7 +114,7 @@ def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path):
     write_checkpoint(path, checkpoint_of(first, first.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(scene())
-    second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)
+    second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)
     rest = list(second.load_steps())
     second.close()
     assert [step.step for step in rest] == list(range(7, 12))

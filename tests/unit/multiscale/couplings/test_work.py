@@ -103,7 +103,7 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     run = Run(given)
     list(run.load_steps())
     counted = run.coupling.work()
-    assert counted.unknowns == (run.unknowns or counted.unknowns)
+    assert counted.unknowns == (run.coupling.unknowns or counted.unknowns)
     cycles = counted.cycles / counted.unknowns - cost.SET_UP_CYCLES
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step
