@@ -289,7 +289,9 @@ def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> It
     if scene.output.contact in ("last", "all"):
         yield "output.contact", f"does not go with {law}, which has no spots", out
     if scene.law.seeds and scene.surface.spectrum is None:
-        yield "law.seeds", "needs surface.spectrum", "leave it out for a measured map"
+        yield "law.seeds", "needs surface.spectrum", "law.samples, which names further maps"
+    if scene.law.samples and scene.surface.file is None:
+        yield "law.samples", "needs surface.file", "law.seeds for a spectrum"
     if scene.block is not None and scene.law.regions:
         yield "law.regions", "names faces of a mesh", "with [body]"
     if scene.body is not None and scene.body.place is not None:
