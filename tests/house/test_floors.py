@@ -54,9 +54,9 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "console figures machine",
+        "figures machine",
         "laws loading",
-        "progress",
+        "console",
         "exports results scene",
         "inputs",
         "bodies",
