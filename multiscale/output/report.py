@@ -11,13 +11,11 @@ import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
-from multiscale.loading.leak import WAYS
-from multiscale.loading.load_step import LoadStep
+from multiscale.loading.load_step import COLUMNS, LoadStep
 from multiscale.readable import Caution, Detail, measured, number, percent, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.html_page import filled
-from multiscale.results.leak_notes import leak_text
 from multiscale.run import Run
 
 PAPER = (
@@ -29,21 +27,6 @@ PAPER = (
 
 _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
 """Topics of the plan that say what was computed; the others say how, and are folded."""
-
-_MORE = {
-    "shear_force_x_N": ("shear force along x", "N"),
-    "shear_force_y_N": ("shear force along y", "N"),
-    "shear_x_mm": ("shift along x", "mm"),
-    "shear_y_mm": ("shift along y", "mm"),
-    "tangential_stiffness_N_per_mm": ("tangential stiffness", "N/mm"),
-    "dissipated_mJ": ("lost to friction", "mJ"),
-    "stiffness_N_per_mm": ("interfacial stiffness", "N/mm"),
-    "plastic_depth_mm": ("plastic depth", "mm"),
-    "thermal_conductance_W_per_K": ("thermal conductance", "W/K"),
-    "electrical_conductance_S": ("electrical conductance", "S"),
-}
-"""What some runs know of their load steps: attribute, name and unit."""
-
 
 CONTACT_OF_STEP = "contact_of_step_"
 """Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
@@ -168,12 +151,11 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    for way, where in WAYS.items():
-        if (leak := last.leak(way)) is not None:
-            yield f"leak {where}", leak_text(leak), ""
-    for name, (text, unit) in _MORE.items():
-        if value := getattr(last, name):
-            yield text, quantity(value, unit), ""
+    for observer in run.observers:
+        yield from ((name, value, "") for name, value in observer.results(last))
+    for column in COLUMNS:
+        if column.in_report and (value := column.of(last)):
+            yield column.in_report, quantity(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:

@@ -289,7 +289,9 @@ def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> It
     if scene.output.contact in ("last", "all"):
         yield "output.contact", f"does not go with {law}, which has no spots", out
     if scene.law.seeds and scene.surface.spectrum is None:
-        yield "law.seeds", "needs surface.spectrum", "leave it out for a measured map"
+        yield "law.seeds", "needs surface.spectrum", "law.samples, which names further maps"
+    if scene.law.samples and scene.surface.file is None:
+        yield "law.samples", "needs surface.file", "law.seeds for a spectrum"
     if scene.block is not None and scene.law.regions:
         yield "law.regions", "names faces of a mesh", "with [body]"
     if scene.body is not None and scene.body.place is not None:
@@ -350,6 +352,9 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
 
 def _friction_on_mesh(scene: SceneSections) -> Iterator[Problem]:
     """Yield what has no tangential displacements, which friction of laws needs."""
+    if scene.friction is not None and scene.friction.coupled:
+        problem = "is true, but laws do not know how pressures of single contacts pull the surface"
+        yield "friction.coupled", problem, "false; or coupling.kind = 'concurrent' or 'analytic'"
     reason = "but friction of laws needs the mesh of the body"
     if scene.coupling.newton == "condensed":
         yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"

@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.bodies import Cells
-from multiscale.scene.surface import Auto, RegionSection
+from multiscale.scene.surface import NAMES_A_FILE, Auto, RegionSection
 from support.errors import InputError
 from support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
@@ -70,9 +70,14 @@ class FrictionSection:
 
     Args:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
+        coupled: Whether pressures pull the surface sideways and tractions lift it, as on a body
+            against a rigid plane, or of other elasticity than the other one, and on a finite body.
+            Both problems are then solved in turn until they agree. Without, it is neglected, and
+            the run says how much the shear force would differ. Cells alone can do so.
     """
 
     coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coupled: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,6 +215,8 @@ class LawSection:
             periodic sample.
         seeds: Of a spectrum: seeds of several samples. The law is that of their mean, and their
             scatter is reported; the seed of the spectrum when not given.
+        samples: Of a ``surface.file``: further maps of the same roughness, read and prepared like
+            it. The law is that of the mean of all, and their scatter is reported.
         largest_pressure: Largest pressure at a point of the face that the laws are made for; when
             not given, ten times the mean one, or more on a crowned face. Laws are extended where a
             load step needs it.
@@ -219,6 +226,7 @@ class LawSection:
 
     kind: Literal["patch", "representative"] = "patch"
     seeds: tuple[Seed, ...] = ()
+    samples: tuple[Annotated[str, NAMES_A_FILE], ...] = ()
     largest_pressure: PositivePressure | None = None
     regions: tuple[RegionSection, ...] = ()
     crown: tuple[Radius, Radius] | None = None
