@@ -335,16 +335,20 @@ class HalfSpaceModel:
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            nearby = tuple(
-                (self.interference(one.plane) - one.by_slopes, one.by_slopes)
-                for one in start.nearby or (start,)
-                if one.by_slopes is not None and one.plastic_depth is None
-            )
+            nearby = () if displaced is not None else self._nearby(start)
             first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
+
+    def _nearby(self, start: Start) -> tuple[tuple[Array, Array], ...]:
+        """Return what finite slopes add at solutions, and at which interferences; as pairs."""
+        return tuple(
+            (self.interference(one.plane) - one.by_slopes, one.by_slopes)
+            for one in start.nearby or (start,)
+            if one.by_slopes is not None and one.plastic_depth is None
+        )
 
     def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
