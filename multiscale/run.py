@@ -10,6 +10,7 @@ from typing import Any
 
 from geometry import NotConverged
 from multiscale.auto.keys import resolved_sections
+from multiscale.console import run_progress
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_table import LawTable
@@ -18,7 +19,6 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
 from multiscale.observers.step_observers import ContactRecorder, FieldRecorder, observers_of
-from multiscale.progress import run_progress
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History

@@ -17,9 +17,8 @@ from multiscale.loading.load_step import COLUMNS, LoadStep
 from multiscale.readable import Caution, span
 from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
-from multiscale.results.data_frames import data_frame, dataset
 from multiscale.results.reference_record import ReferenceRecord
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from geometry.materials import Material, PoissonRatio
 from geometry.meshes.block import BlockMeshing, Element
-from multiscale.loading.body_loads import BodyLoads
+from multiscale.loading.stages import BodyLoads
 from multiscale.scene.surface import NAMES_A_FILE, Auto
 from support.errors import InputError
 from support.fields import (

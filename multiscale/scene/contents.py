@@ -352,6 +352,9 @@ def _friction(scene: SceneSections) -> Iterator[Problem]:
 
 def _friction_on_mesh(scene: SceneSections) -> Iterator[Problem]:
     """Yield what has no tangential displacements, which friction of laws needs."""
+    if scene.friction is not None and scene.friction.coupled:
+        problem = "is true, but laws do not know how pressures of single contacts pull the surface"
+        yield "friction.coupled", problem, "false; or coupling.kind = 'concurrent' or 'analytic'"
     reason = "but friction of laws needs the mesh of the body"
     if scene.coupling.newton == "condensed":
         yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"

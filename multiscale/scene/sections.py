@@ -70,9 +70,14 @@ class FrictionSection:
 
     Args:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
+        coupled: Whether pressures pull the surface sideways and tractions lift it, as on a body
+            against a rigid plane, or of other elasticity than the other one, and on a finite body.
+            Both problems are then solved in turn until they agree. Without, it is neglected, and
+            the run says how much the shear force would differ. Cells alone can do so.
     """
 
     coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coupled: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -16,7 +16,6 @@ import numpy as np
 from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
 from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
-from multiscale.results.data_frames import data_frame
 from multiscale.results.history import History
 from multiscale.results.reading import read_history, result_of_a_run
 from multiscale.scene.scene_file import flat
@@ -32,7 +31,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame
 from support.errors import InputError
 
 _MOST_CHANGES = 40
@@ -187,7 +186,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("studies.difference_figure.difference_figure", self)
+        return by_matplotlib("studies.figures.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""
