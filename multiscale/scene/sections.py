@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field
 
 from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.bodies import Cells
-from multiscale.scene.surface import Auto, Problem, RegionSection
+from multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
 from support.errors import InputError
 from support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
