@@ -186,12 +186,21 @@ class HalfSpaceModel:
         patches: PatchGrid | None = None,
         mean_heights: ArrayLike | None = None,
         start: Start | None = None,
+        displaced: Array | None = None,
     ) -> ContactState:
         """Solve the contact and the free motions of the plane as one; see `MicroModel.press`.
 
         Pressure, area and displacement of a cell that straddles a border of patches are shared by
         area; force and area outside of all patches count for the nearest. Under a hardness the
         surface has the plastic depth of the start.
+
+        Args:
+            control: What is prescribed.
+            patches: Partition that results are summed over.
+            mean_heights: Mean height of each patch, shape (N,) [mm].
+            start: What the solution may start from.
+            displaced: What other loads than pressures displace the surface by, into the body, shape
+                (nx, ny) [mm]; nothing when not given.
 
         Raises:
             InputError: Also when a periodic surface is pressed to full contact or by a tilted
@@ -206,11 +215,13 @@ class HalfSpaceModel:
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
-        solved, plane = self._solved(control, start, depth)
+        solved, plane = self._solved(control, start, depth, displaced)
         yielding, pressure = solved.pressure >= self._bound, solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
         displacement = self._displacement(pressure, solved.by_slopes)
+        if displaced is not None:
+            displacement = displacement + displaced
         state = ContactState(
             plane=plane,
             patches=patches,
@@ -307,11 +318,17 @@ class HalfSpaceModel:
         )
 
     def _solved(
-        self, control: Control, start: Start | None, depth: Array | None
+        self,
+        control: Control,
+        start: Start | None,
+        depth: Array | None,
+        displaced: Array | None = None,
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return pressures / E* and the plane, on a surface with a plastic depth."""
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
+        if displaced is not None:
+            interference = interference - displaced
         if self.periodic:
             self._check_periodic(control, interference)
         problem, first = self._problem(interference, control.free, control.loads), None

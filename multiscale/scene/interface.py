@@ -31,9 +31,14 @@ class FrictionSection:
 
     Args:
         coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
+        coupled: Whether pressures pull the surface sideways and tractions lift it, as on a body
+            against a rigid plane, or of other elasticity than the other one, and on a finite body.
+            Both problems are then solved in turn until they agree. Without, it is neglected, and
+            the run says how much the shear force would differ. Cells alone can do so.
     """
 
     coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coupled: bool = False
 
     def problems(self, scene: Any) -> Iterator[Problem]:
         """Yield what has no friction, friction without effect, and loads that it does not bear.
@@ -57,6 +62,12 @@ class FrictionSection:
 
     def _on_mesh(self, scene: Any) -> Iterator[Problem]:
         """Yield what has no tangential displacements, which friction of laws needs."""
+        if self.coupled:
+            problem = (
+                "is true, but laws do not know how pressures of single contacts pull the surface"
+            )
+            allowed = f"false; or {_CONCURRENT} or 'analytic'"
+            yield "friction.coupled", problem, allowed
         reason = "but friction of laws needs the mesh of the body"
         if scene.coupling.newton == "condensed":
             yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"

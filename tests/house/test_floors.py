@@ -38,7 +38,8 @@ FLOORS = {
         "closed_forms conductance flow",
         "boundary_elements model",
         "asperities complementarity",
-        "friction half_space",
+        "half_space",
+        "friction",
         "by_name",
     ],
     "macro": [
