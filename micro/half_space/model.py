@@ -335,11 +335,20 @@ class HalfSpaceModel:
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
+            nearby = () if displaced is not None else self._nearby(start)
+            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
+
+    def _nearby(self, start: Start) -> tuple[tuple[Array, Array], ...]:
+        """Return what finite slopes add at solutions, and at which interferences; as pairs."""
+        return tuple(
+            (self.interference(one.plane) - one.by_slopes, one.by_slopes)
+            for one in start.nearby or (start,)
+            if one.by_slopes is not None and one.plastic_depth is None
+        )
 
     def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
@@ -355,6 +364,9 @@ class HalfSpaceModel:
         free = np.array([False, turns, turns])
         interference = self.interference(state.plane, state.earlier_depth)
         problem = self._problem(interference, free, np.zeros(3))
+        if state.by_slopes is not None:
+            lowered = state.by_slopes
+            problem = replace(problem, interference=interference - lowered, lowered=lowered)
         with blas_threads(1):
             rate, products = approach_stiffness(problem, state.pressures / self.contact_modulus)
         return rate * self.contact_modulus * float(np.prod(self.surface.spacing)), products
