@@ -72,7 +72,7 @@ def press_coupled(
         change = float(np.abs(across - displaced)[shear.closed].max() / np.abs(moved).max())
         if change <= TOLERANCE:
             break
-        displaced = mixing.next(displaced, across - displaced)
+        displaced = mixing.next(displaced, -displaced, across, np.ones(grid, bool))
         options["start"] = replace(state.guess, plastic_depth=state.earlier_depth)
     else:
         raise NotConverged(

@@ -1,22 +1,29 @@
-"""The report of a run: its results, then its pictures, inputs and, folded, the solver's work."""
+"""The report of a run, and how pages are filled that need no network and no other file."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import COLUMNS, LoadStep
-from multiscale.readable import Caution, Detail, measured, number, percent, quantity
+from multiscale.readable import Caution, Detail, duration, measured, number, percent, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.html_page import filled
 from multiscale.run import Run
+from support.displayed import table_html
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
 
 PAPER = (
     "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
@@ -190,3 +197,32 @@ def citations() -> tuple[str, str]:
         f"Version {version('patchlaw')}"
     )
     return program, PAPER
+
+
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
+
+    Args:
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
+    """
+    return _templates().get_template(template).render(**content) + "\n"
+
+
+@cache
+def _templates() -> Environment:
+    """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["base64"] = lambda content: b64encode(content).decode()
+    templates.filters["duration"] = duration
+    templates.globals["table"] = lambda *content: Markup(table_html(*content))
+    return templates
