@@ -306,12 +306,14 @@ def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
     """
     if coupling.scene.output.contact != "none":
         yield StiffnessObserver(coupling)
-    for place in _places(coupling):
-        module, _, name = place.partition(".")
-        yield getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    yield from (_loaded(place, coupling) for place in _places(coupling))
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
     if coupling.scene.friction is not None and not coupling.has_laws:
-        from multiscale.observers.friction import ShearErrorCheck  # others do without
+        yield _loaded("friction.ShearErrorCheck", coupling)
 
-        yield ShearErrorCheck(coupling)
+
+def _loaded(place: str, coupling: Coupling) -> StepObserver:
+    module, _, name = place.partition(".")
+    made: StepObserver = getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    return made
