@@ -12,7 +12,7 @@ import numpy as np
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import COLUMNS, LoadStep
-from multiscale.readable import Caution, Detail, measured, number, percent, quantity
+from multiscale.readable import Caution, Detail, measured, number, percent, quantity, usual
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.results.html_page import filled
@@ -99,7 +99,7 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
     for record in known:
         way = "unloading" if record.unloading else "loading"
         spots = f"{len(record.spots)} spots" if record.force_N > 0.0 else "no contact"
-        load = f"{quantity(record.approach_mm, 'mm')}, force {quantity(record.force_N, 'N')}"
+        load = f"{usual(record.approach_mm, 'mm')}, force {usual(record.force_N, 'N')}"
         caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
         contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
     forces = [record.force_N for record in known]
@@ -136,26 +136,26 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
     if (approach := last.first_touch_approach_mm) is not None:
-        above = f"which is {quantity(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
-        yield "approach from first touch", quantity(approach, "mm"), above
+        above = f"which is {usual(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
+        yield "approach from first touch", usual(approach, "mm"), above
     face = coupling.area
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
     share = last.contact_area_fraction
-    yield "real contact area", percent(share, 3), f"{quantity(share * face, 'mm²', 3)} of the face"
+    yield "real contact area", percent(share, 3), f"{usual(share * face, 'mm²', 3)} of the face"
     if last.peak_pressure_MPa:
-        yield "peak pressure", quantity(last.peak_pressure_MPa, "MPa", 3), ""
+        yield "peak pressure", usual(last.peak_pressure_MPa, "MPa", 3), ""
     record = run.history().contact
     spots = len(record.spots) if record and record.step == last.step else last.contacts
     if spots:
         yield "contact spots", number(spots, 9), ""
-    yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
+    yield "mean pressure", usual(last.mean_pressure_MPa, "MPa"), "over the whole face"
     for observer in run.observers:
         yield from ((name, value, "") for name, value in observer.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
-            yield column.in_report, quantity(value, column.unit), ""
+            yield column.in_report, usual(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:

@@ -26,11 +26,11 @@ def difference_figure(both: Difference) -> Figure:
         both: The two runs.
     """
     figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
-    colours = (BLUE, VERMILLION)
-    for history, name, colour in zip(both.histories, both.names, colours, strict=True):
+    colours, marks = (BLUE, VERMILLION), "os"
+    for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
         look: dict[str, Any] = {"color": colour, "label": name}
         if len(history) <= 100:
-            look |= {"marker": "o", "ms": 3.0}
+            look |= {"marker": mark, "ms": 3.0}
         pressure, falls = history.mean_pressure_MPa, history.unloading
         draw_path(force, 1e3 * history.approach_mm, pressure, falls, look)
         draw_path(area, pressure, 100 * history.contact_area_fraction, falls, look)
@@ -55,14 +55,16 @@ def _draw_ratios(axes: Any, both: Difference) -> None:
     at_pressure = both.at == "pressure"
     load = both.loads if at_pressure else 1e3 * both.loads
     axes.axhline(1.0, color="0.7", lw=0.8)
-    for one in both.ratios:
-        if one.name in _SHOWN:
-            look = {"color": _COLOURS[one.name], "marker": "o", "ms": 3.0, "label": one.text}
-            axes.plot(load, one.ratio, **look)
-            known = np.isfinite(one.error) & (one.error > 0.0)
-            bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
-            axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
+    shown = [one for one in both.ratios if one.name in _SHOWN]
+    for one, mark in zip(shown, "osD^", strict=False):
+        look = {"color": _COLOURS[one.name], "marker": mark, "ms": 3.0, "label": one.text}
+        axes.plot(load, one.ratio, **look)
+        known = np.isfinite(one.error) & (one.error > 0.0)
+        bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
+        axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
     text, unit, drawn = ("mean pressure", "MPa", 1.0) if at_pressure else ("approach", "mm", 1e-3)
     show_unit(axes.xaxis, text, unit, both.loads, drawn)
     axes.set(ylabel="second over first", title=f"{both.names[1]} over {both.names[0]}")
-    axes.legend()
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.18 * len(shown) * (high - low))  # for the legend
+    axes.legend(loc="upper left")
