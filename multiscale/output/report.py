@@ -1,22 +1,38 @@
-"""The report of a run: its results, then its pictures, inputs and, folded, the solver's work."""
+"""The report of a run, and how pages are filled that need no network and no other file."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import COLUMNS, LoadStep
-from multiscale.readable import Caution, Detail, measured, number, percent, quantity, usual
+from multiscale.readable import (
+    Caution,
+    Detail,
+    duration,
+    measured,
+    number,
+    percent,
+    quantity,
+    usual,
+)
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.html_page import filled
 from multiscale.run import Run
+from support.displayed import table_html
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
 
 PAPER = (
     "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
@@ -31,6 +47,9 @@ _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "
 CONTACT_OF_STEP = "contact_of_step_"
 """Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
 the number of the load step follows."""
+
+_MOST_COLUMNS = 7
+"""Columns of a table beside its first, of those whose number depends on the run."""
 
 _MOST_CONTACTS = 40
 """Contacts that a report shows at most, each with a picture of some 100 kB."""
@@ -190,3 +209,46 @@ def citations() -> tuple[str, str]:
         f"Version {version('patchlaw')}"
     )
     return program, PAPER
+
+
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
+
+    Args:
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
+    """
+    return _templates().get_template(template).render(**content) + "\n"
+
+
+def _look(picture: bytes) -> str:
+    """Return the class of a picture in PNG: narrow where it is no wider than a column of text."""
+    return "narrow" if int.from_bytes(picture[16:20], "big") < 1000 else "wide"
+
+
+def _parted(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> Iterator[Any]:
+    """Yield parts of a table that fit a page, each with its first column."""
+    headings, rows = table
+    for start in range(1, len(headings), _MOST_COLUMNS):
+        part = slice(start, start + _MOST_COLUMNS)
+        yield (headings[0], *headings[part]), [(row[0], *row[part]) for row in rows]
+
+
+@cache
+def _templates() -> Environment:
+    """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["base64"] = lambda content: b64encode(content).decode()
+    templates.filters["duration"] = duration
+    templates.filters |= {"look": _look, "parted": _parted}
+    templates.globals["table"] = lambda *content: Markup(table_html(*content))
+    return templates
