@@ -10,6 +10,7 @@ from typing import Any
 
 from geometry import NotConverged
 from multiscale.auto.keys import resolved_sections
+from multiscale.console import run_progress
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_table import LawTable
@@ -18,7 +19,6 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
 from multiscale.observers.step_observers import ContactRecorder, FieldRecorder, observers_of
-from multiscale.progress import run_progress
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
@@ -40,15 +40,15 @@ class Run:
         resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
-        clock: Measures the phases of the run, and tells an observer of them.
+        clock: Measures the phases of the run, and reports them to an observer.
         given: The scene as the user wrote it.
         identity: All that its numbers depend on, see `multiscale.scene.identity`.
-        coupling: What was made of the scene, and finds the load steps.
+        coupling: The coupling made from the scene, which solves the load steps.
         scene: The scene with values for its auto keys.
         steps: The load steps accepted so far, counted from first touch.
         position: Position in the load history after them.
         fields: The states that the fields of chosen load steps are written from.
-        observers: What is read off the load steps.
+        observers: Observers, which each load step is passed to.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Run:
                 yield step.counted_from(self.coupling.zero)
 
     def finish(self) -> None:
-        """Let all that sees load steps know that none follows, also where the run ended early."""
+        """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
             with self.clock.phase("contact"):
                 for observer in self.observers:
@@ -230,7 +230,7 @@ def run(
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
         observe: Called with every accepted load step.
-        progress: Whether what the run is at is shown, in the terminal or below a notebook's cell.
+        progress: Whether the progress is shown, in the terminal or below a notebook's cell.
 
     Returns:
         The history, the same on every rank.

@@ -18,7 +18,6 @@ from typing import Any, cast
 
 from geometry.zero import Zero
 from micro import HalfSpaceModel
-from multiscale.auto.bodies import OpenMeshes, as_quadratic
 from multiscale.auto.keys import (
     MOST_HEIGHTS,
     auto_keys,
@@ -27,7 +26,17 @@ from multiscale.auto.keys import (
     on_waves,
     with_value,
 )
-from multiscale.auto.rule import TRIALS, Errors, Grid, Share, Tally, refinement, scaled
+from multiscale.auto.rule import (
+    TRIALS,
+    Errors,
+    Grid,
+    OpenMeshes,
+    Share,
+    Tally,
+    as_quadratic,
+    refinement,
+    scaled,
+)
 from multiscale.auto.samples import SampleSearch
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class

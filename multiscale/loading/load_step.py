@@ -42,8 +42,9 @@ class PatchState:
 class LoadStep(Displayed):
     """One accepted load step.
 
-    Its columns in ``history.csv`` say what they hold where they are declared; None stands for what
-    a run does not know. A new column is one more `column` here, behind those that are there.
+    Meaning and unit of the columns of ``history.csv`` stand where they are declared; None stands
+    for what a run does not measure. A new column is one more `column` here, behind those that are
+    there.
 
     Attributes:
         step: 0 before the load step is accepted.
@@ -52,7 +53,7 @@ class LoadStep(Displayed):
         stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment, on the
             side that the plane came from.
         stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
-        slip_area_fraction: None without friction, as all that is about shear.
+        slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
             where there is no support.
@@ -302,11 +303,11 @@ class LoadStep(Displayed):
 
     @property
     def under_its_plane(self) -> Control:
-        """What brings the plane of the load step, counted from first touch, back to where it is."""
+        """Control that puts the plane, counted from first touch, where it was."""
         return Control(approach=self.approach_mm, tilt=self.tilt, body_state=self.body_state)
 
     def leak(self, way: str) -> Leak | None:
-        """Return what leaks along a way; None where that is not known.
+        """Return the leak along a way; None where it was not computed.
 
         Args:
             way: A key of `multiscale.loading.leak.WAYS`.

@@ -21,7 +21,7 @@ from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, quantity
-from multiscale.scene.bodies import ConductanceSection
+from multiscale.scene.interface import ConductanceSection
 from support.arrays import Array
 from support.collective import on_root
 

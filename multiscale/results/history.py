@@ -17,9 +17,8 @@ from multiscale.loading.load_step import COLUMNS, LoadStep
 from multiscale.readable import Caution, span
 from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
-from multiscale.results.data_frames import data_frame, dataset
 from multiscale.results.reference_record import ReferenceRecord
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -42,7 +41,7 @@ class History(Displayed):
         patches: The partition of the interface, or regions of a contact face.
         seconds: Wall time of each phase of the run [s].
         notes: Remarks of the run on its own approximations.
-        accuracy: Whether the accuracy that was asked for is kept; None where none was.
+        accuracy: Whether the requested accuracy is kept; None where none was requested.
         reference: Results of all meshes of a reference; None with other couplings.
         contact_records: The contacts of those load steps that the scene asks for.
         before: Of a part of a history the load step before the first of the part, if there is one.
@@ -109,7 +108,7 @@ class History(Displayed):
 
     @property
     def contact(self) -> ContactRecord | None:
-        """The contact recorded last, spots and maps; None where none was asked for."""
+        """The contact recorded last, spots and maps; None where none was requested."""
         return self.contact_records[-1] if self.contact_records else None
 
     def records(self) -> list[dict[str, Any]]:
@@ -157,8 +156,8 @@ class History(Displayed):
     def to_xarray(self) -> Any:
         """Return all columns and the state of the patches as an xarray dataset.
 
-        Columns that no load step knows are left out. Of patches the dimensions are ``step``, ``ix``
-        and ``iy``, of regions ``step`` and ``region``.
+        Columns without a value in any load step are left out. Of patches the dimensions are
+        ``step``, ``ix`` and ``iy``, of regions ``step`` and ``region``.
 
         Raises:
             ImportError: When xarray, which patchlaw does not require, is not installed.

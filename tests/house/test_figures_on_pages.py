@@ -78,12 +78,10 @@ def test_errors_of_micro_models(tmp_path):
         model, heights = one.split(", ")
         shown = f"| `{model}` | {heights} | {errors[one][0]} % | {errors[one][1]} % |"
         says("accuracy", shown)
-        if one in grids:
-            says("choosing", shown)
     force, area = (", ".join(errors[one][k] for one in grids) for k in (0, 1))
-    for pair in pairs:
-        shown = [", ".join(errors[one][k] for one in pair) for k in (0, 1)]
-        says("choosing", f"| 256² | {shown[0]} % | {shown[1]} % |")
+    coarse, fine = (errors[f"half-space, {n}²"] for n in (64, 128))
+    says("choosing", "its force errs by {} %, its area by {} %".format(*fine))
+    says("choosing", "64² heights ({} and {} %)".format(*coarse))
     elliptic, circular = (errors[one][0] for one in pairs[0])
     says("README", f"| {force} % rms |", f"| {elliptic}, {circular} % rms |")
     least, most = sorted(errors[one][0] for one in pairs[1])

@@ -38,7 +38,8 @@ FLOORS = {
         "closed_forms conductance flow",
         "boundary_elements model",
         "asperities complementarity",
-        "friction half_space",
+        "half_space",
+        "friction",
         "by_name",
     ],
     "macro": [
@@ -53,9 +54,9 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "console figures machine",
+        "figures machine",
         "laws loading",
-        "progress",
+        "console",
         "exports results scene",
         "inputs",
         "bodies",
