@@ -69,7 +69,9 @@ def test_rigid_body_on_springs_against_a_dense_matrix(stiffness, allowed):
     slope = problem.approach_response().stiffness
     assert slope == pytest.approx(state.force / APPROACH, rel=1e-7)
     _, again = pressed(face_of(8), stiffness, Control(force=state.force, tilt=None))
-    assert again.approach == pytest.approx(APPROACH, rel=1e-6)  # displacements, 45 closures, are met to 1e-8
+    assert again.approach == pytest.approx(
+        APPROACH, rel=1e-6
+    )  # displacements, 45 closures, are met to 1e-8
 
 
 def test_a_stiff_half_space_is_a_rigid_plane_and_steps_follow_each_other():
