@@ -20,11 +20,11 @@ from multiscale.figures.files import (
     write_pictures,
 )
 from multiscale.output import terminal
+from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.restart.results_folder import locked
-from multiscale.results.html_page import filled
 from multiscale.studies import errors
 from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.comparison import Comparison, compare
