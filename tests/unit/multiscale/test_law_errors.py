@@ -220,3 +220,11 @@ def test_a_half_space_on_the_other_side_is_displaced_under_the_whole_face(mesh):
     near = [solver.press(Control(approach=step.approach_mm + s * 1e-6)).force_N for s in (-1, 1)]
     assert response == pytest.approx((near[1] - near[0]) / 2e-6, rel=1e-3)  # of a difference
     whole.close()
+
+
+def test_bodies_that_do_not_face_each_other_are_refused(mesh, tmp_path):
+    turned = np.diag([1.0, -1.0, -1.0])
+    ticks = TICKS[0], TICKS[1], np.asarray(TICKS[2]) - TICKS[2][-1]
+    beside = write_box(tmp_path / "beside.msh", ticks, turn=turned, shift=(0.0, -0.01, 0.0))
+    with pytest.raises(InputError, match=r"counter_body\.contact: .* no part in common"):
+        Run(scene(mesh, law={"kind": "representative"}, counter_body=body(beside)))
