@@ -35,8 +35,8 @@ def read_surface(
     * ``.npy``: an array with index [ix, iy];
     * text: numbers in rows, see `geometry.files.text.read_text`;
     * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order, x, y in mm;
-    * any other, and text under words with numbers: an instrument's format, told by its content,
-      through the optional package SurfaceTopography.
+    * any other, and text under words with numbers: an instrument's format, recognised by its
+      content, through the optional package SurfaceTopography.
 
     Args:
         path: The file.
@@ -132,7 +132,7 @@ def _surface(
     """Return the surface of what a file or an array holds."""
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
-        said.append(f"heights taken in {unit}")
+        said.append(f"heights taken in {unit.replace('um', 'µm')}")
     notes: list[str] = []
     heights = content.heights
     if heights.ndim == 2 and heights.size:

@@ -6,41 +6,21 @@ sideways. With Dundurs' β the difference is
     u = −(β/(π E*)) ∫ p d/ρ² dA,    u_z = (β/(π E*)) ∫ q·d/ρ² dA,
 
 d from the load to the point. Neglecting both separates the normal contact from shear (Goodman
-1962). They are evaluated at a solution without them, to know their size.
+1962). Otherwise both problems are solved in turn until they agree (`micro.friction.coupled`). A
+finite body adds a term to both.
 
 Theory: docs/theory.md, section 15.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from scipy import fft
 
 from geometry.materials import MaterialPair
+from micro.boundary_elements.traction_modes import TractionsOnCells
 from support.arrays import Array
 from support.cores import cores
-
-
-class NeglectedCoupling(NamedTuple):
-    """What Goodman's assumption leaves out at a load step.
-
-    Attributes:
-        beta: Dundurs' β.
-        sideways: Largest difference of displacements along the surface by the pressures, from their
-            mean over the contact [mm].
-        across: Largest difference of displacements across the surface by the tractions, from their
-            mean over the contact [mm].
-        force: Shear force at the shift of the load step, had it been reached at once [N].
-        force_change: Change of that force where the pressures pull the surface sideways first [N].
-    """
-
-    beta: float
-    sideways: float = 0.0
-    across: float = 0.0
-    force: float = 0.0
-    force_change: float = 0.0
 
 
 class CrossCompliance:
@@ -51,6 +31,7 @@ class CrossCompliance:
         spacing: Sides of a cell [mm].
         materials: The two bodies.
         periodic: Whether loads continue periodically.
+        body: What a finite body adds, on these cells, for loads over E*; none when not given.
     """
 
     def __init__(
@@ -60,7 +41,9 @@ class CrossCompliance:
         materials: MaterialPair,
         *,
         periodic: bool,
+        body: TractionsOnCells | None = None,
     ) -> None:
+        self._body, self._modulus = body, materials.contact_modulus
         self._shown = tuple(slice(count) for count in grid)
         self._shape = grid if periodic else tuple(2 * count for count in grid)
         waves = _waves if periodic else _padded_waves
@@ -68,7 +51,10 @@ class CrossCompliance:
 
     def sideways(self, pressure: Array) -> Array:
         """Return the displacements along the surface by pressures [MPa], shape (2, nx, ny) [mm]."""
-        return np.stack([self._convolved(-one, pressure) for one in self._waves])
+        moved = np.stack([self._convolved(-one, pressure) for one in self._waves])
+        if self._body is not None:
+            moved += self._body.sideways(pressure / self._modulus)
+        return moved
 
     def across(self, tractions: Array) -> Array:
         """Return the displacements into the body by tractions, shape (nx, ny) [mm].
@@ -76,18 +62,14 @@ class CrossCompliance:
         Args:
             tractions: The tractions, shape (2, nx, ny) [MPa].
         """
-        return self._convolved(self._waves[0], tractions[0]) + self._convolved(
-            self._waves[1], tractions[1]
-        )
+        moved = sum(map(self._convolved, self._waves, tractions))
+        if self._body is not None:
+            moved = moved + self._body.across(tractions / self._modulus)
+        return np.asarray(moved)
 
     def _convolved(self, kernel: Array, field: Array) -> Array:
         loaded = fft.rfft2(field, s=self._shape, workers=cores())
         return np.asarray(fft.irfft2(kernel * loaded, s=self._shape, workers=cores())[self._shown])
-
-
-def variation(values: Array) -> Array:
-    """Return the sizes of differences from the mean along the last axis."""
-    return np.asarray(np.abs(values - values.mean(axis=-1, keepdims=True)))
 
 
 def _waves(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:

@@ -11,8 +11,8 @@ from micro import MicroModel
 from multiscale.inputs.bodies import BodyFacts, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import heights_per_wave
-from multiscale.loading.body_loads import BodyLoads
 from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stages import BodyLoads
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.scene.sections import MicroSection
@@ -40,7 +40,7 @@ def dimensions(parts: SceneParts) -> str:
     solid = "a half-space"
     if parts.has_body:
         solid = f"a {what} {quantity(parts.body.depth, 'mm')} high"
-    return f"{lx} × {ly} on {solid}{' as sample' if parts.regions else ''}"
+    return f"{'samples of ' if parts.regions else ''}{lx} × {ly} on {solid}"
 
 
 def _constants(material: Material) -> str:
@@ -194,6 +194,8 @@ def body(parts: SceneParts) -> str:
     text = f"{_mesh(parts.body)}, contact modulus {modulus}"
     if parts.counter is not None:
         text += f"; counter-body {_mesh(parts.counter)}; unknowns of both are one problem"
+    elif parts.both_elastic and parts.regions is not None:
+        text += "; a half-space on the other side is displaced under the whole face"
     return text
 
 

@@ -1,24 +1,38 @@
-"""The report of a run: its results, then its pictures, inputs and, folded, the solver's work."""
+"""The report of a run, and how pages are filled that need no network and no other file."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
-from multiscale.loading.leak import WAYS
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, Detail, measured, number, percent, quantity
+from multiscale.loading.load_step import COLUMNS, LoadStep
+from multiscale.readable import (
+    Caution,
+    Detail,
+    duration,
+    measured,
+    number,
+    percent,
+    quantity,
+    usual,
+)
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.html_page import filled
-from multiscale.results.leak_notes import leak_text
 from multiscale.run import Run
+from support.displayed import table_html
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
 
 PAPER = (
     "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
@@ -30,24 +44,12 @@ PAPER = (
 _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
 """Topics of the plan that say what was computed; the others say how, and are folded."""
 
-_MORE = {
-    "shear_force_x_N": ("shear force along x", "N"),
-    "shear_force_y_N": ("shear force along y", "N"),
-    "shear_x_mm": ("shift along x", "mm"),
-    "shear_y_mm": ("shift along y", "mm"),
-    "tangential_stiffness_N_per_mm": ("tangential stiffness", "N/mm"),
-    "dissipated_mJ": ("lost to friction", "mJ"),
-    "stiffness_N_per_mm": ("interfacial stiffness", "N/mm"),
-    "plastic_depth_mm": ("plastic depth", "mm"),
-    "thermal_conductance_W_per_K": ("thermal conductance", "W/K"),
-    "electrical_conductance_S": ("electrical conductance", "S"),
-}
-"""What some runs know of their load steps: attribute, name and unit."""
-
-
 CONTACT_OF_STEP = "contact_of_step_"
 """Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
 the number of the load step follows."""
+
+_MOST_COLUMNS = 7
+"""Columns of a table beside its first, of those whose number depends on the run."""
 
 _MOST_CONTACTS = 40
 """Contacts that a report shows at most, each with a picture of some 100 kB."""
@@ -116,7 +118,7 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
     for record in known:
         way = "unloading" if record.unloading else "loading"
         spots = f"{len(record.spots)} spots" if record.force_N > 0.0 else "no contact"
-        load = f"{quantity(record.approach_mm, 'mm')}, force {quantity(record.force_N, 'N')}"
+        load = f"{usual(record.approach_mm, 'mm')}, force {usual(record.force_N, 'N')}"
         caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
         contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
     forces = [record.force_N for record in known]
@@ -153,27 +155,26 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
     if (approach := last.first_touch_approach_mm) is not None:
-        above = f"which is {quantity(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
-        yield "approach from first touch", quantity(approach, "mm"), above
+        above = f"which is {usual(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
+        yield "approach from first touch", usual(approach, "mm"), above
     face = coupling.area
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
     share = last.contact_area_fraction
-    yield "real contact area", percent(share, 3), f"{quantity(share * face, 'mm²', 3)} of the face"
+    yield "real contact area", percent(share, 3), f"{usual(share * face, 'mm²', 3)} of the face"
     if last.peak_pressure_MPa:
-        yield "peak pressure", quantity(last.peak_pressure_MPa, "MPa", 3), ""
+        yield "peak pressure", usual(last.peak_pressure_MPa, "MPa", 3), ""
     record = run.history().contact
     spots = len(record.spots) if record and record.step == last.step else last.contacts
     if spots:
         yield "contact spots", number(spots, 9), ""
-    yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    for way, where in WAYS.items():
-        if (leak := last.leak(way)) is not None:
-            yield f"leak {where}", leak_text(leak), ""
-    for name, (text, unit) in _MORE.items():
-        if value := getattr(last, name):
-            yield text, quantity(value, unit), ""
+    yield "mean pressure", usual(last.mean_pressure_MPa, "MPa"), "over the whole face"
+    for observer in run.observers:
+        yield from ((name, value, "") for name, value in observer.results(last))
+    for column in COLUMNS:
+        if column.in_report and (value := column.of(last)):
+            yield column.in_report, usual(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
@@ -208,3 +209,46 @@ def citations() -> tuple[str, str]:
         f"Version {version('patchlaw')}"
     )
     return program, PAPER
+
+
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
+
+    Args:
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
+    """
+    return _templates().get_template(template).render(**content) + "\n"
+
+
+def _look(picture: bytes) -> str:
+    """Return the class of a picture in PNG: narrow where it is no wider than a column of text."""
+    return "narrow" if int.from_bytes(picture[16:20], "big") < 1000 else "wide"
+
+
+def _parted(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> Iterator[Any]:
+    """Yield parts of a table that fit a page, each with its first column."""
+    headings, rows = table
+    for start in range(1, len(headings), _MOST_COLUMNS):
+        part = slice(start, start + _MOST_COLUMNS)
+        yield (headings[0], *headings[part]), [(row[0], *row[part]) for row in rows]
+
+
+@cache
+def _templates() -> Environment:
+    """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["base64"] = lambda content: b64encode(content).decode()
+    templates.filters["duration"] = duration
+    templates.filters |= {"look": _look, "parted": _parted}
+    templates.globals["table"] = lambda *content: Markup(table_html(*content))
+    return templates

@@ -15,10 +15,10 @@ import numpy as np
 
 from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
-from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
-from multiscale.results.data_frames import data_frame
+from multiscale.readable import SCALED_UNITS, number, percent, quantity, usual_unit, with_error
 from multiscale.results.history import History
 from multiscale.results.reading import read_history, result_of_a_run
+from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import flat
 from multiscale.studies import AT
 from multiscale.studies.run_curves import (
@@ -32,7 +32,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame
 from support.errors import InputError
 
 _MOST_CHANGES = 40
@@ -79,7 +79,7 @@ class Difference(Displayed):
         histories: Their load steps.
         at: What they have in common: ``"pressure"``, the mean pressure, or ``"approach"``.
         loads: Where they are compared, rising, shape (n,) [MPa or mm].
-        ratios: Every quantity that both know; that which the load does not prescribe first.
+        ratios: Every quantity that both have; that which the load does not prescribe first.
         changes: Keys of the scenes that differ, with both values; empty where not known.
         notes: What a reader should know.
     """
@@ -99,7 +99,7 @@ class Difference(Displayed):
             name: Its name, such as ``"approach_mm"``.
 
         Raises:
-            InputError: When one of the runs does not know it.
+            InputError: When one of the runs does not have it.
         """
         for ratio in self.ratios:
             if ratio.name == name:
@@ -108,7 +108,7 @@ class Difference(Displayed):
         raise InputError("is not known of both runs", key="name", value=name, allowed=known)
 
     def load_text(self, index: int = -1) -> str:
-        """Return a load as people say it.
+        """Return a load with its unit, as text.
 
         Args:
             index: Which of the loads; the largest by default.
@@ -165,7 +165,7 @@ class Difference(Displayed):
         """Return headings and rows: the ratios of all quantities at all loads.
 
         Args:
-            most: Loads that are shown; of more as many at equal distances.
+            most: Largest number of loads shown; of more, so many at equal distances.
         """
         name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
         count = len(self.loads)
@@ -187,7 +187,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("studies.difference_figure.difference_figure", self)
+        return by_matplotlib("studies.figures.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""
@@ -348,16 +348,20 @@ def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
     first, second = (dict(flat(scene)) for scene in scenes if scene is not None)
     keys = [key for key in (first | second) if not key.startswith("output.")]
     differing = [key for key in keys if first.get(key) != second.get(key)]
+    known = scene_keys()
     for key in differing[:_MOST_CHANGES]:
-        yield key, _said(first.get(key)), _said(second.get(key))
+        unit = known[key].unit if key in known else ""
+        yield key, _said(first.get(key), unit), _said(second.get(key), unit)
     if len(differing) > _MOST_CHANGES:
         yield "…", f"{len(differing) - _MOST_CHANGES} more", ""
     if runs[0].heights != runs[1].heights:
         yield "heights, SHA-256", runs[0].heights[:12] + "…", runs[1].heights[:12] + "…"
 
 
-def _said(value: Any) -> str:
-    """Return a value as a cell shows it."""
+def _said(value: Any, unit: str = "") -> str:
+    """Return a value as a cell shows it, a number with its unit."""
+    if isinstance(value, float) and unit in SCALED_UNITS:
+        return quantity(value, unit, 6)
     text = "–" if value is None else str(value)
     return text if len(text) <= 60 else f"{text[:59]}…"
 

@@ -158,7 +158,7 @@ def test_contacts_survive_a_checkpoint(tmp_path):
             write_checkpoint(path, checkpoint_of(whole, whole.state()))
     kept = read_checkpoint(path)
     again = Run(whole.given)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
     list(again.load_steps())
     for one, other in zip(again.contacts, whole.contacts, strict=True):
         assert one.step == other.step
@@ -185,7 +185,7 @@ def test_figure_shows_pressures_gaps_and_sizes(model):
     figure = run(scene(model=model)).contact.plot()
     titles = [axes.get_title() for axes in figure.axes]
     assert "sizes of the spots" in titles
-    assert ("gap; contact in red" in titles) == (model == "half-space")
+    assert ("gap; contact in orange" in titles) == (model == "half-space")
 
 
 def test_modulus_scales_pressure_and_stiffness():
