@@ -1,12 +1,12 @@
 """Laws as lines near a face where they change over lengths that the whole body does not tell.
 
 Beside a step between two laws, an edge or a border of contact, pressures change over a few
-elements, and the body is stiffer against that than against pressures everywhere. One stiffness of
-the body (`law_lines`) then sends Newton's method from there to the solution in small steps: pressures
-that the last lines made negative, for one, grow by a factor of two to five a step. So the laws are
-solved there before the next solve of the whole body: on the layer of elements beneath, with the
-rest of the body at rest, under the plane in its equilibrium. Only the lines are taken from that
-solution. This is nonlinear elimination (Lanzkron, Rose & Wilkes 1996, doi
+elements, and the body is stiffer against that than against pressures everywhere. One stiffness
+of the body (`law_lines`) then sends Newton's method from there to the solution in small steps:
+pressures that the last lines made negative, for one, grow by a factor of two to five a step. So the
+laws are solved there before the next solve of the whole body: on the layer of elements beneath,
+with the rest of the body at rest, under the plane in its equilibrium. Only the lines are taken from
+that solution. This is nonlinear elimination (Lanzkron, Rose & Wilkes 1996, doi
 10.1137/S1064827594262576; Cai & Li 2011, doi 10.1137/080736272).
 
 Theory: section 11 of ``docs/theory.md``.
@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from macro.contact.equations import Equilibrium
 from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
-from macro.linear_solvers.node_matrices import joined_diagonal, springs_at, with_springs
+from macro.linear_solvers.node_matrices import joined_diagonal, springs_at
 from macro.linear_solvers.options import conjugate_gradients, shell
 
 Array = NDArray[np.float64]
@@ -70,9 +70,7 @@ class FaceLayer:
         square = forces.comm.tompi4py().allreduce(float(sampling.weight @ moved**2))
         return float(forces.dot(rough)) / square
 
-    def lines(
-        self, displaced: Array, closure: Array, pressure: Array, stiffness: float
-    ) -> Lines:
+    def lines(self, displaced: Array, closure: Array, pressure: Array, stiffness: float) -> Lines:
         """Linearise the laws where samples reach their curves along the body's stiffness.
 
         Args:
@@ -130,7 +128,7 @@ class FaceLayer:
             before = now
         return lines
 
-    def _nodes(self, off: Array) -> Array:
+    def _nodes(self, off: Flags) -> Flags:
         """Return which of this rank's nodes are near samples that are off, shape (nodes,)."""
         matrix, values = self._equilibrium.matrix, self._sampling.values
         rng = np.random.default_rng(1)
@@ -142,7 +140,7 @@ class FaceLayer:
             here.array[:] = np.repeat(nodes, 3) * rng.uniform(1.0, 2.0, 3 * len(nodes))
             matrix.mult(here, spread)
             here, spread = spread, here
-        return here.array_r.reshape(-1, 3).any(axis=1)
+        return np.asarray(here.array_r.reshape(-1, 3).any(axis=1))
 
 
 class _Layer:
@@ -195,7 +193,8 @@ class _Layer:
         forces = self._forces
         self._border = forces.border(stiffness)
         springs = springs_at(self._points, stiffness / forces.weight)
-        self._stiff = with_springs([self._alone], springs)
+        self._stiff = self._alone.copy()
+        self._stiff.axpy(1.0, springs)  # entries between two bodies are new
         load, move = self._moved.duplicate(), self._moved.duplicate()
         self._values.array[:] = change
         self._points.multTranspose(self._values, load)

@@ -66,6 +66,7 @@ class ContactFace:
         areas: Areas of the patches, shape (N,) [mm²].
         patchwise: Laws at the mean closures of the patches, which are distributed over the ranks.
         pointwise: Laws at quadrature points.
+        points_by_dofs: Rows of weighted basis functions against the normal at the points, mm².
         in_all_directions: The operator of pressures and shear stresses at the samples of a mode.
         pull_moments: Moments of what pulls the body, by the state of its loads.
 
@@ -79,6 +80,7 @@ class ContactFace:
     areas: Any
     patchwise: Any
     pointwise: Any
+    points_by_dofs: Any
     in_all_directions: Any
     pull_moments: Any
 
