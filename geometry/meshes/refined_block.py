@@ -113,13 +113,13 @@ class RefinedShape:
         """
         sides = (*self.interface, self.height)
         longest = 0.5 * min(sides)
-        cells = tuple(max(1, round(side / longest)) for side in sides)
+        x, y, z = (max(1, round(side / longest)) for side in sides)
         starts = (0.0, 0.0, -self.height)
         ticks = [
             Segment(start=start, end=start + side, cells=count).ticks
-            for start, side, count in zip(starts, sides, cells, strict=True)
+            for start, side, count in zip(starts, sides, (x, y, z), strict=True)
         ]
-        hexahedra = lattice_cells(cells, tuple(map(range, cells)), hexahedra=True)
+        hexahedra = lattice_cells((x, y, z), (range(x), range(y), range(z)), hexahedra=True)
         quadrilaterals, count = np.unique(
             np.sort(hexahedron_sides(hexahedra), axis=1), axis=0, return_counts=True
         )

@@ -375,6 +375,10 @@ class ReferenceCoupling(PressedSurface):
             [one.problem.body.dofs for one in self.solver.meshes],
             force_order=meshes.force_order,
             area_order=meshes.area_order,
+            scatter=meshes.scatter(
+                np.array([step.contact_area_fraction for step in steps], float),
+                np.array([step.contacts for step in steps], float),
+            ),
         )
         return record.without_bars(np.array([self._misses(step) for step in steps], dtype=bool))
 

@@ -7,9 +7,8 @@ import numpy as np
 from dolfinx import mesh as dmesh
 
 from geometry import RefinedShape
-from geometry.meshes.gmsh_session import gmsh_session
-from geometry.meshes.refined_block import generate, size_near
-from macro import TaggedMesh, compat
+from helpers.gmsh_session import generate, gmsh_session, in_unit, mesh_from_gmsh, size_near
+from macro import TaggedMesh
 from macro.mesh.block import move_onto
 from support.collective import on_root
 
@@ -52,12 +51,13 @@ class SteppedShape:
     def unit(self):
         """Length that gmsh meshes the body in, its largest extent [mm]."""
         corners = np.concatenate([np.reshape(self.boxes, (-1, 3)), np.zeros((1, 3))])
-        return max(self.block.unit, float(np.ptp(corners, axis=0).max()))
+        sides = (*self.block.interface, self.block.height)
+        return max(*sides, float(np.ptp(corners, axis=0).max()))
 
     @contextmanager
     def meshed(self):
-        """Mesh the body in gmsh for as long as the context lasts; see `RefinedShape.meshed`."""
-        shape = self.block.scaled(self.unit)
+        """Mesh the body in gmsh for as long as the context lasts."""
+        shape = in_unit(self.block, self.unit)
         with gmsh_session("a stepped block") as gmsh:
             add_box = gmsh.model.occ.addBox
             block = add_box(0.0, 0.0, -shape.height, *shape.interface, shape.height)
@@ -69,13 +69,13 @@ class SteppedShape:
             gmsh.model.addPhysicalGroup(3, [body], 1)
             fields, least = gmsh.model.mesh.field, _AT_SEAMS * shape.coarse
             sizes = [
-                size_near(fields, "PointsList", points, shape.fine, shape),
-                size_near(fields, "CurvesList", _seams(gmsh, shape), least, shape),
+                size_near("PointsList", points, shape.fine, shape),
+                size_near("CurvesList", _seams(gmsh, shape), least, shape),
             ]
             smallest = fields.add("Min")
             fields.setNumbers(smallest, "FieldsList", sizes)
             fields.setAsBackgroundMesh(smallest)
-            generate(gmsh, shape)
+            generate(shape)
             yield gmsh.model
 
 
@@ -103,7 +103,7 @@ def stepped_mesh(shape, planes, comm):
     with ExitStack() as session:
         models = []
         on_root(comm, lambda: models.append(session.enter_context(shape.meshed())))
-        mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
+        mesh = mesh_from_gmsh(models[0] if models else None, comm)
     mesh.geometry.x[:] *= shape.unit
     mesh.topology.create_connectivity(2, 3)
     facets = np.sort(dmesh.exterior_facet_indices(mesh.topology)).astype(np.int32)
