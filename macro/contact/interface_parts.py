@@ -50,13 +50,12 @@ def check_space(space: Any) -> None:
         InputError: On all ranks.
     """
     fits = compat.holds_displacements(space)
-    straight = fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8)
-    if not straight:
+    if not (fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8, 10, 27)):
         raise InputError(
-            "the space of the displacements does not fit" if not fits else "the cells are curved",
+            "the space of the displacements does not fit" if not fits else "the cells do not fit",
             value=str(space.ufl_element()),
             allowed="a continuous Lagrange space of degree 1 or 2 with three components, on "
-            "tetrahedra or hexahedra with straight edges",
+            "tetrahedra or hexahedra of first or second order",
         )
 
 

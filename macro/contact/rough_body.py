@@ -49,6 +49,9 @@ class FlatBody:
         frame: Frame of that face; the rough rectangle begins at its origin.
         lengths: Sides of the rectangle [mm].
 
+    Raises:
+        InputError: When the cells are curved, whose parts would be straight.
+
     Note:
         Everything here is collective. Rank 0 has the whole mesh while it is refined.
     """
@@ -57,6 +60,13 @@ class FlatBody:
     contact: int
     frame: FaceFrame
     lengths: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if compat.geometry_degree(self.body.mesh.mesh) == 2:
+            raise InputError(
+                "a mesh of curved cells is not divided for a reference",
+                allowed="a mesh of straight cells, or another coupling",
+            )
 
     @property
     def comm(self) -> Any:

@@ -13,7 +13,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facets import facet_indices, facet_nodes
+from macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes
 from support.arrays import Array
 
 
@@ -48,14 +48,17 @@ class FacetQuadrature:
 class ContactFacets:
     """Facets of a contact face whose cells this rank owns: triangles, or quadrilaterals.
 
+    Those of curved cells have nodes between their corners, too, see `facet_basis`; m is the number
+    of their nodes, 3, 4, 6 or 9.
+
     Args:
         frame: Frame of the face, or of the one that it is pressed on.
         outward: Unit normal out of the body, shape (3,): that of the frame, or its opposite.
         cell: Rank-local cell that the facet belongs to, shape (n,).
         side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
-        corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
-        depth: Depths of the vertices below the plane, into the body, shape (n, 3 or 4) [mm].
+        corners: Nodes in the plane, vertices first, shape (n, m, 2) [mm].
+        depth: Depths of the nodes below the plane, into the body, shape (n, m) [mm].
     """
 
     frame: FaceFrame
@@ -83,6 +86,11 @@ class ContactFacets:
         areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
         return np.asarray(areas, dtype=np.float64)
 
+    @property
+    def vertices(self) -> Array:
+        """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
+        return self.corners[:, : self.reference.shape[1]]
+
     def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
         """Return these facets and others of the same face."""
         arrays = [each.name for each in fields(self) if each.name not in ("frame", "outward")]
@@ -102,21 +110,21 @@ class ContactFacets:
             facet: The facet of each point, shape (n,).
             points: Points in the plane, shape (n, 2) [mm].
         """
-        corners = self.corners
+        corners = self.vertices
         edges = np.swapaxes(corners[:, 1:3] - corners[:, :1], 1, 2)
         offset = points - corners[facet, 0]
-        s = np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset)
-        if corners.shape[1] == 3:
-            return s
-        twist = corners[:, 0] - corners[:, 1] - corners[:, 2] + corners[:, 3]
-        # a parallelogram needs no Newton step to invert the map
-        bent = (np.abs(twist).max(axis=1) > 1e-12 * np.abs(edges).max(axis=(1, 2)))[facet]
-        edges, twist = edges[facet[bent]], twist[facet[bent]]
+        s = np.asarray(np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset))
+        # straight triangles and parallelograms need no Newton step to invert the map
+        bent = _off_parallel(self.corners)[facet]
+        at, nodes = s[bent], self.corners[facet[bent]]
         for _ in range(8 if bent.any() else 0):
-            at = s[bent]
-            miss = np.einsum("nij,nj->ni", edges, at) + twist * at.prod(axis=1)[:, None]
-            slope = edges + twist[:, :, None] * at[:, None, ::-1]
-            s[bent] = at - np.linalg.solve(slope, (miss - offset[bent])[..., None])[..., 0]
+            values, slopes = facet_basis(nodes.shape[1], at)
+            miss = np.einsum("nm,nmi->ni", values, nodes) - points[bent]
+            at = (
+                at
+                - np.linalg.solve(np.einsum("nmi,nmj->nij", nodes, slopes), miss[..., None])[..., 0]
+            )
+        s[bent] = at
         return s
 
     def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
@@ -126,11 +134,8 @@ class ContactFacets:
 
     def depths(self, facet: NDArray[np.intp], local: Array) -> Array:
         """Return depths below the plane at coordinates (n, 2) on given facets, shape (n,) [mm]."""
-        s, t = local.T
-        weights = [1.0 - s - t, s, t]
-        if self.corners.shape[1] == 4:
-            weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t]
-        return np.einsum("kn,nk->n", np.array(weights), self.depth[facet])
+        values, _ = facet_basis(self.depth.shape[1], local)
+        return np.einsum("nk,nk->n", values, self.depth[facet])
 
 
 def facet_quadrature(
@@ -198,7 +203,7 @@ def contact_facets(
     owned = nodes.cell < mesh.topology.index_map(3).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
     side = nodes.side[owned]
-    corners = mesh.geometry.x[nodes.corners[owned]]
+    corners = mesh.geometry.x[nodes.nodes[owned]]
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
@@ -219,14 +224,68 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,).
 
     Args:
-        corners: Corners of the facets, shape (m, 3 or 4, 2) [mm].
+        corners: Their nodes, shape (m, 3, 4, 6 or 9, 2) [mm]. Facets with edges that are curved in
+            the plane are divided into 4 × 4 parts with straight edges, whose corners lie on them.
     """
     facet = np.arange(len(corners))
+    if corners.shape[1] > 4:
+        return _parts_of_curved(corners)
     if corners.shape[1] == 3:
         return corners, facet
     # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides the diagonal
     # of what is left of a triangle cut by a border, on which the quadrature error depends.
     return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
+
+
+_PARTS = 4
+"""Straight parts of an edge that is curved in the plane: they enclose a disc of eight such edges to
+3e-4 of its area; the edges themselves to 2e-5."""
+
+
+def _parts_of_curved(nodes: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Return triangles of facets that may be curved in the plane, nodes (m, 6 or 9, 2)."""
+    count = {6: 3, 9: 4}[nodes.shape[1]]
+    straight = np.flatnonzero(~_is_bent(nodes))
+    triangles, facet = facet_triangles(nodes[straight, :count])
+    parts, owners = [triangles], [straight[facet]]
+    curved = np.flatnonzero(_is_bent(nodes))
+    for local in _lattice_triangles(count):
+        values, _ = facet_basis(nodes.shape[1], local)
+        parts.append(np.einsum("cm,nmi->nci", values, nodes[curved]))
+        owners.append(curved)
+    return np.concatenate(parts), np.concatenate(owners)
+
+
+def _lattice_triangles(count: int) -> Array:
+    """Return the parts of the unit triangle (3) or square (4), shape (parts, 3, 2)."""
+    found, n = [], _PARTS
+    for i in range(n):
+        for j in range(n):
+            a, b, c, d = (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)
+            if count == 4 or i + j < n:
+                found.append((a, b, c))
+            if count == 4 or i + j < n - 1:
+                found.append((d, c, b))
+    return np.array(found) / n
+
+
+def _is_bent(nodes: Array) -> NDArray[np.bool_]:
+    """Tell which facets have nodes in the plane that lie off the middles of their corners, (n,)."""
+    if nodes.shape[1] < 5:
+        return np.zeros(len(nodes), dtype=bool)
+    count = {6: 3, 9: 4}[nodes.shape[1]]
+    middles = np.stack([nodes[:, list(ends)].mean(axis=1) for ends in BETWEEN[count]], axis=1)
+    size = np.ptp(nodes[:, :count], axis=1).max(axis=1)
+    return np.asarray(np.abs(nodes[:, count:] - middles).max(axis=(1, 2)) > 1e-9 * size)
+
+
+def _off_parallel(nodes: Array) -> NDArray[np.bool_]:
+    """Tell which facets have a map to the plane that is not linear, shape (n,)."""
+    bent = _is_bent(nodes)
+    if nodes.shape[1] in (4, 9):
+        twist = nodes[:, 0] - nodes[:, 1] - nodes[:, 2] + nodes[:, 3]
+        bent |= np.abs(twist).max(axis=1) > 1e-12 * np.ptp(nodes[:, :4], axis=1).max(axis=1)
+    return bent
 
 
 def _cut_into_patches(

@@ -332,9 +332,10 @@ class ReferenceCoupling(PressedSurface):
         from macro.contact.rough_body import FlatBody
 
         tag = first.body.mesh.facet_tag(section.contact)
-        return FlatBody(
-            body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
-        )
+        with located(self.scene, "body.mesh"):
+            return FlatBody(
+                body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
+            )
 
     def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
         """Return a body with its roughness meshed."""
