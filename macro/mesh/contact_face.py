@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes
+from macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
 from support.arrays import Array
 
 
@@ -82,9 +82,9 @@ class ContactFacets:
     @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
-        triangles, facet = facet_triangles(self.corners)
-        areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
-        return np.asarray(areas, dtype=np.float64)
+        exact = 4 if self.corners.shape[1] > 4 else 1  # for the determinants of the maps
+        rule, weights = facet_rule(self.reference.shape[1], exact)
+        return np.asarray(np.abs(_jacobians(self.corners[:, None], rule[None]) @ weights))
 
     @property
     def vertices(self) -> Array:
@@ -152,26 +152,33 @@ def facet_quadrature(
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
-    triangles, facet = facet_triangles(facets.corners)
+    triangles, facet, curved = _divided(facets.corners)
+    part = np.arange(len(facet))
     if isinstance(parts, PatchGrid):
-        triangles, facet = _cut_into_patches(triangles, facet, parts)
+        triangles, part = _cut_into_patches(triangles, part, parts)
         patch = parts.index_of(*triangles.mean(axis=1).T)
     else:
         patch = parts[facet]
     order = np.argsort(patch, kind="stable")
-    triangles, facet, patch = triangles[order], facet[order], patch[order]
+    triangles, part, patch = triangles[order], part[order], patch[order]
 
     points, weights = compat.triangle_rule(degree)
     edges = triangles[:, 1:] - triangles[:, :1]
     positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
-    facet, patch = np.repeat(facet, len(weights)), np.repeat(patch, len(weights))
-    local = facets.local(facet, positions)
+    weight = np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel()
+    part, patch = np.repeat(part, len(weights)), np.repeat(patch, len(weights))
+    facet = facet[part]
+    if curved is None:
+        local = facets.local(facet, positions)
+    else:
+        local, positions, share = curved.placed(part, positions, facets.corners[facet])
+        weight = share * weight
     reference = facets.pull_back(facet, local)
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
         depth=facets.depths(facet, local),
-        weight=np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel(),
+        weight=weight,
         patch=patch,
         cell=facets.cell[facet],
         reference=reference,
@@ -224,12 +231,9 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     """Return facets as triangles (n, 3, 2) and the facet that each comes from (n,).
 
     Args:
-        corners: Their nodes, shape (m, 3, 4, 6 or 9, 2) [mm]. Facets with edges that are curved in
-            the plane are divided into 4 × 4 parts with straight edges, whose corners lie on them.
+        corners: Corners of the facets, shape (m, 3 or 4, 2) [mm].
     """
     facet = np.arange(len(corners))
-    if corners.shape[1] > 4:
-        return _parts_of_curved(corners)
     if corners.shape[1] == 3:
         return corners, facet
     # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides the diagonal
@@ -238,22 +242,71 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 _PARTS = 4
-"""Straight parts of an edge that is curved in the plane: they enclose a disc of eight such edges to
-3e-4 of its area; the edges themselves to 2e-5."""
+"""Parts of an edge of second order, in which borders of patches are taken for straight."""
 
 
-def _parts_of_curved(nodes: Array) -> tuple[Array, NDArray[np.intp]]:
-    """Return triangles of facets that may be curved in the plane, nodes (m, 6 or 9, 2)."""
-    count = {6: 3, 9: 4}[nodes.shape[1]]
-    straight = np.flatnonzero(~_is_bent(nodes))
-    triangles, facet = facet_triangles(nodes[straight, :count])
-    parts, owners = [triangles], [straight[facet]]
-    curved = np.flatnonzero(_is_bent(nodes))
-    for local in _lattice_triangles(count):
+class _CurvedParts(NamedTuple):
+    """Triangles that facets of second order are divided into, straight on the unit facet.
+
+    Attributes:
+        corners: Their corners in the plane, shape (n, 3, 2) [mm].
+        local: Their corners on the unit triangle or square, shape (n, 3, 2).
+    """
+
+    corners: Array
+    local: Array
+
+    def placed(
+        self, part: NDArray[np.intp], positions: Array, nodes: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return where points of straight triangles lie in curved facets.
+
+        Args:
+            part: The triangle of every point, shape (n,).
+            positions: Points in the straight triangles in the plane, shape (n, 2) [mm].
+            nodes: Nodes of the facet of each, shape (n, 6 or 9, 2) [mm].
+
+        Returns:
+            Their coordinates on the unit facet and in the plane, shape (n, 2), and the area there
+            over that of the straight triangle, shape (n,).
+        """
+        plane, unit = (np.swapaxes(c[:, 1:] - c[:, :1], 1, 2) for c in self)
+        map_ = unit @ np.linalg.inv(plane)
+        offset = positions - self.corners[part, 0]
+        local = self.local[part, 0] + np.einsum("nij,nj->ni", map_[part], offset)
         values, _ = facet_basis(nodes.shape[1], local)
-        parts.append(np.einsum("cm,nmi->nci", values, nodes[curved]))
-        owners.append(curved)
-    return np.concatenate(parts), np.concatenate(owners)
+        share = _jacobians(nodes, local) * np.linalg.det(map_)[part]
+        return local, np.einsum("nm,nmi->ni", values, nodes), np.abs(share)
+
+
+def _jacobians(nodes: Array, local: Array) -> Array:
+    """Return the determinants of the maps of facets to the plane.
+
+    Args:
+        nodes: Nodes of the facets in the plane, shape (n, m, 2) or (n, 1, m, 2) [mm].
+        local: Coordinates on the unit facets, shape (n, 2) or (1, q, 2).
+
+    Returns:
+        Determinants, shape (n,) or (n, q) [mm²].
+    """
+    _, slopes = facet_basis(nodes.shape[-2], local.reshape(-1, 2))
+    slopes = slopes.reshape(*local.shape[:-1], *slopes.shape[1:])
+    return np.asarray(np.linalg.det(np.einsum("...mi,...mj->...ij", nodes, slopes)))
+
+
+def _divided(nodes: Array) -> tuple[Array, NDArray[np.intp], _CurvedParts | None]:
+    """Return triangles of facets, the facet of each, and what they are of facets of second order.
+
+    Args:
+        nodes: Nodes of the facets in the plane, shape (m, 3, 4, 6 or 9, 2) [mm].
+    """
+    if nodes.shape[1] < 5:
+        return *facet_triangles(nodes), None
+    unit = _lattice_triangles({6: 3, 9: 4}[nodes.shape[1]])
+    values, _ = facet_basis(nodes.shape[1], unit.reshape(-1, 2))
+    triangles = np.einsum("km,nmi->nki", values, nodes).reshape(-1, 3, 2)
+    facet = np.repeat(np.arange(len(nodes)), len(unit))
+    return triangles, facet, _CurvedParts(triangles, np.tile(unit, (len(nodes), 1, 1)))
 
 
 def _lattice_triangles(count: int) -> Array:

@@ -39,6 +39,27 @@ class FacetNodes:
     nodes: NDArray[np.int32]
 
 
+def facet_outline(nodes: Array) -> Array:
+    """Return points of facets that they extend to: their nodes, or more on edges that are curved.
+
+    Args:
+        nodes: Nodes of facets, shape (n, m, k).
+
+    Returns:
+        Points, shape (n', k).
+    """
+    if nodes.shape[1] > 4:
+        steps = np.linspace(0.0, 1.0, 17)
+        zero, one = np.zeros(17), np.ones(17)
+        sides = [(steps, zero), (zero, steps)]
+        sides += [(1.0 - steps, steps)] if nodes.shape[1] == 6 else [(steps, one), (one, steps)]
+        values, _ = facet_basis(
+            nodes.shape[1], np.concatenate([np.stack(s, axis=1) for s in sides])
+        )
+        nodes = np.concatenate([nodes, np.einsum("qm,nmk->nqk", values, nodes)], axis=1)
+    return nodes.reshape(-1, nodes.shape[2])
+
+
 def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
     """Return facets that a user gives, as indices.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.face_frame import FaceFrame
 from macro import compat
-from macro.mesh.facets import exterior_facets, facet_basis, facet_nodes, facet_rule
+from macro.mesh.facets import exterior_facets, facet_basis, facet_nodes, facet_outline, facet_rule
 from support.arrays import Array
 from support.errors import InputError, did_you_mean
 
@@ -185,7 +185,7 @@ def planar_face(
     if np.linalg.norm(total) < 0.5 * area:
         raise refused("is not planar: its facets face different ways and close around a body")
     frame = FaceFrame.across(total, along=along)
-    lower, upper = bounding_box(corners.reshape(-1, 3) @ frame.axes.T, comm)
+    lower, upper = bounding_box(facet_outline(corners) @ frame.axes.T, comm)
     upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
     flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
     lengths, off = upper[:2] - lower[:2], 0.5 * float(upper[2] - lower[2])
@@ -226,8 +226,9 @@ def _area_elements(nodes: Array) -> Array:
         nodes: Nodes of the facets, shape (n, 3, 4, 6 or 9, 3) [mm].
     """
     # their sums are exact: tangents of quadratic maps have products of degree 3 along a coordinate
-    rule, weights = facet_rule({3: 3, 6: 3, 4: 4, 9: 4}[nodes.shape[1]], 4)
-    _, slopes = facet_basis(nodes.shape[1], rule)
+    count = nodes.shape[1]
+    rule, weights = facet_rule({3: 3, 6: 3, 4: 4, 9: 4}[count], 4 if count > 4 else 1)
+    _, slopes = facet_basis(count, rule)
     along = np.einsum("qmk,nmi->qkni", slopes, nodes)
     return np.asarray(weights[:, None, None] * np.cross(along[:, 0], along[:, 1]))
 
