@@ -30,7 +30,8 @@ extensions = [
 ]
 root_doc = "docs/index"
 include_patterns = [
-    "README.md", "CHANGELOG.md", "docs/*.md", "docs/api/*.md", "demos/notebooks/*.ipynb",
+    "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/*.md", "docs/api/*.md",
+    "demos/notebooks/*.ipynb",
 ]  # fmt: skip
 exclude_patterns = [
     ".*", "results", "tests", "docs/_build", "docs/_generated", "docs/jupyter_execute",

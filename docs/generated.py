@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 
-from multiscale.results.history import COLUMNS
+from multiscale.loading.load_step import COLUMNS
 from multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]

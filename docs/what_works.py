@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,17 +40,14 @@ COUPLINGS: dict[str, Changes] = {
 }
 """Columns: the couplings, and laws of periodic samples (``law.kind = "representative"``)."""
 
-BODIES: dict[str, tuple[str, dict[str, Changes]]] = {
-    "block": (
-        "On a block, `[block]`",
-        {
-            "laws of samples": {"block.lengths": [2.0, 2.0]},
-            "`reference`": {"reference.cells": [8, 8, 4]},
-        },
-    ),
-    "body": ("On a mesh, `[body]`", {}),
+BODIES: dict[str, dict[str, Changes]] = {
+    "block": {
+        "laws of samples": {"block.lengths": [2.0, 2.0]},
+        "`reference`": {"reference.cells": [8, 8, 4]},
+    },
+    "body": {},
 }
-"""Tables: their headings, and what single couplings need there."""
+"""Sections of the first body, and what single couplings need there."""
 
 CHOICES: dict[str, dict[str, Changes]] = {
     "Contact": {
@@ -111,18 +108,22 @@ ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)
 
 INTRO = """# What works with what
 
-`docs/what_works.py` wrote this page from what the code itself refuses: it plans small scenes of
-every coupling on a block and on a mesh, each with one of the choices below. ● works, ○ is accepted
-and changes nothing there, and a number is that of the reason in the list [below](#reasons). Where a
-scene states nothing else, a rigid, smooth plane is pressed to an approach, and contacts are those
-of a half-space where the coupling has any.
+Which choice goes with which coupling? `docs/what_works.py` wrote this page from what the code
+itself refuses: it sets up small scenes, each with one of the choices below.
 
-A column names `coupling.kind`; laws of samples are `law.kind = "representative"`. How accurate and
-how fast each way is stands on the page on [choosing](choosing.md).
+* ● works.
+* ○ is accepted and changes nothing.
+* A number is that of the reason in the [list at the end](#reasons).
+* Two signs in a cell are those on a block (`[block]`) and on a mesh (`[body]`); one sign is that of
+  both.
+
+A column names `coupling.kind`; laws of samples are `law.kind = "representative"`. Where a scene
+states nothing else, a rigid, smooth plane is pressed to an approach, and contacts are those of a
+half-space. [Choosing](choosing.md) has the accuracy and the speed of each way.
 """
 PAIRS = """## Two choices together
 
-Two choices that each work with a coupling but not together, on a block or on a mesh:
+Two choices that each work with a coupling but not together:
 """
 
 
@@ -186,7 +187,7 @@ class Planner:
                 "mesh": str(self._folder / "below.msh"), "contact": "near",
                 "supports": supports, **material,
             }  # fmt: skip
-        changes = [COUPLINGS[coupling], BODIES[body][1].get(coupling, {}), *choices]
+        changes = [COUPLINGS[coupling], BODIES[body].get(coupling, {}), *choices]
         pairs = [pair for one in changes for pair in one.items()]
         for key, value in sorted(pairs, key=lambda pair: pair[1] == AS_SURFACE):
             self._put(data, key, value)
@@ -294,44 +295,37 @@ def page(*, pairs: bool = True) -> str:
     with tempfile.TemporaryDirectory() as folder:
         planner, reasons = Planner(Path(folder)), Reasons()
         works: dict[tuple[str, str], list[str]] = {}
-        parts = [INTRO]
-        for body, (heading, _) in BODIES.items():
-            parts.append(f"## {heading}\n")
-            parts.append(_table(planner, reasons, body, works))
+        parts = [INTRO, "## One choice\n", _table(planner, reasons, works)]
         if pairs:
             parts += [PAIRS, _pairs(planner, reasons, works)]
     listed = "".join(f"{number}. {reason.text}\n" for reason, number in reasons.items())
     return "\n".join([*parts, "## Reasons\n", listed])
 
 
-def _table(
-    planner: Planner, reasons: Reasons, body: str, works: dict[tuple[str, str], list[str]]
-) -> str:
-    """Return the table of a body by topic, and note which choices work."""
+def _table(planner: Planner, reasons: Reasons, works: dict[tuple[str, str], list[str]]) -> str:
+    """Return the table of choices by topic, and note which of them work."""
     lines = [f"| | {' | '.join(COUPLINGS)} |\n|---|{':-:|' * len(COUPLINGS)}\n"]
-    bare = {coupling: planner.planned(coupling, body) for coupling in COUPLINGS}
+    bare = {(one, body): planner.planned(one, body) for one in COUPLINGS for body in BODIES}
     for topic, choices in CHOICES.items():
         lines.append(f"| **{topic}** |{' |' * len(COUPLINGS)}\n")
         if topic == "Contact":
-            lines.append(_row("nothing else", [_reason(made) for made in bare.values()], reasons))
+            lines.append(_row("nothing else", lambda *at: reasons.cell(_reason(bare[at])), BODIES))
         if topic == "Results":
-            lines.append(_row(ERROR, [planner.error(one, body) for one in COUPLINGS], reasons))
-            lines.append(_row(LAWS, [_laws(planner, one, body) for one in COUPLINGS], reasons))
+            lines.append(_row(ERROR, lambda *at: reasons.cell(planner.error(*at)), BODIES))
+            lines.append(_row(LAWS, lambda *at: reasons.cell(_laws(planner, *at)), BODIES))
         for name, changes in choices.items():
-            if name.startswith(("`block.", "`body.")) and not name.startswith(f"`{body}."):
-                continue
-            cells = []
-            for coupling in COUPLINGS:
-                made = bare[coupling]
+            bodies = [body for body in BODIES if name.startswith(f"`{body}.")] or BODIES
+
+            def cell(coupling: str, body: str, name: str = name, changes: Changes = changes) -> str:
+                made = bare[coupling, body]
                 if not isinstance(made, Reason):
                     made = planner.planned(coupling, body, changes)
-                cell = reasons.cell(_reason(made))
-                if not isinstance(made, Reason):
-                    works.setdefault((coupling, body), []).append(name)
-                    if _changes_nothing(changes, made, bare[coupling]):
-                        cell = "○"
-                cells.append(cell)
-            lines.append(f"| {name} | {' | '.join(cells)} |\n")
+                if isinstance(made, Reason):
+                    return reasons.cell(made)
+                works.setdefault((coupling, body), []).append(name)
+                return "○" if _changes_nothing(changes, made, bare[coupling, body]) else "●"
+
+            lines.append(_row(name, cell, bodies))
     return "".join(lines)
 
 
@@ -355,8 +349,10 @@ def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     return False
 
 
-def _row(name: str, found: list[Reason | None], reasons: Reasons) -> str:
-    return f"| {name} | {' | '.join(reasons.cell(reason) for reason in found)} |\n"
+def _row(name: str, cell: Callable[[str, str], str], bodies: Iterable[str]) -> str:
+    """Return a row: for every coupling what stands there on each body, once if it is the same."""
+    cells = [" ".join(dict.fromkeys(cell(one, body) for body in bodies)) for one in COUPLINGS]
+    return f"| {name} | {' | '.join(cells)} |\n"
 
 
 def _pairs(planner: Planner, reasons: Reasons, works: Mapping[tuple[str, str], list[str]]) -> str:

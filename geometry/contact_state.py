@@ -92,12 +92,14 @@ class Start:
             are lower, shape (nx, ny) [mm]; None for the surface as it was made.
         by_slopes: What finite slopes add to the displacements of the cells there, (nx, ny) [mm];
             None where that is not known.
+        nearby: Other solutions, which tell how solutions change with the load.
     """
 
     plane: RigidPlane
     values: Array
     plastic_depth: Array | None = None
     by_slopes: Array | None = None
+    nearby: tuple[Start, ...] = ()
 
     def towards(self, other: Start, share: float) -> Start:
         """Return what a load between this and another one, or beyond, may start from.
@@ -110,7 +112,8 @@ class Start:
         by_slopes = None
         if self.by_slopes is not None and other.by_slopes is not None:
             by_slopes = self.by_slopes + share * (other.by_slopes - self.by_slopes)
-        return Start(plane=self.plane, values=values, by_slopes=by_slopes)
+        known = replace(other, nearby=()), replace(self, nearby=())
+        return Start(plane=self.plane, values=values, by_slopes=by_slopes, nearby=known)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

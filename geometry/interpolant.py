@@ -17,6 +17,10 @@ _PADDING = 28
 """Cells by which periodic samples are continued: the influence of a sample on a cubic spline decays
 by 2 − √3 per cell and is below 1e-16 there, so that a padded spline is periodic to rounding."""
 
+_MOST_CLIMBS, _CLIMBED = 60, 1e-9
+"""Steps to a local maximum, and their length, in cells, at which it counts as reached: its height
+is then right to 1e-18 of the curvature."""
+
 
 def cell_centres(length: float, count: int) -> Array:
     """Return the centres of equal cells along a side, shape (count,) [mm].
@@ -102,14 +106,11 @@ class Interpolant:
 
         On a span between knots a spline stays below the largest of its 4 × 4 B-spline
         coefficients, so spans that cannot exceed the best sample are discarded; the others are
-        sampled, and the best points refined by bounded quasi-Newton iterations.
+        sampled, and the best points refined by Newton's method within the rectangle.
         """
-        x, y, z = self._starts()
-        refined = [self._climb(*start) for start in zip(x, y, strict=True)]
-        best = int(np.argmax(z))
-        points = [(float(x[best]), float(y[best]), float(z[best])), *refined]
-        x_m, y_m, z_m = max(points, key=lambda point: point[2])
-        return x_m - self._corner[0], y_m - self._corner[1], z_m + self._lowest
+        points = np.stack(self._starts(), axis=1)
+        x, y, z = max((*points, *self._climbed(points[:, :2])), key=lambda point: float(point[2]))
+        return float(x) - self._corner[0], float(y) - self._corner[1], float(z) + self._lowest
 
     def _derivative(self, dx: int, dy: int) -> Any:
         """Return a derivative as a spline of its own, made once: evaluation would remake it."""
@@ -175,23 +176,45 @@ class Interpolant:
         strips = np.maximum.reduce([rows[k : nx + k] for k in range(4)])
         return np.asarray(np.maximum.reduce([strips[:, k : ny + k] for k in range(4)]))
 
-    def _climb(self, x: float, y: float) -> tuple[float, float, float]:
-        """Return the local maximum reached from (x, y) without leaving the rectangle."""
-        origin, (dx, dy) = np.array([x, y]), self._spacing
-        value, along_x, along_y = (self._derivative(*d) for d in ((0, 0), (1, 0), (0, 1)))
-        height = float(np.ptp(self._coefficients())) or 1.0
+    def _climbed(self, points: Array) -> Array:
+        """Return local maxima (x, y, z) reached from points without leaving the rectangle.
 
-        def depth(step: Array) -> tuple[float, Array]:
-            px, py = origin + step * (dx, dy)
-            slope = [dx * at_points(along_x, px, py), dy * at_points(along_y, px, py)]
-            return -float(at_points(value, px, py)) / height, -np.array(slope) / height
+        Newton's method with the curvatures' sizes, so that every step leads up; steps that go too
+        far are halved.
 
+        Args:
+            points: Where to begin, shape (n, 2) [mm].
+        """
+        spacing, share = np.array(self._spacing), np.ones((len(points), 1))
         low, high = np.transpose([self._box(axis) for axis in range(2)])
-        limits = list(zip((low - origin) / (dx, dy), (high - origin) / (dx, dy), strict=True))
-        options = {"ftol": 1e-16, "gtol": 1e-12}
-        top = scipy.optimize.minimize(depth, np.zeros(2), jac=True, bounds=limits, options=options)
-        px, py = np.clip(origin + top.x * (dx, dy), low, high)
-        return float(px), float(py), float(at_points(value, px, py))
+        points, heights = points.copy(), at_points(self._spline, *points.T)
+        for _ in range(_MOST_CLIMBS):
+            step = np.clip(self._newton_step(points, low, high), -1.0, 1.0)
+            trial = np.clip(points + share * step * spacing, low, high)
+            reached = at_points(self._spline, *trial.T)
+            higher = reached > heights
+            points[higher], heights[higher] = trial[higher], reached[higher]
+            share = np.where(higher[:, None], np.minimum(2.0 * share, 1.0), 0.5 * share)
+            if np.abs(share * step).max() <= _CLIMBED:
+                break
+        return np.column_stack((points, heights))
+
+    def _newton_step(self, points: Array, low: Array, high: Array) -> Array:
+        """Return steps up from points, in cells, which end at sides that are in the way, (n, 2)."""
+        spacing, orders = np.array(self._spacing), ((2, 0), (1, 1), (0, 2))
+        slope = np.stack(
+            [at_points(self._derivative(*d), *points.T) for d in ((1, 0), (0, 1))], axis=1
+        )
+        slope *= spacing
+        xx, xy, yy = (at_points(self._derivative(*d), *points.T) for d in orders)
+        at_side = np.where(slope > 0.0, points >= high, points <= low)
+        slope[at_side] = 0.0
+        xy = np.where(at_side.any(axis=1), 0.0, xy)
+        bends = np.stack([xx, xy, xy, yy], axis=1).reshape(-1, 2, 2) * np.outer(spacing, spacing)
+        sizes, axes = np.linalg.eigh(bends)
+        sizes = np.maximum(np.abs(sizes), np.finfo(float).tiny)
+        along = np.einsum("nij,ni->nj", axes, slope) / sizes
+        return np.einsum("nij,nj->ni", axes, along)
 
 
 def at_points(spline: Any, x: ArrayLike, y: ArrayLike) -> Array:

@@ -40,9 +40,9 @@ class Control:
         tilt: Slopes (tx, ty) of the approach about the middle of the interface [mm/mm]; None lets
             the plane turn until the pressures have the prescribed moment about the middle.
         moment: First moments of the pressures about the middle where the plane turns, as bolts
-            prescribe them [N mm]; laws on a mesh alone follow them.
-        body_state: Position among the states of what else loads the bodies, which none of them
-            changes by itself: 0.25 is a quarter of the way from the first state to the second.
+            prescribe them [N mm]; only laws on a mesh take them.
+        body_state: Position in the history of the other loads of the bodies: 0.25 is a quarter of
+            the way from their first state to the second.
         shear: Shift of the plane along the surface, or shear force on it; None without friction.
 
     Raises:
@@ -110,8 +110,8 @@ class RigidPlane:
         approach: δ at the centre of the rectangle [mm].
         tilt: Slopes (tx, ty) [mm/mm].
         centre: Point (xc, yc) that the plane turns about [mm]; None: the middle of the face that
-            it presses, as with a `Control`. Only that face knows it, so that such a plane has an
-            approach at points only where it is level.
+            it presses, as with a `Control`. Without a centre only a level plane has an approach
+            at points.
 
     Raises:
         InputError: When a number is not finite or the tilt is not a pair.

@@ -37,9 +37,9 @@ class Friction:
 
     Args:
         coefficient: Coefficient of friction μ: no shear stress exceeds μ times the pressure.
-        poisson_ratio: Poisson's ratio of the bodies, for laws that do not know their ratio of
-            normal to tangential stiffness; of two bodies the mean, weighted by 1/G. None: the laws
-            know it, as those of a scene do.
+        poisson_ratio: Poisson's ratio of the bodies, for laws without a ratio of normal to
+            tangential stiffness; of two bodies the mean, weighted by 1/G. None: the laws have it,
+            as those of a scene do.
 
     Raises:
         InputError: When a number is outside its range.

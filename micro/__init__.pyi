@@ -23,6 +23,10 @@ from micro.boundary_elements.rectangle_modes import side_modes as side_modes
 from micro.boundary_elements.rectangle_modes import side_stress_modes as side_stress_modes
 from micro.boundary_elements.side_cells import SideStresses as SideStresses
 from micro.boundary_elements.side_cells import side_stresses as side_stresses
+from micro.boundary_elements.traction_modes import TractionModes as TractionModes
+from micro.boundary_elements.traction_modes import (
+    half_space_traction_modes as half_space_traction_modes,
+)
 from micro.by_name import MODEL_NAMES as MODEL_NAMES
 from micro.by_name import micro_model as micro_model
 from micro.closed_forms.hertz import HertzContact as HertzContact

@@ -246,7 +246,9 @@ class _Problems:
         if not fit:
             return None
         _, known, values = min(fit, key=lambda each: each[0])
-        return replace(known, values=values)
+        if known.values.shape == grid:
+            return known
+        return replace(known, values=values, by_slopes=None)
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
         model = self._probe.model.resampled(grid)

@@ -3,40 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from functools import cached_property
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
 from multiscale.auto.keys import resolved_sections
+from multiscale.console import run_progress
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import load_finite_elements
-from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.clock import Clock
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
-from multiscale.measured_errors import error_notes
-from multiscale.observers.step_observers import (
-    ContactRecorder,
-    ErrorCheck,
-    FieldRecorder,
-    StepObserver,
-    StiffnessObserver,
-    WorkObserver,
-)
-from multiscale.progress import run_progress
+from multiscale.observers.step_observers import ContactRecorder, FieldRecorder, observers_of
+from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.notes import energy_notes, verdict, yielding_notes
 from multiscale.scene.identity import identity
-from multiscale.scene.leak import LeakSection
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
-from support.checked_store import fingerprint
 from support.collective import on_root
 from support.packages import optional_packages
 
@@ -52,14 +40,15 @@ class Run:
         resolved: Values of the scene's auto keys when the run began; see `resolved_sections`.
 
     Attributes:
-        clock: Measures the phases of the run, and tells an observer of them.
+        clock: Measures the phases of the run, and reports them to an observer.
         given: The scene as the user wrote it.
         identity: All that its numbers depend on, see `multiscale.scene.identity`.
-        coupling: What was made of the scene, and finds the load steps.
+        coupling: The coupling made from the scene, which solves the load steps.
         scene: The scene with values for its auto keys.
         steps: The load steps accepted so far, counted from first touch.
-        fields: The states that the fields of chosen load steps are written from.
         position: Position in the load history after them.
+        fields: The states that the fields of chosen load steps are written from.
+        observers: Observers, which each load step is passed to.
     """
 
     def __init__(
@@ -71,7 +60,6 @@ class Run:
         self.position = LoadPosition()
         self._start: Any = None
         self._notes: list[str] = []
-        self._leak: StepObserver | None = None
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
         nodes = cluster_nodes(comm)
@@ -81,46 +69,7 @@ class Run:
         self.scene = self.coupling.scene
         self.fields = FieldRecorder(self.coupling)
         self._contacts = ContactRecorder(self.coupling)
-        self._observers: list[StepObserver] = [self.fields]
-        if self.scene.output.contact != "none":
-            self._observers.append(StiffnessObserver(self.coupling))
-        self._observers.append(WorkObserver(self.coupling))
-        if self.scene.conductance is not None:
-            from multiscale.observers.conductance import ConductanceObserver  # others do without
-
-            self._observers.append(ConductanceObserver(self.coupling, self.scene.conductance))
-        if self.scene.leak is not None:
-            self._leak = self._leak_observer(self.scene.leak)
-            self._observers.append(self._leak)
-        if self.scene.friction is not None:
-            from multiscale.observers.friction import FrictionObserver  # others do without
-
-            self._observers.append(FrictionObserver(self.coupling))
-        self._observers += [ErrorCheck(self.coupling, self._has_unloaded), self._contacts]
-
-    def _leak_observer(self, section: LeakSection) -> StepObserver:
-        """Return what adds the leak to load steps: through gaps, patches, or over a face."""
-        if section.between_edges:
-            from multiscale.observers.face_leak import FaceLeakObserver
-
-            coupling: Any = self.coupling
-            return FaceLeakObserver(coupling, section)
-        if self.coupling.has_laws:
-            from multiscale.observers.patch_leak import PatchLeakObserver
-
-            laws: Any = self.coupling
-            return PatchLeakObserver(laws, section)
-        from multiscale.observers.leak import LeakObserver
-
-        return LeakObserver(self.coupling, section, self._has_unloaded)
-
-    def phase(self, name: str) -> AbstractContextManager[None]:
-        """Measure the wall time of a phase, without that of phases within it.
-
-        Args:
-            name: Its name.
-        """
-        return self.clock.phase(name)
+        self.observers = [self.fields, *observers_of(self.coupling), self._contacts]
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
@@ -141,21 +90,20 @@ class Run:
         """
         self.prepare()
         stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
-        with self.phase("load steps"):
+        with self.clock.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
-                before = self.steps[-1] if self.steps else None
-                with self.phase("contact"):
-                    for observer in self._observers:
-                        step = observer.observe(step, before, last=self.finished)
+                with self.clock.phase("contact"):
+                    for observer in self.observers:
+                        step = observer.observe(step, self.steps, last=self.finished)
                 self.steps.append(step)
                 yield step.counted_from(self.coupling.zero)
 
     def finish(self) -> None:
-        """Let all that sees load steps know that none follows, also where the run ended early."""
+        """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
-            with self.phase("contact"):
-                for observer in self._observers:
+            with self.clock.phase("contact"):
+                for observer in self.observers:
                     self.steps[-1] = observer.finish(self.steps[-1])
 
     @property
@@ -166,11 +114,7 @@ class Run:
     @property
     def fluid(self) -> Any:
         """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
-        return getattr(self._leak, "map", None)
-
-    def _has_unloaded(self) -> bool:
-        """Tell whether the load was larger at an earlier load step."""
-        return self.position.is_below_past
+        return next(filter(None, (getattr(one, "fluid", None) for one in self.observers)), None)
 
     @property
     def finished(self) -> bool:
@@ -195,7 +139,7 @@ class Run:
         steps: Sequence[LoadStep],
         position: LoadPosition,
         state: Any,
-        laws: bytes,
+        laws: LawTable | None = None,
         contacts: Sequence[ContactRecord] = (),
     ) -> None:
         """Continue after load steps of the same scene; call it before anything is made.
@@ -204,21 +148,14 @@ class Run:
             steps: The load steps accepted so far.
             position: Position in the load history after them.
             state: What `state` returned then.
-            laws: What `law_bytes` was then.
+            laws: The laws of the coupling then, where any were made.
             contacts: What `contacts` was then.
         """
         self.steps, self.position, self._start = list(steps), position, state
         self._contacts.records = list(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
-        if laws:
-            self.coupling.table = read_laws(BytesIO(laws))
-
-    @cached_property
-    def heights(self) -> str:
-        """SHA-256 of the surface's heights, or of those of all samples."""
-        samples = () if self.coupling.regions is None else self.coupling.rough_surfaces
-        surfaces = (self.coupling.surface, *samples)
-        return fingerprint([surface.heights for surface in surfaces])
+        if laws is not None:
+            self.coupling.table = laws
 
     @property
     def laws(self) -> LawTable | None:
@@ -227,11 +164,6 @@ class Run:
         if table is None or not zero:
             return table
         return table.counted_from(self.scene.loading.zero, zero)
-
-    @property
-    def law_bytes(self) -> bytes:
-        """The law file's bytes; empty as long as there are no laws."""
-        return b"" if self.coupling.table is None else law_bytes(self.coupling.table)
 
     def history(self) -> History:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
@@ -253,26 +185,14 @@ class Run:
 
     def _all_notes(self) -> Iterator[str]:
         """Yield what a report says, after the accuracy."""
-        coupling, hardness = self.coupling, self.scene.micro.hardness
-        yield from coupling.notes(self.steps)
+        yield from self.coupling.notes(self.steps)
         yield from self._notes
-        for observer in self._observers:
+        for observer in self.observers:
             yield from observer.notes(self.steps)
-        if hardness is not None or coupling.regions is None:  # whose peaks are those of means
-            yield from yielding_notes(self.steps, hardness)
-        yield from energy_notes(self.steps)
-        yield from error_notes(self.steps)
-        if self.steps:
-            yield from coupling.error_notes(self.steps)
 
     def remark(self, notes: Iterable[str]) -> None:
         """Add notes to the history, each once."""
         self._notes += [note for note in dict.fromkeys(notes) if note not in self._notes]
-
-    @property
-    def unknowns(self) -> int | None:
-        """Degrees of freedom of the mesh that load steps are solved on, where there is one."""
-        return self.coupling.unknowns
 
     def write_fields(self, path: Path) -> None:
         """Write the fields of the load steps that the scene names, see `FieldRecorder.write`.
@@ -282,7 +202,7 @@ class Run:
         """
         if self.finished:
             self.prepare()
-        with self.phase("field"):
+        with self.clock.phase("field"):
             self.fields.write(path, self.steps, finished=self.finished)
 
     def close(self) -> None:
@@ -291,7 +211,7 @@ class Run:
         Note:
             Collective.
         """
-        for observer in self._observers:
+        for observer in self.observers:
             observer.release()
         self.coupling.release()
 
@@ -310,7 +230,7 @@ def run(
         scene: What to run.
         comm: MPI communicator (mpi4py); None runs on this process alone.
         observe: Called with every accepted load step.
-        progress: Whether what the run is at is shown, in the terminal or below a notebook's cell.
+        progress: Whether the progress is shown, in the terminal or below a notebook's cell.
 
     Returns:
         The history, the same on every rank.

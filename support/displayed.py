@@ -1,11 +1,11 @@
-"""Tables as text and as HTML, and the results that show themselves as one."""
+"""Tables as text, as HTML and for other packages; results that show themselves as one."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from html import escape
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -98,3 +98,45 @@ def spread(count: int, most: int) -> list[int]:
 def _are_numbers(cells: Sequence[str]) -> bool:
     """Tell whether the cells of a column are numbers, with errors or without, or marks for none."""
     return all(not cell or cell[0] in "–-+.…0123456789" or cell in ("nan", "inf") for cell in cells)
+
+
+def data_frame(records: list[dict[str, Any]]) -> Any:
+    """Return records as a pandas data frame, with a column for each of their keys.
+
+    Args:
+        records: The rows.
+
+    Raises:
+        ImportError: When pandas, which patchlaw does not require, is not installed.
+    """
+    try:
+        from pandas import DataFrame
+    except ImportError as error:
+        raise ImportError(
+            "a data frame needs pandas (Debian: apt install python3-pandas); `records` gives the "
+            "same rows without it"
+        ) from error
+    return DataFrame(records)
+
+
+def dataset(
+    values: Mapping[str, Any], coordinates: Mapping[str, Any], facts: Mapping[str, Any]
+) -> Any:
+    """Return arrays as an xarray dataset.
+
+    Args:
+        values: Dimensions and array of each variable, by name.
+        coordinates: The same of each coordinate.
+        facts: Attributes of the dataset.
+
+    Raises:
+        ImportError: When xarray, which patchlaw does not require, is not installed.
+    """
+    try:
+        from xarray import Dataset
+    except ImportError as error:
+        raise ImportError(
+            "a dataset needs xarray (Debian: apt install python3-xarray); the attributes of the "
+            "same names are plain arrays without it"
+        ) from error
+    return Dataset(dict(values), coords=dict(coordinates), attrs=dict(facts))

@@ -30,6 +30,7 @@ scene = Scene.from_dict(
             "filter": {"short": "8 um"},
         },
         "block": {"young_modulus": "210 GPa", "poisson_ratio": 0.3},
+        "micro": {"hardness": "2.5 GPa"},  # summits yield at this pressure
         "coupling": {"kind": "concurrent"},
         "load": {"force": "20 N", "steps": 4},
     }
@@ -61,5 +62,5 @@ history.contact
 history.contact.plot()
 
 # %%
-assert abs(1e3 * last.approach_mm - 0.5899) < 0.0031  # what the page on this map says
+assert abs(1e3 * last.approach_mm - 0.6034) < 0.0029  # what the page on this map says
 assert history.contact.force_N > 19.99

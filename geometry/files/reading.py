@@ -35,8 +35,8 @@ def read_surface(
     * ``.npy``: an array with index [ix, iy];
     * text: numbers in rows, see `geometry.files.text.read_text`;
     * ``.xyz``, or three columns: x, y, z of the points of a regular grid in any order, x, y in mm;
-    * any other, and text under words with numbers: an instrument's format, told by its content,
-      through the optional package SurfaceTopography.
+    * any other, and text under words with numbers: an instrument's format, recognised by its
+      content, through the optional package SurfaceTopography.
 
     Args:
         path: The file.

@@ -78,8 +78,7 @@ class ParityBlock:
         """Return the displacements and strains of the top by the modes of the parity."""
         (ux, uy, _), (vx, vy, _), (wx, wy, z) = self._lines
         odd_x, odd_y = self.parity
-        loads = np.kron(wx.modes[odd_x::2], wy.modes[odd_y::2])
-        tops, growth = self._solved(loads, z.end)
+        tops, growth = self._solved({2: -self._modes(2)}, z.end)
         sizes = len(wx.modes[odd_x::2]), len(wy.modes[odd_y::2])
 
         def seen(top: Array, along_x: Array, along_y: Array, *, shear: bool = False) -> Array:
@@ -97,11 +96,48 @@ class ParityBlock:
             growth=growth.reshape(*sizes, *sizes),
         )
 
-    def _solved(self, loads: Array, end: int) -> tuple[list[Array], Array]:
+    def traction_response(self) -> list[list[Array]]:
+        """Return the displacements of the top by modes of traction along x, y and downwards.
+
+        Modes are those that load the block with the parity of its pressures: a traction along an
+        axis has the opposite parity along it.
+
+        Returns:
+            By component of the displacement and of the traction the integrals over the top of modes
+            times displacements, shape (k, l, m, n) each as in `Response` [mm³/MPa].
+        """
+        loads = [(-1.0 if axis == 2 else 1.0) * self._modes(axis) for axis in range(3)]
+        tops, _ = self._solved(dict(enumerate(loads)), self._lines[2][2].end)
+        splits = np.cumsum([len(load) for load in loads])[:2]
+        shapes = [self._counts(axis) for axis in range(3)]
+        return [
+            [
+                (load @ part).reshape(*shapes[seen], *shapes[by])
+                for by, part in enumerate(np.split(top, splits, axis=1))
+            ]
+            for seen, (load, top) in enumerate(zip(loads, tops, strict=True))
+        ]
+
+    def parity_of(self, axis: int) -> Parity:
+        """Return the parity of displacements and tractions along an axis: 0 x, 1 y, 2 z."""
+        (odd_x, odd_y) = self.parity
+        return (odd_x + (axis == 0)) % 2, (odd_y + (axis == 1)) % 2
+
+    def _modes(self, axis: int) -> Array:
+        """Return the forces of modes of traction on the unknowns (ix, iy) of a component."""
+        (x, y, _), (odd_x, odd_y) = self._lines[axis], self.parity_of(axis)
+        return np.kron(x.modes[odd_x::2], y.modes[odd_y::2])
+
+    def _counts(self, axis: int) -> tuple[int, int]:
+        """Return how many modes along x and y a traction has."""
+        (x, y, _), (odd_x, odd_y) = self._lines[axis], self.parity_of(axis)
+        return len(x.modes[odd_x::2]), len(y.modes[odd_y::2])
+
+    def _solved(self, loads: dict[int, Array], end: int) -> tuple[list[Array], Array]:
         """Solve for the displacements by loads on the top.
 
         Args:
-            loads: Downward forces on the vertical unknowns (ix, iy) of the top, shape (m, n) [N].
+            loads: By component forces on its unknowns (ix, iy) of the top, shape (m, n) [N].
             end: Index iz of the unknowns of the top.
 
         Returns:
@@ -111,13 +147,17 @@ class ParityBlock:
         sizes = [part.shape for part in self._free]
         splits = np.cumsum([part.size for part in self._free])
         free = np.concatenate([part.ravel() for part in self._free])
-        forces = np.zeros((len(free), len(loads)))
-        forces[splits[1] :].reshape(-1, sizes[2][2], len(loads))[:, end] = -loads.T
+        count, first = sum(map(len, loads.values())), 0
+        forces = np.zeros((len(free), count))
+        for axis, load in loads.items():
+            own = np.split(forces, splits[:2])[axis].reshape(-1, sizes[axis][2], count)
+            own[:, end, first : first + len(load)] = load.T
+            first += len(load)
         solved = _solution(self._stiffness()[free][:, free], forces[free])
         displacements = np.zeros_like(forces)  # also where a roller constrains
         displacements[free] = solved
         tops = [
-            part.reshape(-1, size[2], len(loads))[:, end]
+            part.reshape(-1, size[2], count)[:, end]
             for part, size in zip(np.split(displacements, splits[:2]), sizes, strict=True)
         ]
         # derivative of the inverse stiffness when all elements grow in proportion
@@ -127,10 +167,10 @@ class ParityBlock:
     @cached_property
     def _lines(self) -> list[tuple[Line, Line, Line]]:
         """Shape functions along x, y and z by component of the displacement."""
-        (x, y, z), (odd_x, odd_y) = self.lines, self.parity
+        x, y, z = self.lines
         return [
-            (x.of_parity((odd_x + (k == 0)) % 2), y.of_parity((odd_y + (k == 1)) % 2), z)
-            for k in range(3)
+            (x.of_parity(odd_x), y.of_parity(odd_y), z)
+            for odd_x, odd_y in map(self.parity_of, range(3))
         ]
 
     @cached_property

@@ -54,9 +54,9 @@ class ContactProblem:
             PETSc's for quadratic ones, or with a factorisation of small problems. What stands
             behind ``-patchlaw_`` on the command line wins. A factorisation alone (``"ksp_type":
             "preonly"``) preconditions GMRES, as contact is no part of what is factorised.
-        in_matrix: Whether preconditioners know the tangents of pointwise interfaces, which takes
-            their entries into the matrix; they are made anew when these have changed much. False
-            keeps one preconditioner for a linear body, which contact alone must not hold.
+        in_matrix: Whether preconditioners contain the tangents of pointwise interfaces, whose
+            entries are then added to the matrix; they are made anew when these have changed much.
+            False keeps one preconditioner for a linear body, which needs supports then.
 
     Attributes:
         displacement: u.
@@ -68,7 +68,7 @@ class ContactProblem:
             the first solve, when PETSc has no use for one of the options.
 
     Note:
-        Construction and all methods are collective. A change of the mesh is not seen.
+        Construction and all methods are collective. The mesh must not change afterwards.
     """
 
     def __init__(
@@ -135,7 +135,7 @@ class ContactProblem:
         return self.report.iterations
 
     def reaction(self) -> Array:
-        """Return the force that the supports bear, at the latest solution, shape (3,) [N].
+        """Return the force on the supports at the latest solution, shape (3,) [N].
 
         It is the sum of F less contact over the constrained unknowns, component by component.
         """

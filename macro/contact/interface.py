@@ -200,7 +200,7 @@ class Interface:
         return crown_depth(self._crown, x, y)
 
     def approach_at(self, x: Array, y: Array) -> Array:
-        """Return the approach of the plane, where it is now, at points of it, shapes (n,) [mm]."""
+        """Return the approach of the plane as it is at points of it, shapes (n,) [mm]."""
         (approach, tx, ty), (xc, yc) = self.forces.plane, self.patches.middle
         return np.asarray(approach + tx * (x - xc) + ty * (y - yc))
 
@@ -340,11 +340,11 @@ class Interface:
         return self.forces if isinstance(self.forces, FrictionalForces) else None
 
     def accept(self, x: Any) -> None:
-        """Take displacements for the end of a load step: what has slipped until then is slip.
+        """Accept displacements as the end of a load step; later steps start from their slip.
 
         `ContactProblem` does so when it has converged. Solvers of your own do it once for every
         load step that counts; a step that is repeated or taken back starts from the last one that
-        was accepted. Without friction nothing remembers load steps.
+        was accepted. Without friction the order of load steps does not matter.
 
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
@@ -355,7 +355,7 @@ class Interface:
 
     @property
     def slip_record(self) -> SliderRecord:
-        """What the accepted load steps left behind of friction, on any number of ranks.
+        """Slip after the accepted load steps, for any number of ranks.
 
         Set it to go on from there: to take load steps back, or in another run.
 

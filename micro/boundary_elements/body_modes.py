@@ -99,6 +99,53 @@ class BodyModes:
         some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
         return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
 
+    def within(self, lengths: tuple[float, float]) -> BodyModes:
+        """Return the compliance of a rectangle of the top, in modes of its own.
+
+        On a part of the top its modes are polynomials of the same degrees, so that nothing is lost.
+
+        Args:
+            lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
+        """
+        if lengths == self.lengths and self.origin == (0.0, 0.0):
+            return self
+        nodes, weights = np.polynomial.legendre.leggauss(self.count)
+        part = 0.5 * (1.0 + nodes)
+        along = [
+            (0.5 * weights * mode_values(part * inner, inner, self.count))
+            @ mode_values(part * inner - start, whole, self.count).T
+            for inner, start, whole in zip(lengths, self.origin, self.lengths, strict=True)
+        ]
+        change = np.kron(*along)
+
+        def changed(matrix: Array) -> Array:
+            found = change @ matrix @ change.T
+            return np.asarray(0.5 * (found + found.T))
+
+        rough = None if self.rough is None else changed(self.rough)
+        return BodyModes(lengths, changed(self.matrix), rough=rough)
+
+    def plus(self, other: BodyModes) -> BodyModes:
+        """Return the compliance of this body and of another one on the same rectangle.
+
+        Args:
+            other: That of the other body, whose modes may be more or fewer.
+        """
+        count = max(self.count, other.count)
+
+        def total(own: Array, others: Array) -> Array:
+            found = np.zeros(4 * (count,))
+            for one in (own, others):
+                few = round(len(one) ** 0.5)
+                found[:few, :few, :few, :few] += one.reshape(4 * (few,))
+            return found.reshape(2 * (count**2,))
+
+        rough = None
+        if self.rough is not None or other.rough is not None:
+            parts = (one.matrix if one.rough is None else one.rough for one in (self, other))
+            rough = total(*parts)
+        return BodyModes(self.lengths, total(self.matrix, other.matrix), self.origin, rough)
+
     def coarser(self) -> BodyModes | None:
         """Return the compliance from a coarser discretisation; None where there is none."""
         return None if self.rough is None else BodyModes(self.lengths, self.rough, self.origin)

@@ -45,9 +45,30 @@ def half_space_modes(lengths: tuple[float, float], count: int) -> Array:
     Returns:
         (1/A²) ∫∫ φ_m(x) φ_n(x') / (π |x − x'|) dA dA', symmetric, shape (K², K²) [1/mm].
     """
-    parts = _products, _products
-    matrix = 4.0 / np.pi * _integrated(lengths, count, parts, 1.0, lambda x, _: np.ones_like(x))
+    matrix = direction_modes(lengths, (0, 0), count)
     return np.asarray(0.5 * (matrix + matrix.T))
+
+
+@_of_few_modes
+def direction_modes(lengths: tuple[float, float], powers: tuple[int, int], count: int) -> Array:
+    """Return what kernels of a direction displace by modes, in modes.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the rectangle [mm].
+        powers: Powers a and b of the kernel cos^a sin^b / (π ρ), with ρ and its direction from the
+            load to the point.
+        count: Modes K along a side; mode k K + l is k along x, l along y.
+
+    Returns:
+        (1/A²) ∫∫ φ_m(x) φ_n(x') cos^a sin^b / (π ρ) dA dA', shape (K², K²) [1/mm].
+    """
+    signs = (-1.0) ** powers[0], (-1.0) ** powers[1]
+    parts = _products, _products
+
+    def weight(cos: Array, sin: Array) -> Array:
+        return signs[0] * signs[1] * 4.0 / np.pi * cos ** powers[0] * sin ** powers[1]
+
+    return _integrated(lengths, count, parts, signs, weight)
 
 
 @_of_few_modes
@@ -66,8 +87,8 @@ def half_space_stress_modes(
     """
     side = 1.0 - 2.0 * poisson_ratio
     parts = _product_slopes, _products
-    xx = -2.0 / np.pi * _integrated(lengths, count, parts, 1.0, lambda x, _: x)
-    xy = -2.0 / np.pi * _integrated(lengths, count, parts, -1.0, lambda _, y: y)
+    xx = -2.0 / np.pi * _integrated(lengths, count, parts, (1.0, 1.0), lambda x, _: x)
+    xy = -2.0 / np.pi * _integrated(lengths, count, parts, (-1.0, -1.0), lambda _, y: y)
     pressure = np.eye(count**2) / (lengths[0] * lengths[1])
     straight = -2.0 * poisson_ratio * pressure - side * xx
     return np.stack([straight, -(1.0 + 2.0 * poisson_ratio) * pressure - straight, -side * xy])
@@ -77,7 +98,7 @@ def _integrated(
     lengths: tuple[float, float],
     count: int,
     parts: tuple[Part, Part],
-    sign: float,
+    signs: tuple[float, float],
     weight: Callable[[Array, Array], Array],
 ) -> Array:
     """Integrate over a quarter of all shifts between two points of the rectangle.
@@ -86,8 +107,8 @@ def _integrated(
         lengths: Sides of the rectangle [mm].
         count: Modes along a side.
         parts: Factors that depend on the shift along x, and along y.
-        sign: 1 for the parts of both that keep their value with the sign of the shift, −1 for those
-            that change theirs.
+        signs: 1 for the part along x that keeps its value with the sign of the shift, −1 for the
+            one that changes it; the same along y.
         weight: Function of the shift's direction (cos, sin), times 1/ρ.
 
     Returns:
@@ -103,9 +124,9 @@ def _integrated(
         w, others = gauss_points(np.array([0.0, steep]), count + 12)
         direction = 1.0 / np.cosh(w), np.tanh(w)
         others = others * weight(*(reversed(direction) if flip else direction))
-        first = _part(parts[along](s, lengths[along], count), sign) * weights[:, None, None]
+        first = _part(parts[along](s, lengths[along], count), signs[along]) * weights[:, None, None]
         t = np.multiply.outer(s, np.sinh(w))
-        second = _part(parts[across](t.ravel(), lengths[across], count), sign)
+        second = _part(parts[across](t.ravel(), lengths[across], count), signs[across])
         second = np.einsum("w,swkl->skl", others, second.reshape(*t.shape, count, count))
         part = np.tensordot(first, second, axes=(0, 0))  # k, k', l, l'
         total += part.transpose(2, 0, 3, 1) if flip else part.transpose(0, 2, 1, 3)

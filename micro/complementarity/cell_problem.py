@@ -43,6 +43,8 @@ class ContactPressures(NamedTuple):
         iterations: Products of the compliance with pressures.
         by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None where that
             is not known.
+        nearby: Interferences of solutions nearby, less what finite slopes add, and what these add,
+            shape (nx, ny) [mm].
     """
 
     pressure: Array
@@ -50,6 +52,7 @@ class ContactPressures(NamedTuple):
     residual: float = 0.0
     iterations: int = 0
     by_slopes: Array | None = None
+    nearby: tuple[tuple[Array, Array], ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

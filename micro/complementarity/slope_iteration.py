@@ -10,13 +10,14 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.solver import solve_on_surface
-from support.arrays import Array
+from support.arrays import Array, Flags
 from support.errors import NotConverged
 
 _MOST_SOLUTIONS = 30
@@ -44,40 +45,57 @@ _DEPENDENT = 1e-2
 
 
 class AndersonMixing:
-    """Fixed-point iteration x ← x + r(x), extrapolated from the last few residuals r.
+    """Fixed-point iteration x ← u(d − x), extrapolated along the last few changes of u.
+
+    u is what finite slopes add where bodies of an interference y = d − x touch: a function of y
+    alone, whatever the load. Solutions of other loads therefore tell how it changes, too.
+
+    Args:
+        known: Interferences y of solutions nearby and u there, shape (nx, ny) both [mm].
 
     Source:
-        Walker & Ni 2011, doi 10.1137/10078356X, eq. 2.1 in the form of differences.
+        Walker & Ni 2011, doi 10.1137/10078356X, eq. 2.1 in the form of differences, which are
+        those of u(y) + y here.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, known: Sequence[tuple[Array, Array]] = ()) -> None:
         self._last: tuple[Array, Array] | None = None
-        self._steps: list[tuple[Array, Array]] = []
+        self._changes: list[tuple[Array, Array]] = []
+        for pair in known:
+            self._add(*pair)
 
-    def next(self, point: Array, residual: Array) -> Array:
+    def next(self, point: Array, interference: Array, moved: Array, where: Flags) -> Array:
         """Return the next point.
 
         Args:
-            point: Where the iteration is, of any shape.
-            residual: What a plain step would change, of the same shape.
+            point: Where the iteration is, x.
+            interference: y there, with the free motions of the body.
+            moved: u there.
+            where: The cells that touch, whose interferences count.
         """
-        if self._last is not None:
-            step, change = point - self._last[0], residual - self._last[1]
-            size = float(np.linalg.norm(change))
-            if 0.0 < size <= _NOISE * float(np.linalg.norm(step)):
-                pair = step / size, change / size  # they shrink by orders of magnitude
-                self._steps = [*self._steps, pair][-_MEMORY:]
-        self._last = point, residual
-        moved = point + residual
-        if not self._steps:
+        self._add(interference, moved)
+        residual, moves, columns = (moved - point)[where], [], []
+        for change, move in self._changes:
+            column = change[where] + move[where]
+            size = float(np.linalg.norm(column))
+            if 0.0 < size <= _NOISE * float(np.linalg.norm(change[where])):
+                moves.append(move / size)  # they differ by orders of magnitude
+                columns.append(column / size)
+        if not columns:
             return moved
-        changes = np.stack([change.ravel() for _, change in self._steps])
         # least squares by the normal equations: the changes are few, and their lengths are 1
-        products = np.linalg.pinv(changes @ changes.T, _DEPENDENT**2, hermitian=True)
-        shares = products @ (changes @ residual.ravel())
-        for share, (step, change) in zip(shares, self._steps, strict=True):
-            moved = moved - share * (step + change)
+        matrix = np.stack(columns)
+        products = np.linalg.pinv(matrix @ matrix.T, _DEPENDENT**2, hermitian=True)
+        for share, move in zip(products @ (matrix @ residual), moves, strict=True):
+            moved = moved - share * move
         return moved
+
+    def _add(self, interference: Array, moved: Array) -> None:
+        """Add a solution."""
+        if self._last is not None:
+            change = interference - self._last[0], moved - self._last[1]
+            self._changes = [*self._changes, change][-_MEMORY:]
+        self._last = interference, moved
 
 
 def solve_contact(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
@@ -97,6 +115,8 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
     if not compliance.slopes:
         return solve_on_surface(problem, start)
     mixing, displaced, first = AndersonMixing(), np.zeros(interference.shape), _FIRST
+    if start is not None and not problem.motions.count:
+        mixing = AndersonMixing(start.nearby)
     if start is not None and start.pressure.any():
         known = start.by_slopes
         displaced = compliance.slope_displacement(start.pressure) if known is None else known
@@ -132,7 +152,7 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
             return found._replace(residual=max(solution.residual, left))
         rate = min(1.0, _CAUTION * left / before) if 0.0 < before < np.inf else _AHEAD
         ahead = rate * left + _BY_SLOPES * solution.residual
-        displaced = mixing.next(displaced, change)
+        displaced = mixing.next(displaced, nearer - displaced, displaced + change, touching)
         accuracy = max(tolerance, min(_FIRST, ahead, _PART * left)) if ahead > least else tolerance
     raise NotConverged(
         "the displacements by finite slopes",

@@ -64,7 +64,7 @@ def solve_on_surface(problem: CellProblem, start: ContactPressures | None) -> Co
         return _solve_under_force(problem, start)
     if interference.max() <= 0.0:
         return ContactPressures(np.zeros(interference.shape))
-    return _solve_growing(problem, _place(problem, interference > 0.0), pressure)
+    return _solve_growing(problem, place_of(problem, interference > 0.0), pressure)
 
 
 def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
@@ -82,7 +82,7 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
         most = _MARGIN * (float(solution.motion[0]) + top)
     while True:
         least = min(top - most, np.nextafter(top, -np.inf), _bearing(problem))
-        place = _place(problem, interference > least)
+        place = place_of(problem, interference > least)
         solution = _solve_growing(problem, place, first)
         approach, used = float(solution.motion[0]) + top, used + solution.iterations
         if approach <= most or _is_whole(place, interference):
@@ -108,10 +108,10 @@ def touches_few_cells(problem: CellProblem) -> bool:
         problem: The contact problem.
     """
     touchable = problem.interference > 0.0
-    return not touchable.any() or not isinstance(_place(problem, touchable)[0], slice)
+    return not touchable.any() or not isinstance(place_of(problem, touchable)[0], slice)
 
 
-def _place(problem: CellProblem, touchable: Flags) -> Place:
+def place_of(problem: CellProblem, touchable: Flags) -> Place:
     """Return where to solve: the rows and columns of few cells, or a box around many.
 
     The depths that few cells lie within come in steps: their matrix serves loads nearby, too.
@@ -135,6 +135,18 @@ def _place(problem: CellProblem, touchable: Flags) -> Place:
     return row[:, None], column[:, None]
 
 
+def on_place(problem: CellProblem, place: Place) -> CellProblem:
+    """Return the problem of the cells of a place, which carry all loads.
+
+    Args:
+        problem: The contact problem of all cells of a surface.
+        place: The place, see `place_of`.
+    """
+    if isinstance(place[0], slice):
+        return problem.on(place)
+    return problem.among(np.ravel_multi_index(place, problem.interference.shape).ravel())
+
+
 def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:
     """Solve on some cells, and on more while cells outside are lifted into contact."""
     solution = _solve_on(problem, place, start)
@@ -144,7 +156,7 @@ def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> C
         if not larger.any():
             break
         larger[place] = True  # what touched once may touch again
-        place = _place(problem, larger)
+        place = place_of(problem, larger)
         again = _solve_on(problem, place, solution.pressure)
         solution = again._replace(iterations=solution.iterations + again.iterations)
     return solution
@@ -167,7 +179,7 @@ def _lifted(problem: CellProblem, place: Place, interference: Array, pressure: A
 def _solve_on(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:
     """Solve on some cells; where there is no start and they are many, from coarser grids."""
     shape, few = problem.interference.shape, not isinstance(place[0], slice)
-    part = problem.among(np.ravel_multi_index(place, shape).ravel()) if few else problem.on(place)
+    part = on_place(problem, place)
     known = None if start is None else start[place].copy()  # the search overwrites it
     if known is None or not known.any():
         known = _even_pressure(part) if few else nested_start(part)

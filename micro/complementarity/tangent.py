@@ -19,13 +19,13 @@ import numpy as np
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.conjugate_gradients import ContactCells
-from micro.complementarity.solver import box_around
+from micro.complementarity.solver import on_place, place_of
 from support.arrays import Array
 
 _RESIDUAL = 3e-4
 """Largest error of the displacements relative to the approach. That of the sum is its square."""
 _FORCING = 1e-2
-"""Part of the present error that a solution leaves; finite slopes change by as much in a pass."""
+"""Part of the present error that a solution of the elastic body leaves."""
 _MOST_PASSES, _MOST_ITERATIONS = 12, 100
 
 
@@ -43,23 +43,35 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
     moving = pressure > 0.0
     if not moving.any():
         return 0.0, 0
-    whole = problem.compliance.periodic
-    box = box_around(moving | (problem.interference > 0.0) | whole)
-    part, flat = problem.on(box), np.flatnonzero(moving[box])
-    shape = part.interference.shape
+    place = place_of(problem, moving | (problem.interference > 0.0))
+    part, flat = on_place(problem, place), np.flatnonzero(moving[place])
+    shape, used = part.interference.shape, part.grid.products
     contact = ContactCells(part.grid, Cells.of(flat, shape), part.motions.modes_of(flat))
-    rate = np.zeros(pressure.shape)
-    left = np.ones(len(flat))
-    for _ in range(_MOST_PASSES):
-        stop = max(_FORCING * float(np.abs(left).max()), 0.25 * _RESIDUAL)
-        change = np.zeros(shape)
-        change.ravel()[flat] = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
-        rate[box] += change
-        moved = part.grid.displacement(rate[box])
+
+    def displacement(change: Array) -> Array:
+        """Return the displacements of the moving cells by a change of their pressures."""
+        everywhere, here = np.zeros(pressure.shape), np.zeros(shape)
+        here.ravel()[flat] = change
+        moved = part.grid.displacement(here).ravel()[flat]
         if problem.compliance.slopes:
-            moved += problem.compliance.slope_rate(pressure, rate)[box]
-        left = 1.0 - moved.ravel()[flat]
-        if float(np.abs(contact.balanced(left)).max()) <= _RESIDUAL:
-            rates = rate[box].ravel()[flat]
-            return float(rates.sum() + rates @ left), part.grid.products
-    return np.nan, part.grid.products
+            everywhere[moving] = change
+            moved += problem.compliance.slope_rate(pressure, everywhere)[moving]
+        return moved
+
+    # conjugate gradients; solutions of the elastic body without finite slopes precondition them
+    left = np.ones(len(flat))
+    rate, direction, answer = np.zeros((3, len(flat)))
+    before = np.inf
+    for _ in range(_MOST_PASSES):
+        size = float(np.abs(contact.balanced(left)).max())
+        if size <= _RESIDUAL:
+            return float(rate.sum() + rate @ left), part.grid.products - used
+        stop = max(_FORCING * size, 0.25 * _RESIDUAL)
+        step = contact.close(-left, stop=stop, limit=_MOST_ITERATIONS)
+        direction = step - float(step @ answer) / before * direction
+        answer = displacement(direction)
+        before = float(direction @ answer)
+        length = float(direction @ left) / before
+        rate += length * direction
+        left = left - length * answer
+    return np.nan, part.grid.products - used

@@ -21,7 +21,7 @@ import numpy as np
 
 from micro.boundary_elements.extension import Extension
 from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.tangential_grid import TangentialGrid
+from micro.friction.tangential_grid import BodyGrid, TangentialGrid
 from support.arrays import Array
 
 
@@ -48,7 +48,9 @@ class FreeInverse:
 
     accurate = True
 
-    def __init__(self, grid: TangentialGrid, cells: Cells, normal: Array, stiffness: Array) -> None:
+    def __init__(
+        self, grid: TangentialGrid | BodyGrid, cells: Cells, normal: Array, stiffness: Array
+    ) -> None:
         self._normal, self._inverse = normal, grid.inverse
         slips, own = normal.any(axis=0), grid.self_compliance
         self._known = np.where(slips, own / (own + stiffness), 1.0)

@@ -1,27 +1,31 @@
 """Friction of a rough surface on a half-space: shear step by step, under given pressures.
 
-Pressures come from the normal contact, which shear leaves as it is: exactly so for like bodies, and
-by Goodman's assumption for others (`micro.friction.goodman`). A load step follows the slip of the
-one before. Cells that touch anew begin without traction: before they touched, they followed the
-body that they are on.
+Pressures come from the normal contact, which shear leaves as it is: exactly so for like
+half-spaces, and by Goodman's assumption for others (`micro.friction.goodman`), unless both are
+solved in turn (`micro.friction.coupled`). A load step follows the slip of the one before. Cells
+that touch anew begin without traction: before they touched, they followed the body that they are
+on.
 
 Theory: docs/theory.md, section 15.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from geometry.materials import MaterialPair
 from geometry.shear_state import ShearControl, ShearState
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.traction_modes import TractionModes, TractionsOnCells
 from micro.complementarity.rigid_motions import Box
 from micro.complementarity.solver import box_around
 from micro.friction.goodman import CrossCompliance, NeglectedCoupling, variation
 from micro.friction.stick_slip import FreeTractions, solve_tractions
-from micro.friction.tangential_grid import TangentialGrid, tangential_grid
+from micro.friction.tangential_grid import BodyGrid, TangentialGrid, tangential_grid
 from micro.friction.traction_problem import TractionProblem
 from support.arrays import Array, Flags
 from support.cores import blas_threads
@@ -49,6 +53,9 @@ class FrictionModel:
             half-space is not determined: shifts count from the mean of the displaced surface.
         tolerance: Largest residual of a solution: it is exact for a shift that varies from cell to
             cell by no more than this part.
+        body: What a finite body adds to the half-space; a half-space when not given.
+        coupled: Whether pressures displace the surface sideways, and tractions across; otherwise
+            both are neglected.
 
     Raises:
         InputError: When coefficient or tolerance are not positive.
@@ -59,6 +66,8 @@ class FrictionModel:
     spacing: tuple[float, float]
     periodic: bool = False
     tolerance: float = 1e-6
+    body: TractionModes | None = None
+    coupled: bool = False
 
     def __post_init__(self) -> None:
         for what in ("coefficient", "tolerance"):
@@ -138,10 +147,9 @@ class FrictionModel:
             NotConverged: When the tractions of that are not found.
         """
         beta, closed = self.materials.dundurs_beta, state.closed
-        if beta == 0.0 or not closed.any():
+        cross = self.cross((closed.shape[0], closed.shape[1]))
+        if cross is None or self.coupled or not closed.any():
             return NeglectedCoupling(beta)
-        grid = closed.shape[0], closed.shape[1]
-        cross = CrossCompliance(grid, self.spacing, self.materials, periodic=self.periodic)
         sideways = cross.sideways(state.bound / self.coefficient)[:, closed]
         forces = (
             self._first_loading(state, np.zeros_like(sideways)),
@@ -192,11 +200,55 @@ class FrictionModel:
         """Return the box of cells that products are made on: around some, or a whole period."""
         return box_around(cells | self.periodic | ~cells.any())
 
-    def grid(self, box: Box) -> TangentialGrid:
+    def grid(self, box: Box) -> TangentialGrid | BodyGrid:
         """Return the tangential compliance of the cells of a box."""
         counts = box[0].stop - box[0].start, box[1].stop - box[1].start
         ratio = self.materials.tangential_poisson_ratio
-        return tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+        found = tangential_grid(counts, self.spacing, poisson_ratio=ratio, periodic=self.periodic)
+        return found if self.body is None else BodyGrid(found, self._on(self.body, box))
+
+    def _on(self, body: TractionModes, box: Box) -> TractionsOnCells:
+        """Return what a body adds on the cells of a box."""
+        x, y = (
+            step * np.arange(part.start, part.stop + 1)
+            for part, step in zip(box, self.spacing, strict=True)
+        )
+        return body.on(x, y, modulus=self._modulus)
+
+    def cross(self, grid: tuple[int, int]) -> CrossCompliance | None:
+        """Return what couples pressures and tractions on all cells; None where nothing does.
+
+        Args:
+            grid: Numbers of cells (nx, ny) of the surface.
+        """
+        if self.body is None and self.materials.dundurs_beta == 0.0:
+            return None
+        return self._cross_on(grid)
+
+    @cached_property
+    def _cross_on(self) -> Callable[[tuple[int, int]], CrossCompliance]:
+        return lru_cache(maxsize=2)(self._make_cross)
+
+    def _make_cross(self, grid: tuple[int, int]) -> CrossCompliance:
+        whole = slice(0, grid[0]), slice(0, grid[1])
+        body = None if self.body is None else self._on(self.body, whole)
+        return CrossCompliance(
+            grid, self.spacing, self.materials, periodic=self.periodic, body=body
+        )
+
+    def sideways(self, bound: Array) -> Array:
+        """Return the displacements along the surface by pressures, 0 where they are neglected.
+
+        Args:
+            bound: μ times the pressures, shape (nx, ny) [MPa].
+
+        Returns:
+            Shape (2, nx, ny) [mm].
+        """
+        cross = self.cross((bound.shape[0], bound.shape[1])) if self.coupled else None
+        if cross is None or not bound.any():
+            return np.zeros((2, *bound.shape))
+        return cross.sideways(bound / self.coefficient)
 
     @property
     def _modulus(self) -> float:
@@ -224,6 +276,7 @@ class _Step:
         self._box = model.box(closed | before.closed)
         self._grid = model.grid(self._box)
         self._cells, self._closed = _cells_in(closed, self._box), closed
+        self._sideways = model.sideways(bound)
         self._products = self._grid.products
 
     def solved(self, control: ShearControl) -> ShearState:
@@ -239,7 +292,7 @@ class _Step:
                 grid=self._grid,
                 cells=self._cells,
                 bound=self._of_cells(self._bound) / scale,
-                shift=prescribed[:, None] - slip_before,
+                shift=prescribed[:, None] - slip_before - self._of_cells(self._sideways),
                 force=force,
                 tolerance=model.tolerance,
             ),
@@ -278,13 +331,19 @@ class _Step:
         before = self._before
         anew = self._closed & ~before.closed
         slip = before.slip
-        if anew.any() and (any(before.shift) or before.traction.any()):
-            free = np.zeros_like(slip)
-            free[:, *self._box] = np.array(before.shift)[:, None, None] - self._displacement(
-                before.traction
-            )
+        moved = self._model.coupled and before.bound.any()
+        if anew.any() and (moved or any(before.shift) or before.traction.any()):
+            sideways = self._model.sideways(before.bound)
+            free = self._free(np.array(before.shift), before.traction, sideways)
             slip = np.where(anew, free, slip)
         return slip
+
+    def _free(self, shift: Array, traction: Array, sideways: Array) -> Array:
+        """Return the slip of cells of the box that bear no traction, shape (2, nx, ny) [mm]."""
+        free = np.zeros_like(traction)
+        box = self._box
+        free[:, *box] = shift[:, None, None] - self._displacement(traction) - sideways[:, *box]
+        return free
 
     def _dissipated(self, traction: Array, change: Array, shift: Array) -> float:
         """Return the energy that friction takes up in the step [N mm].
@@ -297,8 +356,7 @@ class _Step:
         before, bound = self._before, self._bound
         parted = before.closed & ~self._closed
         if parted.any() and before.traction[:, parted].any():
-            free = np.zeros_like(change)
-            free[:, *self._box] = shift[:, None, None] - self._displacement(traction)
+            free = self._free(shift, traction, self._sideways)
             change = np.where(parted, free - before.slip, change)
         ratio = np.divide(before.bound, bound, out=np.ones_like(bound), where=bound > before.bound)
         own = 0.5 * (1.0 + ratio) * (traction * change).sum(axis=0)

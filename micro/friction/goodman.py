@@ -6,7 +6,8 @@ sideways. With Dundurs' β the difference is
     u = −(β/(π E*)) ∫ p d/ρ² dA,    u_z = (β/(π E*)) ∫ q·d/ρ² dA,
 
 d from the load to the point. Neglecting both separates the normal contact from shear (Goodman
-1962). They are evaluated at a solution without them, to know their size.
+1962). They are evaluated at a solution without them, to know their size; or both problems are
+solved in turn until they agree (`micro.friction.coupled`). A finite body adds a term to both.
 
 Theory: docs/theory.md, section 15.
 """
@@ -19,6 +20,7 @@ import numpy as np
 from scipy import fft
 
 from geometry.materials import MaterialPair
+from micro.boundary_elements.traction_modes import TractionsOnCells
 from support.arrays import Array
 from support.cores import cores
 
@@ -51,6 +53,7 @@ class CrossCompliance:
         spacing: Sides of a cell [mm].
         materials: The two bodies.
         periodic: Whether loads continue periodically.
+        body: What a finite body adds, on these cells, for loads over E*; none when not given.
     """
 
     def __init__(
@@ -60,7 +63,9 @@ class CrossCompliance:
         materials: MaterialPair,
         *,
         periodic: bool,
+        body: TractionsOnCells | None = None,
     ) -> None:
+        self._body, self._modulus = body, materials.contact_modulus
         self._shown = tuple(slice(count) for count in grid)
         self._shape = grid if periodic else tuple(2 * count for count in grid)
         waves = _waves if periodic else _padded_waves
@@ -68,7 +73,10 @@ class CrossCompliance:
 
     def sideways(self, pressure: Array) -> Array:
         """Return the displacements along the surface by pressures [MPa], shape (2, nx, ny) [mm]."""
-        return np.stack([self._convolved(-one, pressure) for one in self._waves])
+        moved = np.stack([self._convolved(-one, pressure) for one in self._waves])
+        if self._body is not None:
+            moved += self._body.sideways(pressure / self._modulus)
+        return moved
 
     def across(self, tractions: Array) -> Array:
         """Return the displacements into the body by tractions, shape (nx, ny) [mm].
@@ -76,9 +84,10 @@ class CrossCompliance:
         Args:
             tractions: The tractions, shape (2, nx, ny) [MPa].
         """
-        return self._convolved(self._waves[0], tractions[0]) + self._convolved(
-            self._waves[1], tractions[1]
-        )
+        moved = sum(map(self._convolved, self._waves, tractions))
+        if self._body is not None:
+            moved = moved + self._body.across(tractions / self._modulus)
+        return np.asarray(moved)
 
     def _convolved(self, kernel: Array, field: Array) -> Array:
         loaded = fft.rfft2(field, s=self._shape, workers=cores())

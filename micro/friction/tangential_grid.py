@@ -21,6 +21,7 @@ import numpy as np
 from scipy import fft
 
 from micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
+from micro.boundary_elements.traction_modes import TractionsOnCells
 from micro.closed_forms.love import corner_parts
 from support.arrays import Array, Indices
 from support.cores import BLOCK, blocks, cores, in_threads
@@ -268,6 +269,52 @@ def _inverted(waves: Array) -> Field:
     xx, yy = xx.copy(), yy.copy()
     xx[0, 0] = yy[0, 0] = waves[:2].max()
     return np.asarray(np.stack([yy, xx, -xy]) / (xx * yy - xy**2), np.float32)
+
+
+class BodyGrid:
+    """Tangential compliance of a grid of cells on a finite body; used as a `TangentialGrid`.
+
+    Preconditioners take the half-space alone: what a body adds is smooth.
+
+    Args:
+        half_space: The half-space.
+        body: What the body adds.
+    """
+
+    def __init__(self, half_space: TangentialGrid, body: TractionsOnCells) -> None:
+        self._half_space, self._body = half_space, body
+        self.grid, self.self_compliance = half_space.grid, half_space.self_compliance
+        self.inverse = half_space.inverse
+        self._last: tuple[Cells, TractionsOnCells, Indices, int] | None = None
+
+    @property
+    def products(self) -> int:
+        """Products with tractions so far."""
+        return self._half_space.products
+
+    def displacement(self, tractions: Array) -> Array:
+        """Return the displacements of all cells; see `TangentialGrid.displacement`."""
+        return self._half_space.displacement(tractions) + self._body.displacement(tractions)
+
+    def displacement_of(self, cells: Cells, tractions: Array) -> Array:
+        """Return the displacements of some cells; see `TangentialGrid.displacement_of`."""
+        return self._half_space.displacement_of(cells, tractions) + self._of_body(cells, tractions)
+
+    def roughly(self, cells: Cells, tractions: Array) -> Array:
+        """Return the same in single precision."""
+        return self._half_space.roughly(cells, tractions) + self._of_body(cells, tractions)
+
+    def _of_body(self, cells: Cells, tractions: Array) -> Array:
+        """Return what the body adds, on the rows and columns of the cells alone."""
+        if self._last is None or self._last[0] is not cells:
+            columns, column = np.unique(cells.column, return_inverse=True)
+            place = cells.row * len(columns) + column.ravel()
+            self._last = cells, self._body.among(cells.rows, columns), place, len(columns)
+        _, body, place, count = self._last
+        some = np.zeros((2, len(cells.rows) * count))
+        some[:, place] = tractions
+        moved = body.displacement(some.reshape(2, -1, count))
+        return np.asarray(moved.reshape(2, -1)[:, place])
 
 
 tangential_grid = lru_cache(maxsize=4)(TangentialGrid)

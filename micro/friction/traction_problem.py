@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.tangential_grid import TangentialGrid
+from micro.friction.tangential_grid import BodyGrid, TangentialGrid
 from support.arrays import Array, Flags
 
 AT_BOUND = 1e-12
@@ -47,7 +47,7 @@ class TractionProblem:
         tolerance: Largest residual of a solution.
     """
 
-    grid: TangentialGrid
+    grid: TangentialGrid | BodyGrid
     cells: Cells
     bound: Array
     shift: Array

@@ -56,10 +56,10 @@ class HalfSpaceModel:
         periodic: Whether surface and pressures continue periodically. The mean displacement of
             a periodic half-space is not determined: displacements, and so the approach, count
             from the mean of the displaced surface.
-        tolerance: Largest residual of a solution, which bounds the error of the force: this is
-            exact for a surface whose heights differ by the residual times the largest interference
-            at most. On a random surface of 256² cells the force erred by 5e-10 with 1e-8, and by
-            1e-13 with 1e-10.
+        tolerance: Largest residual of a solution, which bounds the error of the force: the force
+            is exact for a surface whose heights differ from these by at most the residual times the
+            largest interference. On a random surface of 256² cells the force erred by 5e-10 with
+            1e-8, and by 1e-13 with 1e-10.
         highest: Height z_M that the approach counts from [mm], such as that of the surface that
             this one was resampled from; the surface's own when not given.
         sides: Free sides of the surface's rectangle, which soften the half-space near them; none
@@ -68,12 +68,12 @@ class HalfSpaceModel:
         slopes: What the finite slopes of the surface add, or those of each of two bodies, on the
             cells of the surface; the theory of small slopes when not given.
         hardness: Hardness of the softer body, the largest pressure [MPa]; contacts are elastic
-            when not given. Where cells bear it, what interference is left is plastic depth.
+            when not given. The interference left where cells carry it is plastic depth.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
             surface that is not periodic or has free sides, the free sides are not those of the
-            surface, or this is steeper than any.
+            surface, or its rms gradient exceeds 2.
 
     Source:
         Polonsky & Keer 1999, doi 10.1016/S0043-1648(99)00113-1.
@@ -154,7 +154,7 @@ class HalfSpaceModel:
         tilt: tuple[float, float] = (0.0, 0.0),
         start: Start | None = None,
     ) -> ContactState:
-        """Solve the contact at one approach of the plane: `press` in short.
+        """Solve the contact at one approach of the plane: short for `press`.
 
         Args:
             approach: Rigid approach δ at the centre of the rectangle [mm].
@@ -170,7 +170,7 @@ class HalfSpaceModel:
         tilt: tuple[float, float] | None = (0.0, 0.0),
         start: Start | None = None,
     ) -> ContactState:
-        """Solve the contact under one normal force: `press` in short.
+        """Solve the contact under one normal force: short for `press`.
 
         Args:
             force: Normal force, ≥ 0 [N]; beyond full contact of a periodic surface too.
@@ -186,12 +186,21 @@ class HalfSpaceModel:
         patches: PatchGrid | None = None,
         mean_heights: ArrayLike | None = None,
         start: Start | None = None,
+        displaced: Array | None = None,
     ) -> ContactState:
         """Solve the contact and the free motions of the plane as one; see `MicroModel.press`.
 
         Pressure, area and displacement of a cell that straddles a border of patches are shared by
         area; force and area outside of all patches count for the nearest. Under a hardness the
         surface has the plastic depth of the start.
+
+        Args:
+            control: What is prescribed.
+            patches: Partition that results are summed over.
+            mean_heights: Mean height of each patch, shape (N,) [mm].
+            start: What the solution may start from.
+            displaced: What other loads than pressures displace the surface by, into the body, shape
+                (nx, ny) [mm]; nothing when not given.
 
         Raises:
             InputError: Also when a periodic surface is pressed to full contact or by a tilted
@@ -206,11 +215,13 @@ class HalfSpaceModel:
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
-        solved, plane = self._solved(control, start, depth)
+        solved, plane = self._solved(control, start, depth, displaced)
         yielding, pressure = solved.pressure >= self._bound, solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
         displacement = self._displacement(pressure, solved.by_slopes)
+        if displaced is not None:
+            displacement = displacement + displaced
         state = ContactState(
             plane=plane,
             patches=patches,
@@ -248,7 +259,7 @@ class HalfSpaceModel:
             depth: Plastic depth by which the heights are lower, shape (nx, ny) [mm]; None: none.
 
         Returns:
-            Negative where they are apart, shape (nx, ny) [mm].
+            The interference, shape (nx, ny) [mm]; negative where there is a gap.
         """
         surface = self.surface
         below = self.reference_height - surface.heights
@@ -259,9 +270,9 @@ class HalfSpaceModel:
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`.
 
-        It is the elastic one, by a linear solution, unless cells yield anew. Then other cells keep
-        entering that soon bear the whole hardness. The derivative for a fixed set of cells leaves
-        them out, so that the plane is taken back by finite increments.
+        It follows from a linear solution, unless cells yield further. Then the plane is withdrawn
+        by finite increments, because cells keep entering that soon carry the hardness, which the
+        derivative for a fixed set of cells leaves out.
         """
         largest = float(self.interference(state.plane, state.earlier_depth).max())
         if not self._yields_anew(state, largest):
@@ -307,22 +318,37 @@ class HalfSpaceModel:
         )
 
     def _solved(
-        self, control: Control, start: Start | None, depth: Array | None
+        self,
+        control: Control,
+        start: Start | None,
+        depth: Array | None,
+        displaced: Array | None = None,
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return pressures / E* and the plane, on a surface with a plastic depth."""
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
+        if displaced is not None:
+            interference = interference - displaced
         if self.periodic:
             self._check_periodic(control, interference)
         problem, first = self._problem(interference, control.free, control.loads), None
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
+            nearby = () if displaced is not None else self._nearby(start)
+            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         with blas_threads(1):  # all cores are taken by threads of ours
             solved = solve_contact(problem, first)
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
+
+    def _nearby(self, start: Start) -> tuple[tuple[Array, Array], ...]:
+        """Return what finite slopes add at solutions, and at which interferences; as pairs."""
+        return tuple(
+            (self.interference(one.plane) - one.by_slopes, one.by_slopes)
+            for one in start.nearby or (start,)
+            if one.by_slopes is not None and one.plastic_depth is None
+        )
 
     def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""
@@ -338,6 +364,9 @@ class HalfSpaceModel:
         free = np.array([False, turns, turns])
         interference = self.interference(state.plane, state.earlier_depth)
         problem = self._problem(interference, free, np.zeros(3))
+        if state.by_slopes is not None:
+            lowered = state.by_slopes
+            problem = replace(problem, interference=interference - lowered, lowered=lowered)
         with blas_threads(1):
             rate, products = approach_stiffness(problem, state.pressures / self.contact_modulus)
         return rate * self.contact_modulus * float(np.prod(self.surface.spacing)), products

@@ -15,9 +15,17 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import cast
 
-from multiscale.auto.bodies import OpenMeshes, as_quadratic
 from multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
-from multiscale.auto.rule import TRIALS, Errors, Share, Tally, refinement, scaled
+from multiscale.auto.rule import (
+    TRIALS,
+    Errors,
+    OpenMeshes,
+    Share,
+    Tally,
+    as_quadratic,
+    refinement,
+    scaled,
+)
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.representative import RepresentativeCoupling
 from multiscale.law_errors import MOST_CHECKED_UNKNOWNS, OF_LINEAR, OF_QUADRATIC

@@ -18,7 +18,6 @@ from typing import Any, cast
 
 from geometry.zero import Zero
 from micro import HalfSpaceModel
-from multiscale.auto.bodies import OpenMeshes, as_quadratic
 from multiscale.auto.keys import (
     MOST_HEIGHTS,
     auto_keys,
@@ -27,7 +26,17 @@ from multiscale.auto.keys import (
     on_waves,
     with_value,
 )
-from multiscale.auto.rule import TRIALS, Errors, Grid, Share, Tally, refinement, scaled
+from multiscale.auto.rule import (
+    TRIALS,
+    Errors,
+    Grid,
+    OpenMeshes,
+    Share,
+    Tally,
+    as_quadratic,
+    refinement,
+    scaled,
+)
 from multiscale.auto.samples import SampleSearch
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
@@ -40,7 +49,7 @@ from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import ZERO, ErrorProbe
-from multiscale.results.notes import relative_error
+from multiscale.results.accuracy import relative_error
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone
 from support.errors import InputError, NotConverged

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import InputError, MaterialPair, PatchGrid, Surface
+from geometry import MaterialPair, PatchGrid, Surface
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
@@ -146,13 +146,6 @@ class Bodies:
             first = BlockTerms.of(shape, parts.materials.first, sides, side_term=side_term)
         if self.counter is None:
             return first
-        if first.margin:
-            raise InputError(
-                "a block with a margin has no smooth modes in common with a counter-body on a mesh",
-                key="block.margin",
-                value=first.margin,
-                allowed="0; or both bodies from meshes",
-            )
         second = MeshTerms.of(self.counter, lengths, side_term=False, behind=True)
         return PairTerms(first=first, second=second)
 

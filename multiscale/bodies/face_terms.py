@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -23,9 +23,11 @@ from micro import (
     BodyStresses,
     FreeSides,
     SurfaceStress,
+    TractionModes,
     coarse_grid,
     half_space_modes,
     half_space_stress_modes,
+    half_space_traction_modes,
     influence_matrix,
     side_modes,
     side_stress_modes,
@@ -128,6 +130,19 @@ class FaceTerms(ABC):
         if count <= _KEPT_MODES:
             self._faces[count] = found
         return found
+
+    def traction_term(self, comm: Any) -> TractionModes | None:
+        """Return what the body adds to a half-space under tractions; None where it is not known.
+
+        Free sides are part of it.
+
+        Args:
+            comm: MPI communicator; None for this process alone.
+
+        Note:
+            Collective.
+        """
+        return None
 
     @abstractmethod
     def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
@@ -295,3 +310,13 @@ class BlockTerms(FaceTerms):
         return face_compliance(
             self.lengths, shape.height, self.material, self.sides, count, comm, use_cache=True
         )
+
+    def traction_term(self, comm: Any) -> TractionModes:
+        """Return what the block adds to a half-space under tractions; see `FaceTerms`."""
+        from macro import face_tractions
+
+        shape, count = self.shape, min(replace(self, side_term=None).modes, _KEPT_MODES)
+        whole = face_tractions(self.lengths, shape.height, self.material, self.sides, count, comm)
+        without = half_space_traction_modes(self.lengths, self.material.poisson_ratio, count)
+        matrix = whole - without / self.material.contact_modulus
+        return TractionModes(self.lengths, matrix, (-self.margin, -self.margin))

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from geometry import Material, PatchGrid
-from micro import FreeSides, RectangleFields
+from geometry import Material, PatchGrid, Surface
+from micro import BodyModes, FreeSides, RectangleFields, SurfaceStress
 from multiscale.bodies.face_terms import (
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
@@ -159,6 +159,24 @@ class MeshTerms(FaceTerms):
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BothFaces:
+    """Compliances of the faces of two bodies in modes.
+
+    Args:
+        first: That of the body.
+        second: That of the counter-body, in the coordinates of the first one.
+    """
+
+    first: FaceCompliance
+    second: FaceCompliance
+
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return max(self.first.count, self.second.count)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PairTerms(FaceTerms):
     """A body and a meshed counter-body on the other side of the contact.
@@ -186,8 +204,8 @@ class PairTerms(FaceTerms):
 
     @property
     def lengths(self) -> tuple[float, float]:
-        """Sides of the rectangle that the modes cover [mm]."""
-        return self.first.lengths
+        """Sides of the contact, which the modes of both together cover [mm]."""
+        return self.second.lengths
 
     @property
     def modes(self) -> int:
@@ -201,14 +219,24 @@ class PairTerms(FaceTerms):
             share += contact_modulus / self.second.material.contact_modulus
         return share
 
-    def _solved_face(self, comm: Any, count: int) -> FaceCompliance:
-        """Solve for the compliance of the first body, and what the other adds to a half-space."""
-        face = self.first.face(comm, modes=count)
-        other = self._behind.face(comm, modes=face.count)
-        term = self._behind.term(other)
-        rough = term.matrix if term.rough is None else term.rough
-        rough = (face.normal if face.rough is None else face.rough) + rough
-        return replace(face, normal=face.normal + term.matrix, rough=rough)
+    def term(self, face: Any, *, higher: float = 0.0) -> BodyModes:
+        """Return the body correction of both, in modes of the contact.
+
+        Args:
+            face: Compliance of both faces.
+            higher: Height that is added to the first body, see `FaceTerms.term`.
+        """
+        own = self.first.term(face.first, higher=higher).within(self.lengths)
+        return own.plus(self._behind.term(face.second))
+
+    def stresses(self, face: Any, surface: Surface) -> list[SurfaceStress]:
+        """Return the stresses in the face of the first body; see `FaceTerms.stresses`."""
+        return self.first.stresses(face.first, surface)
+
+    def _solved_face(self, comm: Any, count: int) -> Any:
+        """Solve for the compliances of both faces."""
+        first = self.first.face(comm, modes=count)
+        return BothFaces(first, self._behind.face(comm, modes=count))
 
     @property
     def _alike(self) -> bool:

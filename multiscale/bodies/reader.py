@@ -17,7 +17,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.inputs.bodies import BodyFacts, SceneBody
 from multiscale.inputs.loads import body_states
 from multiscale.inputs.surfaces import located
-from multiscale.loading.body_loads import BodyLoads
+from multiscale.loading.stages import BodyLoads
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.identity import content_digest
 from multiscale.scene.scene import Scene

@@ -8,7 +8,7 @@ import time
 import traceback
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from multiscale.console import quietly
 from multiscale.machine import (
@@ -19,12 +19,13 @@ from multiscale.machine import (
 )
 from multiscale.output import terminal
 from multiscale.restart.interruption import ended_if_told
-from multiscale.restart.results_folder import folder_name
-from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
 from support.packages import load_wheels_mpi, optional_packages
+
+if TYPE_CHECKING:
+    from multiscale.scene.scene import Scene
 
 _LONGEST_WAIT = 5.0  # for other ranks at the end of a command [s]
 _SOLVER_OPTIONS = ("-snes_", "-ksp_", "-pc_", "-mg_")
@@ -98,6 +99,9 @@ def scene_and_folder(
     Note:
         Collective.
     """
+    from multiscale.restart.results_folder import folder_name  # `help` and `schema` do without
+    from multiscale.scene.scene import Scene
+
     refuse_detached_processes()
 
     def read() -> tuple[Scene, Path]:

@@ -1,20 +1,36 @@
-"""The command ``patchlaw plan``."""
+"""The commands that plan a run, or make a part of it: plan, laws, surface."""
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
+from geometry.statistics import roughness
 from multiscale.cli.execution import scene_and_folder
+from multiscale.console import counting, following
+from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
-from multiscale.couplings.dispatch import load_finite_elements
+from multiscale.couplings.dispatch import coupling_class, load_finite_elements
+from multiscale.exports.export import export_texts, remove_exports
+from multiscale.figures.files import Drawing, file_kinds, write_figure
 from multiscale.inputs.memory import shortage_warnings
+from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
+from multiscale.observers.conductance import conducts_of
 from multiscale.output import terminal
+from multiscale.output.results import surface_drawing
+from multiscale.restart.results_folder import locked, refuse_other_results
+from multiscale.run import Run
+from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup
-from support.collective import on_root_alone, place_in
+from support.collective import on_root, on_root_alone, place_in
+from support.whole_files import write_text
 
 
 def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -48,3 +64,84 @@ def planned(scene: Scene, comm: Any) -> Coupling:
         Collective.
     """
     return make_setup(scene, comm, nodes=replace(cluster_nodes(comm), extensible=True))
+
+
+def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Tabulate the patch laws of a scene; write and draw them, and export them when asked to.
+
+    Exports of earlier laws in the folder are removed.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    with _own_folder(choice, comm) as (scene, folder):
+        coupling_class(scene).check_has_laws(scene)
+        run = Run(scene, comm)
+        terminal.show_plan(comm, run.coupling)
+        with following(comm) as (begun, _):
+            run.clock.observe = counting(begun)
+            run.make_laws()
+        table = run.laws
+        assert table is not None
+
+        def write() -> list[Path]:
+            conducts = conducts_of(run.coupling)
+            exports: dict[str, str] = {}
+            section = run.scene.friction
+            friction = None if section is None else section.coefficient
+            for name in choice.export:
+                exports |= export_texts(table, name, conducts=conducts, friction=friction)
+            files = [write_laws(folder / "laws.h5", table)]
+            kinds = file_kinds(run.scene.output.figures)
+            drawing = Drawing("laws", "figures.curves.law_figure", (table,), kinds)
+            files += write_figure(folder, drawing, lambda problem: run.remark([problem]))
+            remove_exports(folder)
+            for name, text in exports.items():
+                write_text(folder / name, text)
+            return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
+
+        terminal.show_files(comm, on_root(comm, write))
+    for note in run.history().notes:
+        terminal.say(comm, f"note: {note}")
+
+
+def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
+    """Describe and draw the surface of a scene.
+
+    Args:
+        choice: Parsed words of the command line.
+        options: PETSc options given by the user.
+        comm: MPI communicator; None for a process on its own.
+    """
+    with _own_folder(choice, comm) as (scene, folder):
+        coupling = planned(scene, comm)
+        terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
+        drawing, tell = surface_drawing(coupling), partial(terminal.say, None)
+        files = on_root(comm, lambda: write_figure(folder, drawing, tell))
+        terminal.show_files(comm, files)
+
+
+@contextmanager
+def _own_folder(choice: argparse.Namespace, comm: Any) -> Iterator[tuple[Scene, Path]]:
+    """Yield the scene and the locked folder of its results, which holds none of another scene."""
+    scene, folder = scene_and_folder(choice, comm)
+    with locked(folder, comm):
+        if not choice.overwrite:
+            on_root(comm, lambda: refuse_other_results(folder, identity(scene)))
+        yield scene, folder
+
+
+def _surface_facts(coupling: Coupling) -> list[tuple[str, str]]:
+    """Return statistics of a surface, each with its topic."""
+    rough, summits = roughness(coupling.surface), coupling.asperities
+    return [
+        ("surface", describe.surface(coupling)),
+        ("Sa, Sq, Sz", f"{1e3 * rough.sa:.4g}, {1e3 * rough.sq:.4g}, {1e3 * rough.sz:.4g} µm"),
+        ("Ssk, Sku, Sdq", f"{rough.ssk:.4g}, {rough.sku:.4g}, {rough.sdq:.4g}"),
+        ("m0, m2, m4", f"{rough.m0:.4g} mm², {rough.m2:.4g}, {rough.m4:.4g} 1/mm² (profile)"),
+        ("Nayak α", f"{rough.nayak:.3g} (profile), {rough.nayak_radial:.3g} (radial moments)"),
+        ("highest point", f"{1e3 * coupling.surface.highest:.6g} µm"),
+        ("summits", f"{summits.count}, border maxima {summits.border_x.size}"),
+    ]

@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from multiscale.cli.execution import scene_and_folder
+from multiscale.console import following, run_progress
 from multiscale.output import terminal
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import RunFigures, write_results
-from multiscale.progress import following, run_progress
 from multiscale.restart.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.restart.interruption import Interruption, Stopped, watching
 from multiscale.restart.results_folder import (
@@ -49,7 +49,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     begun("setting up the problem")
                     run = Run(scene, comm, None if kept is None else kept.resolved)
                 if kept is not None:
-                    run.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+                    run.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
                 terminal.show_plan(comm, run.coupling)
                 if notice:
                     terminal.say(comm, notice)

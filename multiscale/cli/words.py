@@ -156,7 +156,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     _add_scene(run)
     compare = command(
         "compare",
-        "compare.compare_scene",
+        "studies.compare_scene",
         "Run a scene in every sensible configuration; draw error against time.",
     )
     _add_scene(compare, ending=COMPARE_ENDING)
@@ -167,7 +167,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     compare.add_argument("--ranks", type=_removed_ranks, help=argparse.SUPPRESS)
     sweep = command(
         "sweep",
-        "sweep.sweep_scene",
+        "studies.sweep_scene",
         "Run a scene for many values of its keys; write all load steps and their statistics.",
     )
     _add_scene(sweep, ending=SWEEP_ENDING)
@@ -185,7 +185,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
 def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser]) -> None:
     """Add the commands that run no scene."""
     beside = "Set the results of two runs beside each other: curves, ratios with both errors."
-    diff = command("diff", "diff.diff_results", beside)
+    diff = command("diff", "studies.diff_results", beside)
     folders = "folder that patchlaw run wrote"
     diff.add_argument("first", metavar="RESULTS", type=Path, help=folders)
     diff.add_argument("second", metavar="RESULTS", type=Path, help="the other one")
@@ -205,19 +205,19 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     for name in ("--open", "-q"):
         plan.add_argument(name, action="store_true", dest="unused", help=_UNUSED)
     laws = "Tabulate the patch laws of a scene; write and draw them."
-    tabulate = command("laws", "laws.tabulate_laws", laws)
+    tabulate = command("laws", "plan.tabulate_laws", laws)
     _add_scene(tabulate)
     forms = f"write them for other programs too: {', '.join(FORMATS)}; may be given several times"
     choices: dict[str, Any] = {"choices": FORMATS, "metavar": "FORMAT", "default": []}
     tabulate.add_argument("--export", action="append", help=forms, **choices)
     surface = "Describe and draw the surface of a scene."
-    _add_scene(command("surface", "laws.describe_surface", surface))
+    _add_scene(command("surface", "plan.describe_surface", surface))
     command("schema", "keys.print_schema", "Print the JSON Schema of scene files.")
     keys = command("help", "keys.explain_keys", "Explain the sections and keys of a scene.")
     topic = "a section or a key, such as load or load.force; all sections by default"
     keys.add_argument("topic", nargs="?", metavar="KEY", help=topic)
     shells = "Print what lets a shell complete commands, options and keys of scenes."
-    complete = command("completion", "completion.print_completion", shells)
+    complete = command("completion", "keys.print_completion", shells)
     ways = 'bash or zsh; in its startup file: eval "$(patchlaw completion bash)"'
     complete.add_argument("shell", choices=("bash", "zsh"), help=ways)
     checks = "Check versions, MPI, threads, form compiler and memory; solve a small block."

@@ -15,6 +15,7 @@ from geometry.contact_state import ContactState, Start
 from geometry.patches import patch_means
 from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel, Stiffness
+from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel
 from micro.friction.goodman import NeglectedCoupling
 from multiscale.loading.load_history import LoadHistory
@@ -59,10 +60,9 @@ class ContactSolver(StepSolver):
         """Solve one load step; see `StepSolver.press`."""
 
         def solve() -> LoadStep:
-            state = self._pressed(control)
-            shear, products = self._shear, 0
-            if self._friction is not None and control.shear is not None:
-                shear = self._friction.advance(shear, state.pressures, control.shear)
+            state, shear = self._pressed(control)
+            products = 0
+            if shear is not None and control.shear is not None:
                 state, products = replace(state, shear=shear), shear.products
             self.latest, self._start, self._turns = state, state.start, control.tilt is None
             self._shear, self._last = shear, replace(control, shear=None)
@@ -83,14 +83,23 @@ class ContactSolver(StepSolver):
 
         return on_root_alone(self._comm, solve)
 
-    def _pressed(self, control: Control) -> ContactState:
-        """Solve the normal contact, unless shear alone changes."""
-        if control.shear is not None and self.latest is not None:
-            if self._last == replace(control, shear=None):
-                return replace(self.latest, iterations=0)
-        return self._model.press(
-            control, patches=self._patches, mean_heights=self._mean_heights, start=self._start
-        )
+    def _pressed(self, control: Control) -> tuple[ContactState, ShearState | None]:
+        """Solve the contact and its shear; the normal contact anew unless shear alone changes."""
+        friction, shear = self._friction, self._shear
+        options: dict[str, Any] = {
+            "patches": self._patches,
+            "mean_heights": self._mean_heights,
+            "start": self._start,
+        }
+        if friction is None or control.shear is None:
+            return self._model.press(control, **options), shear
+        if friction.coupled and isinstance(self._model, HalfSpaceModel):
+            return press_coupled(self._model, friction, control, shear, **options)
+        if self.latest is not None and self._last == replace(control, shear=None):
+            state = replace(self.latest, iterations=0)
+        else:
+            state = self._model.press(control, **options)
+        return state, friction.advance(shear, state.pressures, control.shear)
 
     def _of_cells(self) -> dict[str, Any]:
         """Return the energies at the latest load step, and what has yielded, where known."""

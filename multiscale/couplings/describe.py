@@ -11,8 +11,8 @@ from micro import MicroModel
 from multiscale.inputs.bodies import BodyFacts, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import heights_per_wave
-from multiscale.loading.body_loads import BodyLoads
 from multiscale.loading.load_history import LoadHistory
+from multiscale.loading.stages import BodyLoads
 from multiscale.readable import number, quantity
 from multiscale.scene.keys import bare_quantities
 from multiscale.scene.sections import MicroSection

@@ -122,18 +122,25 @@ class MicroCoupling(PressedSurface):
 
     def contact_solver(self, model: MicroModel) -> ContactSolver:
         """Return what solves the contact problem of a model of the surface."""
-        return ContactSolver(model, self.patches, self.mean_heights, self.comm, self.friction_model)
+        friction = None if self.has_laws else self.friction_model
+        return ContactSolver(model, self.patches, self.mean_heights, self.comm, friction)
 
-    @property
+    @cached_property
     def friction_model(self) -> FrictionModel | None:
-        """Friction of the surface; None where the scene has none."""
+        """Friction of the surface; None where the scene has none; collective."""
         if self.scene.friction is None:
             return None
+        body = None
+        if self.has_body:
+            with self.clock.phase("block"):
+                body = self.bodies.terms(side_term=False).traction_term(self.comm)
         return FrictionModel(
             materials=self.materials,
             coefficient=self.scene.friction.coefficient,
             spacing=self.surface.spacing,
             periodic=self.scene.surface.periodic,
+            body=body,
+            coupled=self.scene.friction.coupled,
         )
 
     # --- errors

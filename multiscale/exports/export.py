@@ -136,15 +136,15 @@ def export_laws(
             `Conductances.per_area`; they are columns of the csv file, and the thermal one a
             gap conductance of Abaqus and CalculiX.
         friction: Coefficient of friction: a keyword of Abaqus and CalculiX, with a stiffness of
-            sticking, and that stiffness as a column of the csv file. Modules of 4C know pressures
+            sticking, and that stiffness as a column of the csv file. Modules of 4C have pressures
             alone.
 
     Returns:
         The files written.
 
     Raises:
-        InputError: When there is no such format, or the pressure of a law is a function of
-            closure nowhere, which a csv file alone can say.
+        InputError: When there is no such format, or the pressure of a law is nowhere a
+            function of closure, which only a csv file can hold.
         NotWritten: When the system refuses.
     """
     texts = export_texts(table, format, tolerance=tolerance, conducts=conducts, friction=friction)

@@ -46,7 +46,7 @@ def leak_figure(
         history: A `multiscale.results.history.History`.
         record: A `multiscale.results.contact_record.ContactRecord` with gaps of cells; None draws
             the curves alone.
-        section: A `multiscale.scene.leak.LeakSection`.
+        section: A `multiscale.scene.interface.LeakSection`.
         periodic: Whether the map continues over the sides along the flow.
         fluid: A `multiscale.observers.face_leak.FluidMap` of the last load step; None draws the
             curve alone.

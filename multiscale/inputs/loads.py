@@ -12,9 +12,8 @@ from geometry import InputError, Surface
 from geometry.zero import Zero
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
-from multiscale.loading.body_loads import BodyLoads
 from multiscale.loading.load_history import LoadHistory
-from multiscale.loading.stages import states_of
+from multiscale.loading.stages import BodyLoads, states_of
 from multiscale.scene.scene import Scene
 from support.fields import part_of
 

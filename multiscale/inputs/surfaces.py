@@ -117,7 +117,7 @@ def sample_surface(scene: Scene, section: SurfaceSection, key: str) -> Surface:
     else:
         extent |= {"height_unit": section.height_unit, "channel": section.channel}
         extent |= {"periodic": section.periodic, **part_of(section, Preparation)}
-        with located(scene, f"{key}.file"):
+        with located(scene, key if key == "law.samples" else f"{key}.file"):
             surface = read_surface(scene.path_of(section.file) or Path(), **extent)
     if section.periodic and not surface.periodic:  # it continues so, whatever was removed of it
         return replace(surface, periodic=True)
@@ -175,6 +175,9 @@ def region_samples(
     found = []
     for (name, section, key), material in zip(parts, materials, strict=True):
         surfaces = [sample_surface(scene, one, key) for one in _seeded(section, scene.law.seeds)]
+        if section is scene.surface:
+            others = (replace(section, file=file) for file in scene.law.samples)
+            surfaces += [sample_surface(scene, one, "law.samples") for one in others]
         if above is not None:
             with located(scene, "counter_surface"):
                 laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]

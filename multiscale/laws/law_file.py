@@ -130,8 +130,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
         path: The file, by name or open.
 
     Raises:
-        InputError: When the file cannot be read, is no law file, damaged, lacks anything, was
-            written before law files had a checksum, or with a micro model that is gone.
+        InputError: When the file cannot be read, is no law file, damaged, lacks anything, has no
+            checksum, or names a micro model that no longer exists.
     """
     with optional_packages():
         import h5py  # takes longer than all else that a plan needs of laws

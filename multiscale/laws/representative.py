@@ -58,7 +58,7 @@ def representative_law(
         make_model: Makes the model of a sample; by default the periodic half-space.
         before: A law of the same samples that ends too early: its rows are kept, and only what lies
             beyond them is solved.
-        leak: Whether it also tells the transmissivity of the gaps, for a leak.
+        leak: Whether the law also has the transmissivity of the gaps, for a leak.
         comm: MPI communicator, whose ranks share samples and rows. The law does not depend on
             their number.
         observe: Called as rows are solved.

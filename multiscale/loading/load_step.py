@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import Control, PatchGrid, Regions
-from multiscale.loading.leak import Leak
+from multiscale.loading.column import REQUIRED, DerivedColumn, column, columns_of
+from multiscale.loading.leak import Leak, leak_columns
 from multiscale.readable import measured, number
 from support.arrays import Array
 from support.displayed import Displayed, Table
@@ -39,21 +40,20 @@ class PatchState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
 class LoadStep(Displayed):
-    """One accepted load step; the fields up to `reason` are columns of ``history.csv``.
+    """One accepted load step.
+
+    Meaning and unit of the columns of ``history.csv`` stand where they are declared; None stands
+    for what a run does not measure. A new column is one more `column` here, behind those that are
+    there.
 
     Attributes:
-        step: Number of the step, from 1; 0 before it is accepted.
-        approach_mm: Approach of the rigid plane from first touch [mm].
-        force_N: Normal force on the plane [N].
-        mean_pressure_MPa: Force over nominal contact area [MPa].
-        contact_area_fraction: Real over nominal contact area.
-        mean_separation_mm: Mean gap between the plane and the deformed surface [mm].
-        contacts: Number of contacts.
-        newton_iterations: Newton steps, those of failed and halved steps included; without laws
-            (analytic, concurrent) the iterations of the contact problem.
-        linear_iterations: Iterations of the linear solver.
-        wall_s: Wall time of the step [s].
-        reason: Name of the reason for which the iteration stopped.
+        step: 0 before the load step is accepted.
+        approach_mm: Counted from first touch until `counted_from` another height.
+        newton_iterations: Without laws the iterations of the contact problem.
+        stiffness_N_per_mm: Under fixed slopes or, where the plane turns, without moment, on the
+            side that the plane came from.
+        stiffness_error_N_per_mm: 0 where a linear solution gives the stiffness.
+        slip_area_fraction: None without friction, as in all columns on shear.
         patches: The state of every patch.
         imbalance: Force on the plane minus reaction of the support, relative to the force; None
             where there is no support.
@@ -64,88 +64,137 @@ class LoadStep(Displayed):
             validity; empty within it.
         meshes: Approach [mm], force [N] and contact area fraction on every mesh of a reference;
             the last mesh is the finest, whose results the step has. Empty with other couplings.
-        force_error_N: Error bound of the force [N]; 0 where it is prescribed, None where it was
-            not measured.
-        approach_error_mm: Error bound of the approach [mm]; 0 where it is prescribed, None where
-            it was not measured.
-        peak_pressure_MPa: Largest contact pressure [MPa]; None where it is not known.
-        stiffness_N_per_mm: Interfacial stiffness, the derivative dF/dδ of the force by the
-            approach, under fixed slopes or, where the plane turns, without moment, on the side
-            that the plane came from [N/mm]; None where it was not found.
-        stiffness_error_N_per_mm: Error bound of the stiffness where cells yield further; 0 where a
-            linear solution gives it [N/mm].
-        elastic_energy_mJ: Energy of the elastic deformation of all bodies; None where it is not
-            known [mJ].
-        plastic_work_mJ: Work of the hardness on the plastic depth, since the start [mJ]; None where
-            it is not known.
-        yielding_area_fraction: Area that carries the hardness over nominal contact area; None
-            without a hardness.
-        plastic_depth_mm: Largest plastic depth that the loads so far have left [mm]; None without a
-            hardness.
-        work_mJ: Work of the forces on the plane, since the start [mJ]; None where no energy is
-            known.
-        thermal_conductance_W_per_K: Conductance of contacts and gaps [W/K]; None where the scene
-            asks for none.
-        gap_conductance_W_per_K: Part of it through gas and radiation [W/K].
-        electrical_conductance_S: Conductance of the contacts [S]; None where the scene asks for
-            none.
-        shear_force_x_N: Shear force on the plane along x [N]; None without friction, as all up to
-            the dissipated energy.
-        shear_force_y_N: Shear force along y [N].
-        shear_x_mm: Shift of the plane along x from where it first touched [mm].
-        shear_y_mm: Shift along y [mm].
-        slip_area_fraction: Area that bears the traction μ p over nominal contact area.
-        tangential_stiffness_N_per_mm: Derivative of the shear force along the shift, in the
-            direction of its last change [N/mm]; None where it was not found.
-        dissipated_mJ: Energy lost to friction since the start [mJ].
         leaks: What leaks, by the way of the fluid; empty where the scene does not ask for it.
         zero_mm: Approach from first touch of the height that approach and closures count from [mm].
-        stage: Number of the stage, from 1; None where the load history has none.
         body_state: Position among the states of the bodies' loads, see `geometry.Control`.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
     """
 
-    step: int = 0
-    approach_mm: float
-    force_N: float
-    mean_pressure_MPa: float
-    contact_area_fraction: float
-    mean_separation_mm: float
-    contacts: int
-    newton_iterations: int
-    linear_iterations: int = 0
-    wall_s: float = 0.0
-    reason: str = "CONVERGED"
+    step: int = column("Number of the load step, from 1", heading="step", default=0)
+    approach_mm: float = column(
+        "Approach of the rigid plane, counted from the zero of the load", "mm",
+        heading="approach", error="approach_error_mm", default=REQUIRED,
+    )  # fmt: skip
+    force_N: float = column(
+        "Normal force on the plane", "N",
+        heading="force", digits=6, error="force_error_N", default=REQUIRED,
+    )  # fmt: skip
+    mean_pressure_MPa: float = column(
+        "Force over the nominal contact area", "MPa",
+        heading="pressure", digits=5, default=REQUIRED,
+    )  # fmt: skip
+    contact_area_fraction: float = column(
+        "Real over nominal contact area", heading="area", default=REQUIRED
+    )
+    mean_separation_mm: float = column(
+        "Mean gap between the plane and the deformed surface", "mm",
+        heading="separation", default=REQUIRED,
+    )  # fmt: skip
+    contacts: int = column("Number of contacts", heading="contacts", default=REQUIRED)
+    newton_iterations: int = column(
+        "Newton steps, those of halved load steps too",
+        heading="Newton", table="solver", default=REQUIRED,
+    )  # fmt: skip
+    linear_iterations: int = column(
+        "Iterations of the linear solver", heading="linear", table="solver", default=0
+    )
+    wall_s: float = column("Wall time", "s", heading="time", digits=3, table="solver", default=0.0)
+    reason: str = column("Name of the reason for which the iteration stopped", default="CONVERGED")
+    tilt_x = DerivedColumn(lambda step: step.tilt[0], "Slope of the approach along x", "mm/mm")
+    tilt_y = DerivedColumn(lambda step: step.tilt[1], "Slope of the approach along y", "mm/mm")
+    moment_x_N_mm = DerivedColumn(
+        lambda step: step.moment_N_mm[0], "First moment Σ P (x − xc) of the forces P", "N mm"
+    )
+    moment_y_N_mm = DerivedColumn(
+        lambda step: step.moment_N_mm[1], "First moment Σ P (y − yc) of the forces P", "N mm"
+    )
+    force_error_N: float | None = column("Error of the force; 0 where it is prescribed", "N")
+    approach_error_mm: float | None = column(
+        "Error of the approach; 0 where it is prescribed", "mm"
+    )
+    peak_pressure_MPa: float | None = column(
+        "Largest contact pressure", "MPa", heading="peak pressure", table="more"
+    )
+    stiffness_N_per_mm: float | None = column(
+        "Interfacial stiffness dF/dδ, force over approach", "N/mm",
+        heading="stiffness", table="more", error="stiffness_error_N_per_mm",
+        in_report="interfacial stiffness",
+    )  # fmt: skip
+    elastic_energy_mJ: float | None = column(
+        "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
+    )
+    plastic_work_mJ: float | None = column(
+        "Work of the hardness on the plastic depth", "mJ", heading="plastic work", table="more"
+    )
+    work_mJ: float | None = column("Work of the forces on the plane", "mJ")
+    yielding_area_fraction: float | None = column(
+        "Area that carries the hardness over nominal contact area",
+        heading="yielding area", table="more",
+    )  # fmt: skip
+    plastic_depth_mm: float | None = column(
+        "Largest plastic depth that the loads so far have left", "mm",
+        heading="plastic depth", table="more", in_report="plastic depth",
+    )  # fmt: skip
+    thermal_conductance_W_per_K: float | None = column(
+        "Thermal conductance of contacts and gaps", "W/K",
+        heading="thermal conductance", table="more", in_report="thermal conductance",
+    )  # fmt: skip
+    gap_conductance_W_per_K: float | None = column(
+        "Part of it through gas and radiation", "W/K",
+        heading="of it through gaps", table="more",
+    )  # fmt: skip
+    electrical_conductance_S: float | None = column(
+        "Electrical conductance of the contacts", "S",
+        heading="electrical conductance", table="more", in_report="electrical conductance",
+    )  # fmt: skip
+    stiffness_error_N_per_mm: float | None = column(
+        "Error of the stiffness, where cells yield further", "N/mm"
+    )
+    first_touch_approach_mm = DerivedColumn(
+        lambda step: step.approach_mm + step.zero_mm if step.zero_mm else None,
+        "Approach counted from first touch, where approach_mm counts from another height", "mm",
+        heading="from first touch", table="more",
+    )  # fmt: skip
+    shear_force_x_N: float | None = column(
+        "Shear force on the plane along x", "N",
+        heading="shear force x", table="more", in_report="shear force along x",
+    )  # fmt: skip
+    shear_force_y_N: float | None = column(
+        "Shear force on the plane along y", "N",
+        heading="shear force y", table="more", in_report="shear force along y",
+    )  # fmt: skip
+    shear_x_mm: float | None = column(
+        "Shift of the plane along x from where it first touched", "mm",
+        heading="shift x", table="more", in_report="shift along x",
+    )  # fmt: skip
+    shear_y_mm: float | None = column(
+        "Shift of the plane along y from where it first touched", "mm",
+        heading="shift y", table="more", in_report="shift along y",
+    )  # fmt: skip
+    slip_area_fraction: float | None = column(
+        "Area that bears the traction μ p over nominal contact area",
+        heading="slip area", table="more",
+    )  # fmt: skip
+    tangential_stiffness_N_per_mm: float | None = column(
+        "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
+        heading="tangential stiffness", table="more", in_report="tangential stiffness",
+    )  # fmt: skip
+    dissipated_mJ: float | None = column(
+        "Energy lost to friction", "mJ",
+        heading="lost to friction", table="more", in_report="lost to friction",
+    )  # fmt: skip
+    stage: int | None = column(
+        "Number of the stage, where the load history has stages", heading="stage", table="more"
+    )
     patches: PatchState
     imbalance: float | None = None
     tilt: tuple[float, float] = (0.0, 0.0)
     moment_N_mm: tuple[float, float] = (0.0, 0.0)
     warnings: tuple[str, ...] = ()
     meshes: tuple[tuple[float, float, float], ...] = ()
-    force_error_N: float | None = None
-    approach_error_mm: float | None = None
-    peak_pressure_MPa: float | None = None
-    stiffness_N_per_mm: float | None = None
-    stiffness_error_N_per_mm: float | None = None
-    elastic_energy_mJ: float | None = None
-    plastic_work_mJ: float | None = None
-    work_mJ: float | None = None
-    yielding_area_fraction: float | None = None
-    plastic_depth_mm: float | None = None
-    thermal_conductance_W_per_K: float | None = None
-    gap_conductance_W_per_K: float | None = None
-    electrical_conductance_S: float | None = None
-    shear_force_x_N: float | None = None
-    shear_force_y_N: float | None = None
-    shear_x_mm: float | None = None
-    shear_y_mm: float | None = None
-    slip_area_fraction: float | None = None
-    tangential_stiffness_N_per_mm: float | None = None
-    dissipated_mJ: float | None = None
     leaks: tuple[Leak, ...] = ()
     zero_mm: float = 0.0
-    stage: int | None = None
     body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
 
@@ -254,38 +303,20 @@ class LoadStep(Displayed):
 
     @property
     def under_its_plane(self) -> Control:
-        """What brings the plane of the load step, counted from first touch, back to where it is."""
+        """Control that puts the plane, counted from first touch, where it was."""
         return Control(approach=self.approach_mm, tilt=self.tilt, body_state=self.body_state)
 
-    @property
-    def first_touch_approach_mm(self) -> float | None:
-        """Approach counted from first touch [mm]; None where `approach_mm` counts from there."""
-        return self.approach_mm + self.zero_mm if self.zero_mm else None
-
     def leak(self, way: str) -> Leak | None:
-        """Return what leaks along a way; None where that is not known.
+        """Return the leak along a way; None where it was not computed.
 
         Args:
             way: A key of `multiscale.loading.leak.WAYS`.
         """
         return next((one for one in self.leaks if one.way == way), None)
 
-    @property
-    def tilt_x(self) -> float:
-        """Slope of the approach along x."""
-        return self.tilt[0]
 
-    @property
-    def tilt_y(self) -> float:
-        """Slope of the approach along y."""
-        return self.tilt[1]
+for _name, _column in leak_columns():
+    setattr(LoadStep, _name, _column)
 
-    @property
-    def moment_x_N_mm(self) -> float:
-        """First moment of the forces along x [N mm]."""
-        return self.moment_N_mm[0]
-
-    @property
-    def moment_y_N_mm(self) -> float:
-        """First moment of the forces along y [N mm]."""
-        return self.moment_N_mm[1]
+COLUMNS = columns_of(LoadStep)
+"""The columns of ``history.csv``, in their order."""

@@ -1,1 +1,1 @@
-"""What sees every load step of a run, and adds to it: none of it is known to the physics."""
+"""What is read off load steps: those observers that a scene asks for."""

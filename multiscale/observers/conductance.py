@@ -21,7 +21,7 @@ from multiscale.exports.sampling import Conducts
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, quantity
-from multiscale.scene.bodies import ConductanceSection
+from multiscale.scene.interface import ConductanceSection
 from support.arrays import Array
 from support.collective import on_root
 
@@ -68,14 +68,15 @@ class ConductanceObserver(StepObserver):
 
     Args:
         coupling: What finds the load steps.
-        section: What its scene asks for.
     """
 
-    def __init__(self, coupling: Coupling, section: ConductanceSection) -> None:
+    def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
+        section = coupling.scene.conductance
+        assert section is not None
         self._section = section
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its conductances."""
         coupling, modulus = self._coupling, self._coupling.materials.contact_modulus
         stiffness = coupling.solver.interface_stiffness(step, coupling.areas)
@@ -112,53 +113,42 @@ class ConductanceObserver(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of conductances."""
-        return conductance_notes(steps, self._section, with_laws=self._coupling.has_laws)
-
-
-def conductance_notes(
-    steps: Sequence[LoadStep], section: ConductanceSection, *, with_laws: bool
-) -> Iterator[str]:
-    """Yield what a report says of conductances.
-
-    Args:
-        steps: The load steps.
-        section: What the scene asks for.
-        with_laws: Whether patch laws stand for the contacts.
-    """
-    known = [
-        step
-        for step in steps
-        if (step.thermal_conductance_W_per_K, step.electrical_conductance_S) != (None, None)
-    ]
-    if not known:
-        return
-    step, parts = known[-1], []
-    if step.thermal_conductance_W_per_K is not None:
-        gap = step.gap_conductance_W_per_K or 0.0
-        through = f", {quantity(gap, 'W/K')} of it through the gaps" if gap else ""
-        parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
-    if step.electrical_conductance_S is not None:
-        parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
-    what = (
-        "the sum over patches or regions side by side, without what the bodies add"
-        if with_laws
-        else "that of all contacts between half-spaces"
-    )
-    yield (
-        f"conductance at load step {step.step}: {'; '.join(parts)}; it is {what}, for which it "
-        "follows exactly from the stiffness (Barber 2003); finite bodies and oxide films are left "
-        "out"
-    )
-    if section.gas is None or not step.contact_area_fraction:
-        return
-    if with_laws:
+        section, with_laws = self._section, self._coupling.has_laws
+        known = [
+            step
+            for step in steps
+            if (step.thermal_conductance_W_per_K, step.electrical_conductance_S) != (None, None)
+        ]
+        if not known:
+            return
+        step, parts = known[-1], []
+        if step.thermal_conductance_W_per_K is not None:
+            gap = step.gap_conductance_W_per_K or 0.0
+            through = f", {quantity(gap, 'W/K')} of it through the gaps" if gap else ""
+            parts.append(f"thermal {quantity(step.thermal_conductance_W_per_K, 'W/K', 5)}{through}")
+        if step.electrical_conductance_S is not None:
+            parts.append(f"electrical {quantity(step.electrical_conductance_S, 'S', 5)}")
+        what = (
+            "the sum over patches or regions side by side, without what the bodies add"
+            if with_laws
+            else "that of all contacts between half-spaces"
+        )
         yield (
-            "gas in the gaps: laws know the mean gap, and a layer as thick as that is the least "
-            "that the gas conducts (coupling.kind = 'concurrent' integrates over the gaps)"
+            f"conductance at load step {step.step}: {'; '.join(parts)}; it is {what}, for which "
+            "it follows exactly from the stiffness (Barber 2003); finite bodies and oxide films "
+            "are left out"
         )
-    elif not section.temperature_jump:
-        yield Caution(
-            "warning: gaps close towards contacts, where the gas conducts without bound as no "
-            "conductance.temperature_jump is stated: its conductance depends on the grid (air at "
-            "1 bar: about 0.4 um)"
-        )
+        if section.gas is None or not step.contact_area_fraction:
+            return
+        if with_laws:
+            yield (
+                "gas in the gaps: laws know the mean gap, and a layer as thick as that is the "
+                "least that the gas conducts (coupling.kind = 'concurrent' integrates over the "
+                "gaps)"
+            )
+        elif not section.temperature_jump:
+            yield Caution(
+                "warning: gaps close towards contacts, where the gas conducts without bound as "
+                "no conductance.temperature_jump is stated: its conductance depends on the grid "
+                "(air at 1 bar: about 0.4 um)"
+            )

@@ -11,8 +11,7 @@ Theory: docs/theory.md, section 16.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,15 +20,12 @@ from multiscale.law_errors import mean_error
 from multiscale.laws.transmissivity import CAUSES, Transmissivity
 from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
-from multiscale.observers.step_observers import StepObserver
-from multiscale.results.leak_notes import leak_notes
-from multiscale.scene.leak import LeakSection
+from multiscale.observers.leak import LeakObserver
 from support.arrays import Array
 from support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro.contact.face_leak import LeakingFace
-    from multiscale.couplings.representative import RepresentativeCoupling
 
 
 _MESH = "mesh"
@@ -50,12 +46,11 @@ class FluidMap(NamedTuple):
     leaving_mm3_per_s: Array
 
 
-class FaceLeakObserver(StepObserver):
+class FaceLeakObserver(LeakObserver):
     """Adds what leaks over the contact face to load steps.
 
     Args:
         coupling: What finds the load steps, with laws of samples on a mesh.
-        section: What its scene asks for.
 
     Raises:
         InputError: When the body has no such faces, or they share no edge with the contact face.
@@ -64,11 +59,8 @@ class FaceLeakObserver(StepObserver):
         Everything is collective.
     """
 
-    _coupling: RepresentativeCoupling
-
-    def __init__(self, coupling: RepresentativeCoupling, section: LeakSection) -> None:
+    def __init__(self, coupling: Any) -> None:
         super().__init__(coupling)
-        self._section = section
         self._face: LeakingFace | None = None
         self._known: tuple[int, Any] | None = None
         first = coupling.bodies.first
@@ -76,7 +68,7 @@ class FaceLeakObserver(StepObserver):
         tagged = first.body.mesh
         try:
             tags = [
-                tagged.facet_tag(getattr(section, key), key=f"leak.{key}")
+                tagged.facet_tag(getattr(self._section, key), key=f"leak.{key}")
                 for key in ("inlet", "outlet")
             ]
         except InputError as error:
@@ -84,7 +76,7 @@ class FaceLeakObserver(StepObserver):
         self._edges = tuple(tagged.facet_tags.find(tag) for tag in tags)
         self._errors = [mean_error(region.surfaces) for region in coupling.samples]
         causes = [one for one in CAUSES if one != "samples" or any(self._errors)]
-        self._causes = [_MESH, *causes]
+        self.causes = [_MESH, *causes]
         self._leaking()  # refuses edges that do not fit before anything is solved
         coupling.further_fields.append(self.fluid_pressure)
 
@@ -104,18 +96,11 @@ class FaceLeakObserver(StepObserver):
                 raise error.located(key="leak", file=coupling.scene.file) from None
         return self._face
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
-        """Return the load step with its leak and, where errors are measured, their error."""
-        coupling, section = self._coupling, self._section
-        scale = section.drop / (12.0 * section.viscosity_MPa_s)
-        with coupling.clock.phase("leak"):
-            flow = self._flow_at(step)
-            leak = Leak(way="face", rate=scale * flow.total)
-            if coupling.scene.output.check != "none":
-                others = {cause: self._flow(cause).total for cause in self._causes}
-                errors = {one: abs(scale * (x - flow.total)) for one, x in others.items()}
-                leak = leak.with_errors(errors)
-        return replace(step, leaks=(leak,))
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
+        return (Leak(way="face", rate=self._scale * self._flow_at(step).total),)
+
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        return [self._scale * self._flow(cause).total]
 
     def fluid_pressure(self, step: LoadStep) -> Any:
         """Return the fluid pressure at a load step just solved, as a function on the mesh [MPa]."""
@@ -123,15 +108,15 @@ class FaceLeakObserver(StepObserver):
         return self._leaking().pressure(flow, *self._section.pressures, "fluid_pressure")
 
     @property
-    def map(self) -> FluidMap | None:
-        """The fluid on the face at the load step solved last; None where there is none."""
+    def fluid(self) -> FluidMap | None:
+        """The fluid on the face at the load step solved last; None before the first."""
         if self._known is None:
             return None
         section, flow = self._section, self._known[1]
         return FluidMap(
             triangles=self._leaking().triangles,
             pressure_MPa=section.pressures[1] + flow.pressure * section.drop,
-            leaving_mm3_per_s=flow.leaving * section.drop / (12.0 * section.viscosity_MPa_s),
+            leaving_mm3_per_s=flow.leaving * self._scale,
         )
 
     def _flow_at(self, step: LoadStep) -> Any:
@@ -159,10 +144,6 @@ class FaceLeakObserver(StepObserver):
             whole = np.zeros((len(known), 2))
             whole[known], values = values, whole
         return values
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the leak."""
-        yield from leak_notes(steps)
 
 
 def _transmissivity(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, Detail, number, percent, quantity
+from multiscale.results.history import History
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""
@@ -34,7 +36,7 @@ class FrictionObserver(StepObserver):
         self._finds_stiffness = coupling.scene.output.contact != "none"
         self._neglected: NeglectedCoupling | None = None
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its tangential stiffness."""
         solver = self._coupling.solver
         if last:
@@ -53,13 +55,22 @@ class FrictionObserver(StepObserver):
         if loop := last_loop(steps):
             yield loop
         yield from self._coupling_notes()
-        yield from self._body_notes(steps)
+        yield from self._body_notes()
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
+        contact = history.contact
+        if contact is not None and contact.slipping is not None:
+            yield "shear", "shear.shear_figure", (history, contact)
 
     def _coupling_notes(self) -> Iterator[str]:
         if self._neglected is None:
             return
-        found = self._neglected
-        if found.beta == 0.0:
+        found, friction = self._neglected, self._coupling.scene.friction
+        if friction is not None and friction.coupled:
+            yield "friction: pressures and tractions were solved in turn at every load step"
+            return
+        if not (found.beta or found.sideways):
             yield "friction: two like bodies, whose pressures and tractions do not see each other"
             return
         change = found.force_change / found.force if found.force else 0.0
@@ -73,7 +84,7 @@ class FrictionObserver(StepObserver):
         )
         yield Caution(text) if change > _MUCH else text
 
-    def _body_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+    def _body_notes(self) -> Iterator[str]:
         """Yield what the shift leaves out of the body below the contact."""
         coupling = self._coupling
         if coupling.scene.rubs_on_mesh:
@@ -81,18 +92,12 @@ class FrictionObserver(StepObserver):
             return
         if not coupling.has_body:
             return
-        text = "shift and tangential stiffness are those of the contact on a half-space"
-        sheared = [step for step in steps if step.shear_force_x_N is not None]
-        if coupling.scene.block is None or not sheared:
-            yield f"{text}; the body's own shear comes on top"
-            return
-        height = coupling.scene.block.height_under(coupling.surface.lengths)
-        flexibility = height / (coupling.materials.first.shear_modulus * coupling.area)
-        force = max(_size(_force(step)) for step in sheared)
-        yield (
-            f"{text}; a block sheared as a whole would add up to "
-            f"{quantity(flexibility * force, 'mm', 2)} at the largest shear force"
-        )
+        model = getattr(coupling, "friction_model", None)
+        if model is not None and model.body is None:
+            yield (
+                "shift and tangential stiffness are those of the contact on a half-space; the "
+                "body's own shear comes on top"
+            )
 
     def _law_notes(self) -> Iterator[str]:
         """Yield how close the springs of laws are, and what they leave out."""

@@ -1,4 +1,4 @@
-"""The leak through the gaps of load steps, where a scene asks for it.
+"""The leak at load steps, where a scene asks for it: through the gaps of all cells, or of patches.
 
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half as many cells a side, under the same load. Channels close as cells become
@@ -9,58 +9,172 @@ area in contact, the error was no less than the true one on 93 and 92 % of 144 f
 half of it on 97 and 98 %, and 1.6 to 2.9 times as large in the median
 (`tests/benchmarks/leak_error.py`).
 
+Under consistent laws every patch has one transmissivity, that of its own gaps between walls. The
+flow from patch to patch is that through the cells of a map. It lies beside that through the gaps of
+all cells, which `coupling.kind = "concurrent"` finds: paths that cross the borders of patches
+elsewhere than in the mean are not known.
+
 Theory: docs/theory.md, section 16.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from abc import abstractmethod
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from geometry import NotConverged
+from micro.flow.gap_flow import cell_network
 from multiscale.couplings.coupling import Coupling
 from multiscale.gap_flows import flow_solver, solved_gap_flow
-from multiscale.loading.leak import Leak
+from multiscale.loading.leak import WAYS, Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.observers.step_observers import StepObserver
-from multiscale.results.leak_notes import leak_notes
-from multiscale.scene.leak import LeakSection
+from multiscale.readable import Caution, measured, number, percent, quantity
 from support.arrays import Array
 from support.collective import on_root_alone
+from support.errors import InputError
+from support.network_flow import network_flow
+
+if TYPE_CHECKING:
+    from multiscale.results.history import History
 
 _AFTER_UNLOADING = (
     "the error of the leak after unloading is not measured: the plastic depth there is that of the "
     "load steps before"
 )
+_UNCERTAIN = 0.3
+"""Error over the leak from which on a report warns."""
+_REMEDIES = {
+    "mesh": "it varies within facets of the contact face, and may differ by {} (finer mesh there)",
+    "grid": "on half as many cells a side it differs by {}, as channels are few cells wide (finer "
+    "surface.grid)",
+    "rows": "between the rows of its table it may differ by {}",
+    "samples": "between samples it differs by {} (more law.seeds, or larger samples)",
+}
+"""What is said of a leak that is not certain, by the cause of most of its error."""
+_LEAST_CELLS = 4
+"""Cells of a patch along a side, of which half are tried too."""
 
 
 class LeakObserver(StepObserver):
-    """Adds what leaks through the gaps to load steps.
+    """Adds what leaks to load steps and, where errors are measured, their error by cause.
 
     Args:
-        coupling: What finds the load steps, with gaps of cells.
-        section: What its scene asks for.
-        has_unloaded: Tells whether the load was larger before.
+        coupling: What finds the load steps.
+
+    Attributes:
+        causes: Causes of the error.
     """
 
-    def __init__(
-        self, coupling: Coupling, section: LeakSection, has_unloaded: Callable[[], bool]
-    ) -> None:
+    causes: Sequence[str]
+
+    def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
-        self._section, self._has_unloaded = section, has_unloaded
+        section = coupling.scene.leak
+        assert section is not None
+        self._section = section
+        self._scale = section.drop / (12.0 * section.viscosity_MPa_s)
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
+        return None
+
+    @abstractmethod
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
+        """Return the leaks along all ways; collective."""
+
+    @abstractmethod
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        """Return their flow rates with a cause of their error varied; collective."""
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+        """Return the load step with its leaks."""
+        with self._coupling.clock.phase("leak"):
+            leaks = self._leaks(step)
+            if self._measures(step, past):
+                leaks = self._with_errors(step, leaks)
+        return replace(step, leaks=leaks)
+
+    def _measures(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
+        """Tell whether the error of a load step is measured; where it cannot be, note why."""
+        if self._coupling.scene.output.check == "none":
+            return False
+        if self._plastic_past(step, past):
+            self._failures[_AFTER_UNLOADING] = None
+            return False
+        return True
+
+    def _with_errors(self, step: LoadStep, leaks: tuple[Leak, ...]) -> tuple[Leak, ...]:
+        """Return the leaks with their errors."""
+        try:
+            varied = {cause: self._varied(step, cause) for cause in self.causes}
+        except NotConverged as error:
+            problem = f"error of the leak at load step {step.step} not measured: {error}"
+            self._failures[problem] = None
+            return leaks
+        return tuple(
+            one.with_errors({cause: abs(rates[k] - one.rate) for cause, rates in varied.items()})
+            for k, one in enumerate(leaks)
+        )
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of the leak."""
+        for way, name in WAYS.items():
+            known = [(step.step, leak) for step in steps if (leak := step.leak(way)) is not None]
+            if not known:
+                continue
+            number_of_last, last = known[-1]
+            yield f"leak {name} at load step {number_of_last}: {_whole_text(last)}"
+            closed = [step for step, leak in known if not leak.rate]
+            if closed and len(closed) < len(known):
+                yield (
+                    f"the gap is closed {name} at {len(closed)} of {len(known)} load steps, first "
+                    f"at load step {closed[0]}"
+                )
+            if last.causes and last.error is not None and last.error > _UNCERTAIN * abs(last.rate):
+                cause, error = max(last.causes, key=lambda one: one[1])
+                text = _REMEDIES[cause].format(quantity(error, "mm³/s", 2))
+                yield Caution(f"the leak {name} is uncertain: {text}")
+        yield from super().notes(steps)
+
+    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
+        """Yield the leak along every way."""
+        for way, where in WAYS.items():
+            if (leak := step.leak(way)) is not None:
+                yield f"leak {where}", leak_text(leak)
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield the flow at the last recorded load step, and the leak at all of them."""
+        periodic = self._coupling.scene.surface.periodic
+        about = history, history.contact, self._section, periodic, self.fluid
+        yield "leak", "leak.leak_figure", about
+
+
+class GapLeakObserver(LeakObserver):
+    """Adds what leaks through the gaps of all cells."""
+
+    causes = ("grid",)
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
         flow_solver(coupling.surface.heights.size)  # PETSc starts on all ranks together
-        self._notes: dict[str, None] = {}
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
-        """Return the load step with its leak and, where errors are measured, their error."""
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
         coupling = self._coupling
-        with coupling.clock.phase("leak"):
-            found = on_root_alone(coupling.comm, lambda: self._found(coupling.solver.gaps))
-            step = replace(step, leaks=found)
-            return self._with_errors(step) if self._measures() else step
+        return on_root_alone(coupling.comm, lambda: self._through(coupling.solver.gaps))
 
-    def _found(self, gap: Array | None) -> tuple[Leak, ...]:
-        """Return the leaks through a map of gaps."""
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        gap = self._coupling.coarser_gap(step)
+        found = on_root_alone(self._coupling.comm, lambda: self._through(gap))
+        return [one.rate for one in found]
+
+    def _through(self, gap: Array | None) -> tuple[Leak, ...]:
+        """Return the leaks through a map of gaps; on one process."""
         assert gap is not None, "scenes whose coupling knows no gaps of cells are refused"
         section, surface = self._section, self._coupling.surface
         periodic = self._coupling.scene.surface.periodic
@@ -78,34 +192,105 @@ class LeakObserver(StepObserver):
             )
         return tuple(leaks)
 
-    def _measures(self) -> bool:
-        """Tell whether the error of a load step is measured; where it cannot be, note why."""
-        scene = self._coupling.scene
-        if scene.output.check == "none":
-            return False
-        if scene.micro.hardness is not None and self._has_unloaded():
-            self._notes[_AFTER_UNLOADING] = None
-            return False
-        return True
 
-    def _with_errors(self, step: LoadStep) -> LoadStep:
-        """Return the load step with the error of its leak by the grid."""
-        coupling = self._coupling
-        try:
-            gap = coupling.coarser_gap(step)
-            found = on_root_alone(coupling.comm, lambda: self._found(gap))
-        except NotConverged as error:
-            self._notes[f"error of the leak at load step {step.step} not measured: {error}"] = None
-            return step
-        leaks = zip(step.leaks, found, strict=True)
-        return replace(
-            step,
-            leaks=tuple(
-                one.with_errors({"grid": abs(one.rate - half.rate)}) for one, half in leaks
-            ),
-        )
+class PatchLeakObserver(LeakObserver):
+    """Adds what leaks from patch to patch.
+
+    Args:
+        coupling: What finds the load steps, with consistent laws.
+
+    Raises:
+        InputError: When patches have too few cells.
+    """
+
+    causes = ("grid", "rows")
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        most = tuple(cells // _LEAST_CELLS for cells in coupling.surface.grid)
+        if any(count > limit for count, limit in zip(coupling.patches.grid, most, strict=True)):
+            raise InputError(
+                f"leaves patches fewer than {_LEAST_CELLS} cells a side, too few for a leak",
+                key="patches.grid",
+                value=list(coupling.patches.grid),
+                allowed=f"{most[0]} × {most[1]} at most",
+                file=coupling.scene.file,
+            )
+
+    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
+        patches, leaks = self._coupling.patches, []
+        for way, total in zip(self._section.directions, self._totals(step, None), strict=True):
+            axis = "xy".index(way)
+            cubed = total * patches.lengths[axis] / patches.lengths[1 - axis]
+            factor = cubed / step.mean_separation_mm**3 if step.mean_separation_mm else None
+            rate = self._scale * total
+            leaks.append(Leak(way=way, rate=rate, transmissivity=cubed, flow_factor=factor))
+        return tuple(leaks)
+
+    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
+        return [self._scale * total for total in self._totals(step, cause)]
+
+    def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
+        """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
+        table = self._coupling.table
+        assert table is not None
+
+        def solve() -> list[float]:
+            flows = []
+            for law, closure in zip(table.laws, step.patches.closure_mm, strict=True):
+                known = law.transmissivity
+                assert known is not None
+                at = law.at(np.array([closure]), extend=True).separation
+                flows.append(known.at(at) if cause is None else known.varied(cause, at))
+            through = np.concatenate(flows)
+            return [self._total(through, "xy".index(way)) for way in self._section.directions]
+
+        return on_root_alone(self._coupling.comm, solve)
+
+    def _total(self, transmissivity: Array, axis: int) -> float:
+        """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
+        patches = self._coupling.patches
+        own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
+        lengths = patches.lengths
+        if axis:
+            own, lengths = [one.T for one in own], lengths[::-1]
+        return network_flow(cell_network(own[0], lengths, across=own[1])).total
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the leak."""
-        yield from leak_notes(steps)
-        yield from self._notes
+        """Yield what a report says of the leak, and of patches in its place."""
+        yield from super().notes(steps)
+        if steps:
+            count = self._coupling.patches.count
+            yield (
+                f"the leak is that through {count} patches of one transmissivity each; "
+                "coupling.kind = 'concurrent' finds that through all gaps"
+            )
+
+
+def leak_text(leak: Leak) -> str:
+    """Return a leak with its error, or that the gap is closed.
+
+    Args:
+        leak: The leak.
+    """
+    if not leak.rate:
+        closed = "closed, nothing leaks"
+        return f"{closed} (or {quantity(leak.error, 'mm³/s', 2)})" if leak.error else closed
+    return measured(leak.rate, leak.error, "mm³/s")
+
+
+def _whole_text(leak: Leak) -> str:
+    text = leak_text(leak)
+    if not leak.rate:
+        return f"{text}: the surfaces touch everywhere along a line across the flow"
+    if len(leak.causes) > 1:
+        causes = (f"{cause} {quantity(error, 'mm³/s', 2)}" for cause, error in leak.causes)
+        text += f" ({', '.join(causes)})"
+    if leak.hydraulic_gap is not None:
+        text += f"; hydraulic gap {quantity(leak.hydraulic_gap, 'mm', 3)}"
+    if leak.flow_factor is not None:
+        text += f", flow factor {number(leak.flow_factor, 3)}"
+    if leak.constriction is not None:
+        text += f", {percent(leak.constriction)} of it through the channel of the narrowest "
+        text += "constriction"
+    return text

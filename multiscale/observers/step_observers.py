@@ -1,18 +1,25 @@
-"""What sees the load steps of a run: contacts, stiffness, work, errors, and states of fields."""
+"""What sees the load steps of a run: contacts, stiffness, energies, errors, and states of fields.
+
+An observer is what is read off load steps. It adds columns to them, says what a report says of
+them, and has its figures. None knows of another; a run makes those that its scene asks for.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
-from multiscale.loading.energy import with_work
+from multiscale.loading.energy import energy_notes, with_work, yielding_notes
 from multiscale.loading.load_step import LoadStep
+from multiscale.measured_errors import error_notes
 from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
+from multiscale.results.history import History
 
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
@@ -29,13 +36,14 @@ class StepObserver:
 
     def __init__(self, coupling: Coupling) -> None:
         self._coupling = coupling
+        self._failures: dict[str, None] = {}
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with what the observer adds.
 
         Args:
             step: The load step just accepted, counted from first touch.
-            before: The one before it; None for the first.
+            past: All load steps before it.
             last: Whether no other follows.
 
         Note:
@@ -60,24 +68,53 @@ class StepObserver:
         Args:
             steps: All load steps.
         """
+        yield from self._failures
+
+    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
+        """Yield what a report lists of the last load step beside its columns: name and value.
+
+        Args:
+            step: The load step.
+        """
+        return iter(())
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield figures: name of the file, function in `multiscale.figures`, and its arguments.
+
+        Args:
+            history: All load steps.
+        """
         return iter(())
 
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
 
+    def _plastic_past(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
+        """Tell whether the plastic depth is not that of rising loads, which checks solve for."""
+        if self._coupling.scene.micro.hardness is None:
+            return False
+        return step.force_N < (1.0 - 1e-6) * max((one.force_N for one in past), default=0.0)
 
-class WorkObserver(StepObserver):
-    """Adds the work of the plane since the start to load steps."""
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+class EnergyObserver(StepObserver):
+    """Adds the work of the plane since the start to load steps; says what yields and is stored."""
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with the work of the plane."""
-        return with_work(step, before)
+        return with_work(step, past[-1] if past else None)
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what yields or would, and the energies at the last load step."""
+        hardness = self._coupling.scene.micro.hardness
+        if hardness is not None or self._coupling.regions is None:  # whose peaks are those of means
+            yield from yielding_notes(steps, hardness)
+        yield from energy_notes(steps)
 
 
 class StiffnessObserver(StepObserver):
     """Adds the interfacial stiffness to load steps, where it is known."""
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its interfacial stiffness."""
         stiffness = self._coupling.solver.stiffness()
         return replace(
@@ -105,12 +142,11 @@ class ContactRecorder(StepObserver):
         self.records: list[ContactRecord] = []
         self._state: Any = None
         self._seen, self._unloading = 0, False
-        self._failures: list[str] = []
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Record the contact of a load step if it is requested."""
         self._state, self._seen = self._coupling.solver.latest, step.step
-        self._unloading = step.is_unloading(before)
+        self._unloading = step.is_unloading(past[-1] if past else None)
         return self._recorded(step) if last or self._asked == "all" else step
 
     def finish(self, step: LoadStep) -> LoadStep:
@@ -127,7 +163,7 @@ class ContactRecorder(StepObserver):
         try:
             contact = self._coupling.contact(step, self._state)
         except NotConverged as error:
-            self._failures.append(f"contact of load step {step.step} not found: {error}")
+            self._failures[f"contact of load step {step.step} not found: {error}"] = None
             return step
         if contact is not None:
             step, detail = contact
@@ -140,7 +176,7 @@ class ContactRecorder(StepObserver):
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of contacts that laws stand for, and of those not found."""
-        yield from self._failures
+        yield from super().notes(steps)
         if self.records and self._coupling.has_laws:
             last = self.records[-1]
             yield Detail(
@@ -154,37 +190,30 @@ class ContactRecorder(StepObserver):
 
 
 class ErrorCheck(StepObserver):
-    """Adds measured errors to load steps, as the scene's ``output.check`` says.
+    """Adds measured errors to load steps, as the scene's ``output.check`` says."""
 
-    Args:
-        coupling: What finds the load steps.
-        has_unloaded: Tells whether the load was larger before.
-    """
-
-    def __init__(self, coupling: Coupling, has_unloaded: Callable[[], bool]) -> None:
-        super().__init__(coupling)
-        self._has_unloaded, self._check = has_unloaded, coupling.scene.output.check
-        self._notes: dict[str, None] = {}
-
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""
-        asked = self._check == "all" or (self._check == "last" and last)
+        check = self._coupling.scene.output.check
+        asked = check == "all" or (check == "last" and last)
         if not asked or not self._coupling.checks_steps:
             return step
-        # the plastic depth is then not that of rising loads, which the check solves for
-        if self._coupling.scene.micro.hardness is not None and self._has_unloaded():
-            self._notes[_AFTER_UNLOADING] = None
+        if self._plastic_past(step, past):
+            self._failures[_AFTER_UNLOADING] = None
             return step
         with self._coupling.clock.phase("check"):
             try:
                 return self._coupling.checked(step)
             except NotConverged as error:
-                self._notes[f"errors of load step {step.step} not measured: {error}"] = None
+                self._failures[f"errors of load step {step.step} not measured: {error}"] = None
                 return step
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield why errors were not measured."""
-        yield from self._notes
+        """Yield why errors were not measured, and those that were."""
+        yield from super().notes(steps)
+        yield from error_notes(list(steps))
+        if steps:
+            yield from self._coupling.error_notes(steps)
 
 
 class FieldRecorder(StepObserver):
@@ -202,7 +231,7 @@ class FieldRecorder(StepObserver):
         self._wanted = coupling.scene.output.wants_fields
         self.kept: dict[int, Any] = {}
 
-    def observe(self, step: LoadStep, before: LoadStep | None, *, last: bool) -> LoadStep:
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Keep the state of a load step whose fields may be wanted."""
         if self._coupling.has_body and self._wanted(step.step, last=True):
             if not self._wanted(step.step, last=False):
@@ -244,5 +273,38 @@ class FieldRecorder(StepObserver):
         for step in again:
             solver.press(step.under_its_plane)
             if step.step in missing:
-                self.observe(step, None, last=step is steps[-1])
+                self.observe(step, (), last=step is steps[-1])
         solver.past = past
+
+
+def _places(coupling: Coupling) -> Iterator[str]:
+    """Yield module and class of the observers of the sections of a scene; others are not loaded."""
+    scene = coupling.scene
+    if scene.conductance is not None:
+        yield "conductance.ConductanceObserver"
+    if scene.leak is not None:
+        own = "leak.PatchLeakObserver" if coupling.has_laws else "leak.GapLeakObserver"
+        yield "face_leak.FaceLeakObserver" if scene.leak.between_edges else own
+    if scene.friction is not None:
+        yield "friction.FrictionObserver"
+
+
+def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
+    """Yield what a scene wants read off its load steps, in the order in which they see them.
+
+    Args:
+        coupling: What finds the load steps.
+
+    Raises:
+        InputError: When the scene does not allow it.
+
+    Note:
+        Collective.
+    """
+    if coupling.scene.output.contact != "none":
+        yield StiffnessObserver(coupling)
+    for place in _places(coupling):
+        module, _, name = place.partition(".")
+        yield getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    yield EnergyObserver(coupling)
+    yield ErrorCheck(coupling)

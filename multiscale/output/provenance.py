@@ -13,10 +13,12 @@ from typing import Any
 
 from pydantic_core import to_jsonable_python
 
+from multiscale.couplings.coupling import Coupling
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.machine import peak_memory
 from multiscale.run import Run
 from multiscale.scene.identity import files_of
+from support.checked_store import fingerprint
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()
 """Libraries whose versions are recorded."""
@@ -45,7 +47,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
             "source": coupling.surface.source,
             "notes": list(coupling.surface.notes),
             "lengths_mm": list(coupling.surface.lengths),
-            "heights_sha256": run.heights,
+            "heights_sha256": _heights(coupling),
             "highest_mm": coupling.surface.highest,
             "zero_below_highest_mm": coupling.zero,
             **coupling.surface_record(),
@@ -58,7 +60,7 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
         "ranks": 1 if run.comm is None else run.comm.size,
         "threads": os.environ.get("OMP_NUM_THREADS"),
         "petsc_options": options,
-        "unknowns": run.unknowns,
+        "unknowns": coupling.unknowns,
         "reference": _reference(run),
         "seconds": history.seconds,
         "memory_bytes": peak_memory(),
@@ -76,6 +78,12 @@ def provenance(run: Run, *, options: list[str]) -> dict[str, Any]:
     }
     known: dict[str, Any] = to_jsonable_python(content, inf_nan_mode="null", fallback=str)
     return known
+
+
+def _heights(coupling: Coupling) -> str:
+    """Return the SHA-256 of the heights of the surface, or of all samples."""
+    samples = () if coupling.regions is None else coupling.rough_surfaces
+    return fingerprint([surface.heights for surface in (coupling.surface, *samples)])
 
 
 def _body(face: BodyFacts) -> dict[str, Any]:

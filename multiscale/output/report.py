@@ -1,24 +1,29 @@
-"""The report of a run: its results, then its pictures, inputs and, folded, the solver's work."""
+"""The report of a run, and how pages are filled that need no network and no other file."""
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
+from functools import cache
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
-from multiscale.loading.leak import WAYS
-from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Caution, Detail, measured, number, percent, quantity
+from multiscale.loading.load_step import COLUMNS, LoadStep
+from multiscale.readable import Caution, Detail, duration, measured, number, percent, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.results.html_page import filled
-from multiscale.results.leak_notes import leak_text
 from multiscale.run import Run
+from support.displayed import table_html
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
 
 PAPER = (
     "Y. Waddad, V. Magnier, P. Dufrénoy, G. De Saxcé: A multiscale method for frictionless contact "
@@ -29,21 +34,6 @@ PAPER = (
 
 _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "error")
 """Topics of the plan that say what was computed; the others say how, and are folded."""
-
-_MORE = {
-    "shear_force_x_N": ("shear force along x", "N"),
-    "shear_force_y_N": ("shear force along y", "N"),
-    "shear_x_mm": ("shift along x", "mm"),
-    "shear_y_mm": ("shift along y", "mm"),
-    "tangential_stiffness_N_per_mm": ("tangential stiffness", "N/mm"),
-    "dissipated_mJ": ("lost to friction", "mJ"),
-    "stiffness_N_per_mm": ("interfacial stiffness", "N/mm"),
-    "plastic_depth_mm": ("plastic depth", "mm"),
-    "thermal_conductance_W_per_K": ("thermal conductance", "W/K"),
-    "electrical_conductance_S": ("electrical conductance", "S"),
-}
-"""What some runs know of their load steps: attribute, name and unit."""
-
 
 CONTACT_OF_STEP = "contact_of_step_"
 """Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
@@ -168,12 +158,11 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
     if spots:
         yield "contact spots", number(spots, 9), ""
     yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
-    for way, where in WAYS.items():
-        if (leak := last.leak(way)) is not None:
-            yield f"leak {where}", leak_text(leak), ""
-    for name, (text, unit) in _MORE.items():
-        if value := getattr(last, name):
-            yield text, quantity(value, unit), ""
+    for observer in run.observers:
+        yield from ((name, value, "") for name, value in observer.results(last))
+    for column in COLUMNS:
+        if column.in_report and (value := column.of(last)):
+            yield column.in_report, quantity(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
@@ -208,3 +197,32 @@ def citations() -> tuple[str, str]:
         f"Version {version('patchlaw')}"
     )
     return program, PAPER
+
+
+def filled(template: str, **content: Any) -> str:
+    """Return a template filled with content; characters that HTML reserves are escaped.
+
+    Args:
+        template: Its file, relative to the folder of this package.
+        content: What stands in it, by name.
+    """
+    return _templates().get_template(template).render(**content) + "\n"
+
+
+@cache
+def _templates() -> Environment:
+    """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    templates = Environment(
+        loader=FileSystemLoader(Path(__file__).parents[1]),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    templates.filters["base64"] = lambda content: b64encode(content).decode()
+    templates.filters["duration"] = duration
+    templates.globals["table"] = lambda *content: Markup(table_html(*content))
+    return templates

@@ -22,10 +22,11 @@ from multiscale.figures.files import (
     write_pictures,
 )
 from multiscale.laws.law_file import hdf5_bytes, write_laws
+from multiscale.loading.load_step import COLUMNS
 from multiscale.output.provenance import provenance
 from multiscale.output.report import CONTACT_OF_STEP, report_html, shown_contacts
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.history import COLUMNS, History
+from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from support.collective import on_root, shared
@@ -69,7 +70,7 @@ def write_results(
     drawn = (figures or RunFigures(run.scene, run.comm)).drawn(run)
     run.remark(filter(None, (one.problem for one in drawn)))
     pictures = Pictures(dict(chain.from_iterable(one.files.items() for one in drawn)))
-    with run.phase("writing"):
+    with run.clock.phase("writing"):
         return on_root(run.comm, lambda: _write(folder, run, pictures, options))
 
 
@@ -234,7 +235,7 @@ class RunFigures:
         """
         if not self._figures or not run.steps:
             return []
-        with run.phase("output"):
+        with run.clock.phase("output"):
             drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
             if self._process is None:
                 comm = self._comm
@@ -273,17 +274,12 @@ class RunFigures:
         if run.contacts:
             contact = run.contacts[-1]
             figures["contact"] = "contact.contact_figure", (contact,)
-            if contact.slipping is not None:
-                figures["shear"] = "shear.shear_figure", (history, contact)
             of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
-        if run.scene.leak is not None:
-            gaps = run.contacts[-1] if run.contacts else None
-            section, periodic = run.scene.leak, run.scene.surface.periodic
-            about = history, gaps, section, periodic, run.fluid
-            figures["leak"] = "leak.leak_figure", about
+        for observer in run.observers:
+            figures |= {name: (function, of) for name, function, of in observer.figures(history)}
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
         if run.scene.output.report:

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ from geometry.sliders import SliderRecord
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
+from multiscale.laws.law_file import law_bytes, read_laws
+from multiscale.laws.law_table import LawTable
 from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.loading.stepper import LoadPosition
@@ -66,6 +69,11 @@ class Checkpoint:
     contacts: tuple[ContactRecord, ...] = ()
     log: Mark = START
 
+    @property
+    def table(self) -> LawTable | None:
+        """The laws; None without."""
+        return read_laws(BytesIO(self.laws)) if self.laws else None
+
 
 _KINDS = (
     Checkpoint,
@@ -92,7 +100,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
     return Checkpoint(
         identity=run.identity,
         resolved=run.resolved,
-        laws=run.law_bytes,
+        laws=b"" if run.coupling.table is None else law_bytes(run.coupling.table),
         steps=tuple(run.steps),
         position=run.position,
         state=state,

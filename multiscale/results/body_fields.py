@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.readable import number
-from multiscale.results.data_frames import dataset
 from support.arrays import Array
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, dataset
 from support.errors import InputError
 from support.packages import optional_packages
 

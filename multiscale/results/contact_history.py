@@ -15,11 +15,10 @@ from multiscale.figures import by_matplotlib
 from multiscale.figures.contact_scales import ContactScales
 from multiscale.readable import column
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.data_frames import data_frame, dataset
 from multiscale.results.reading import csv_rows, read_history, result_of_a_run
 from support.arrays import Array
 from support.checked_store import check_hdf5
-from support.displayed import Displayed, Table, of_columns, spread
+from support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from support.errors import InputError
 from support.packages import optional_packages
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, SupportsIndex, overload
+from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +12,13 @@ from numpy.typing import NDArray
 from geometry.patches import PatchGrid, Regions
 from multiscale.figures import by_matplotlib
 from multiscale.laws.law_table import LawTable
-from multiscale.loading.load_step import LoadStep
+from multiscale.loading.column import Column
+from multiscale.loading.load_step import COLUMNS, LoadStep
 from multiscale.readable import Caution, span
-from multiscale.results.column import Column
+from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
-from multiscale.results.data_frames import data_frame, dataset
-from multiscale.results.leak_columns import leak_columns
-from multiscale.results.notes import AccuracyVerdict
 from multiscale.results.reference_record import ReferenceRecord
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 
 Array = NDArray[np.float64]
@@ -36,116 +34,18 @@ class History(Displayed):
     """All load steps of a run; every column of ``history.csv`` is an attribute, as an array.
 
     ``history[-1]`` is a `LoadStep`, ``history[2:5]`` the history of these load steps alone.
-    Printed, or in a notebook, a history is a table. A new column is one more `Column` in this
-    class, behind those that are there. Those of the leak are
-    `multiscale.results.leak_columns.leak_columns`.
+    Printed, or in a notebook, a history is a table. Columns are declared in `LoadStep`.
 
     Attributes:
         steps: The load steps.
         patches: The partition of the interface, or regions of a contact face.
         seconds: Wall time of each phase of the run [s].
         notes: Remarks of the run on its own approximations.
-        accuracy: Whether the accuracy that was asked for is kept; None where none was.
+        accuracy: Whether the requested accuracy is kept; None where none was requested.
         reference: Results of all meshes of a reference; None with other couplings.
         contact_records: The contacts of those load steps that the scene asks for.
         before: Of a part of a history the load step before the first of the part, if there is one.
     """
-
-    step = Column("Number of the load step, from 1", heading="step")
-    approach_mm = Column(
-        "Approach of the rigid plane, counted from the zero of the load", "mm",
-        heading="approach", error="approach_error_mm",
-    )  # fmt: skip
-    force_N = Column(
-        "Normal force on the plane", "N", heading="force", digits=6, error="force_error_N"
-    )
-    mean_pressure_MPa = Column(
-        "Force over the nominal contact area", "MPa", heading="pressure", digits=5
-    )
-    contact_area_fraction = Column("Real over nominal contact area", heading="area")
-    mean_separation_mm = Column(
-        "Mean gap between the plane and the deformed surface", "mm", heading="separation"
-    )
-    contacts = Column("Number of contacts", heading="contacts")
-    newton_iterations = Column(
-        "Newton steps, those of halved load steps too", heading="Newton", table="solver"
-    )
-    linear_iterations = Column("Iterations of the linear solver", heading="linear", table="solver")
-    wall_s = Column("Wall time", "s", heading="time", digits=3, table="solver")
-    reason = Column("Name of the reason for which the iteration stopped")
-    tilt_x = Column("Slope of the approach along x", "mm/mm")
-    tilt_y = Column("Slope of the approach along y", "mm/mm")
-    moment_x_N_mm = Column("First moment Σ P (x − xc) of the forces P", "N mm")
-    moment_y_N_mm = Column("First moment Σ P (y − yc) of the forces P", "N mm")
-    force_error_N = Column("Error of the force; 0 where it is prescribed", "N")
-    approach_error_mm = Column("Error of the approach; 0 where it is prescribed", "mm")
-    peak_pressure_MPa = Column(
-        "Largest contact pressure", "MPa", heading="peak pressure", table="more"
-    )
-    stiffness_N_per_mm = Column(
-        "Interfacial stiffness dF/dδ, force over approach", "N/mm",
-        heading="stiffness", table="more", error="stiffness_error_N_per_mm",
-    )  # fmt: skip
-    elastic_energy_mJ = Column(
-        "Energy of the elastic deformation", "mJ", heading="elastic energy", table="more"
-    )
-    plastic_work_mJ = Column(
-        "Work of the hardness on the plastic depth", "mJ", heading="plastic work", table="more"
-    )
-    work_mJ = Column("Work of the forces on the plane", "mJ")
-    yielding_area_fraction = Column(
-        "Area that carries the hardness over nominal contact area",
-        heading="yielding area", table="more",
-    )  # fmt: skip
-    plastic_depth_mm = Column(
-        "Largest plastic depth that the loads so far have left", "mm",
-        heading="plastic depth", table="more",
-    )  # fmt: skip
-    thermal_conductance_W_per_K = Column(
-        "Thermal conductance of contacts and gaps", "W/K",
-        heading="thermal conductance", table="more",
-    )  # fmt: skip
-    gap_conductance_W_per_K = Column(
-        "Part of it through gas and radiation", "W/K",
-        heading="of it through gaps", table="more",
-    )  # fmt: skip
-    electrical_conductance_S = Column(
-        "Electrical conductance of the contacts", "S",
-        heading="electrical conductance", table="more",
-    )  # fmt: skip
-    stiffness_error_N_per_mm = Column("Error of the stiffness, where cells yield further", "N/mm")
-    first_touch_approach_mm = Column(
-        "Approach counted from first touch, where approach_mm counts from another height", "mm",
-        heading="from first touch", table="more",
-    )  # fmt: skip
-    shear_force_x_N = Column(
-        "Shear force on the plane along x", "N", heading="shear force x", table="more"
-    )
-    shear_force_y_N = Column(
-        "Shear force on the plane along y", "N", heading="shear force y", table="more"
-    )
-    shear_x_mm = Column(
-        "Shift of the plane along x from where it first touched", "mm",
-        heading="shift x", table="more",
-    )  # fmt: skip
-    shear_y_mm = Column(
-        "Shift of the plane along y from where it first touched", "mm",
-        heading="shift y", table="more",
-    )  # fmt: skip
-    slip_area_fraction = Column(
-        "Area that bears the traction μ p over nominal contact area",
-        heading="slip area", table="more",
-    )  # fmt: skip
-    tangential_stiffness_N_per_mm = Column(
-        "Tangential stiffness, shear force over shift in the direction of its last change", "N/mm",
-        heading="tangential stiffness", table="more",
-    )  # fmt: skip
-    dissipated_mJ = Column(
-        "Energy lost to friction", "mJ", heading="lost to friction", table="more"
-    )
-    stage = Column(
-        "Number of the stage, where the load history has stages", heading="stage", table="more"
-    )
 
     steps: tuple[LoadStep, ...]
     patches: PatchGrid | Regions
@@ -155,6 +55,10 @@ class History(Displayed):
     reference: ReferenceRecord | None = None
     contact_records: tuple[ContactRecord, ...] = ()
     before: LoadStep | None = None
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, column: str) -> NDArray[Any]: ...
 
     def __len__(self) -> int:
         return len(self.steps)
@@ -204,7 +108,7 @@ class History(Displayed):
 
     @property
     def contact(self) -> ContactRecord | None:
-        """The contact recorded last, spots and maps; None where none was asked for."""
+        """The contact recorded last, spots and maps; None where none was requested."""
         return self.contact_records[-1] if self.contact_records else None
 
     def records(self) -> list[dict[str, Any]]:
@@ -252,8 +156,8 @@ class History(Displayed):
     def to_xarray(self) -> Any:
         """Return all columns and the state of the patches as an xarray dataset.
 
-        Columns that no load step knows are left out. Of patches the dimensions are ``step``, ``ix``
-        and ``iy``, of regions ``step`` and ``region``.
+        Columns without a value in any load step are left out. Of patches the dimensions are
+        ``step``, ``ix`` and ``iy``, of regions ``step`` and ``region``.
 
         Raises:
             ImportError: When xarray, which patchlaw does not require, is not installed.
@@ -334,11 +238,8 @@ class History(Displayed):
         return by_matplotlib("figures.curves.history_figure", self, label)
 
 
-for _column in leak_columns():
+for _column in COLUMNS:
     setattr(History, _column.name, _column)
-
-COLUMNS = tuple(value for value in vars(History).values() if isinstance(value, Column))
-"""The columns of ``history.csv``, in their order."""
 
 
 def _attributes(column: Column) -> dict[str, str]:

@@ -13,14 +13,14 @@ from typing import Any
 import numpy as np
 
 from geometry.patches import PatchGrid, Regions
+from multiscale.loading.leak import leaks_of
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.removed import refuse_removed_results
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS, History
-from multiscale.results.leak_columns import leaks_of
 from support.errors import InputError
 
 _TEXT = "reason"
-_COUNTS = {"step", "contacts", "newton_iterations", "linear_iterations", "stage"}
+_COUNTS = {one.name for one in fields(LoadStep) if str(one.type).startswith("int")}
 
 
 def read_history(folder: str | Path) -> History:

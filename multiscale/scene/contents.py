@@ -1,37 +1,30 @@
-"""All sections of a scene in one record, and which of them go together."""
+"""All sections of a scene in one record; what of them goes together beyond what sections say."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from itertools import chain
-from math import hypot
 from typing import Annotated
 
 from multiscale.loading.load_history import LoadHistory
 from multiscale.scene.bodies import (
     BlockSection,
     BodySection,
-    ConductanceSection,
     CounterBodySection,
 )
-from multiscale.scene.leak import LeakSection
+from multiscale.scene.interface import ConductanceSection, FrictionSection, LeakSection
 from multiscale.scene.sections import (
     CouplingSection,
-    FrictionSection,
     LawSection,
     MicroSection,
     OutputSection,
     PatchesSection,
     ReferenceSection,
 )
-from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from multiscale.scene.surface import CounterSurfaceSection, Problem, SurfaceSection
 from support.errors import InputError
 from support.fields import KEY, Limits
-
-Problem = tuple[str, str, str]
-"""A key, why its value makes no sense beside those of others, and what is allowed."""
-
 
 _WITHOUT_GAPS = {"isolated", "reference", "auto"}
 """Couplings that know no gaps of the surface's cells, nor laws of what leaks through them."""
@@ -134,11 +127,13 @@ def check_together(scene: SceneSections, of_coupling: Iterable[str]) -> None:
     Raises:
         InputError: With the first reason.
     """
+    interface = (scene.leak, scene.conductance, scene.friction)
     problems = chain(
-        *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings, _leak)),
-        _representative_laws(scene, of_coupling),
-        _micro_models(scene),
-        _friction(scene),
+        *(rule(scene) for rule in (_bodies, _body_loads, _surfaces, _couplings)),
+        scene.law.problems(scene, of_coupling),
+        scene.micro.problems(scene),
+        *(section.problems(scene) for section in interface if section is not None),
+        _shear(scene),
     )
     for key, problem, allowed in problems:
         raise InputError(problem, key=key, allowed=allowed or None)
@@ -258,132 +253,9 @@ def _couplings(scene: SceneSections) -> Iterator[Problem]:
         )
 
 
-def _leak(scene: SceneSections) -> Iterator[Problem]:
-    """Yield what does not fit of the flow over a face, between its edges."""
-    leak = scene.leak
-    if leak is None:
-        return
-    over_face = "law.kind = 'representative' on a [body]"
-    if leak.between_edges and (scene.body is None or not scene.law.representative):
-        yield "leak.inlet", f"needs {over_face}, whose face has edges", "leave out both edges"
-    if scene.law.representative and not leak.between_edges:
-        problem = "is required with law.kind = 'representative': the fluid flows over the face"
-        yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
-
-
-def _representative_laws(scene: SceneSections, of_coupling: Iterable[str]) -> Iterator[Problem]:
-    """Yield the keys that a law of a periodic sample has no use for."""
-    if not scene.law.representative:
-        return
-    law, out = "law.kind = 'representative'", "leave it out"
-    values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
-    stated = set(of_coupling)
-    if stated >= {key for key, value in values.items() if value is not None}:  # written whole
-        stated = {key for key in stated if values[key] != default[key]}
-    for key in sorted(stated - {"table_tolerance"}):
-        yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
-    if scene.patches != type(scene.patches)():
-        yield "patches.grid", f"does not go with {law}, which has no patches", out
-    if scene.micro.model != "half-space":
-        yield "micro.model", f"does not go with {law}", "'half-space'"
-    if scene.output.contact in ("last", "all"):
-        yield "output.contact", f"does not go with {law}, which has no spots", out
-    if scene.law.seeds and scene.surface.spectrum is None:
-        yield "law.seeds", "needs surface.spectrum", "leave it out for a measured map"
-    if scene.block is not None and scene.law.regions:
-        yield "law.regions", "names faces of a mesh", "with [body]"
-    if scene.body is not None and scene.body.place is not None:
-        yield "body.place", f"does not go with {law}, whose sample has no place", out
-
-
-def _micro_models(scene: SceneSections) -> Iterator[Problem]:
-    """Yield what micro models, and patch laws that stand for them, do not know."""
-    cells, concurrent = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
-    model, by_laws = scene.micro.model, scene.kind in ("consistent", "isolated", "representative")
-    yields, conducts = scene.micro.hardness is not None, scene.conductance is not None
-    if yields and model != "half-space":
-        problem = f"does not go with micro.model = '{model}', which has no cells to yield"
-        yield "micro.hardness", problem, cells
-    if yields and scene.loading.unloads and (by_laws or scene.kind == "auto"):
-        yield (
-            "micro.hardness",
-            "does not go with a load that turns back where patch laws stand for the contact: "
-            "they are those of rising loads and have no plastic depth",
-            concurrent,
-        )
-    if conducts and yields and (by_laws or scene.kind == "auto"):
-        yield (
-            "conductance",
-            "does not go with micro.hardness where patch laws stand for the contact: their "
-            "stiffness is that of contacts that yield, which conduct all the same",
-            concurrent,
-        )
-    if scene.leak is not None and model != "half-space":
-        problem = f"does not go with micro.model = '{model}', which knows no gaps beside summits"
-        yield "leak", problem, cells
-    if conducts and model != "half-space" and not by_laws:
-        problem = f"does not go with micro.model = '{model}' without laws"
-        yield "conductance", problem, f"{cells}; or coupling.kind = 'consistent' or 'isolated'"
-
-
-def _friction(scene: SceneSections) -> Iterator[Problem]:
-    """Yield friction without shear, shear without friction, and what has no friction."""
-    loading, given = scene.loading, scene.friction is not None
-    if loading.shear_key and not given:
+def _shear(scene: SceneSections) -> Iterator[Problem]:
+    """Yield shear without friction."""
+    loading = scene.loading
+    if loading.shear_key and scene.friction is None:
         place = "load.stage" if loading.stage else f"load.{loading.shear_key}"
         yield place, "needs friction", "friction.coefficient, as in 0.3"
-    if not given:
-        return
-    if scene.rubs_on_mesh:
-        yield from _friction_on_mesh(scene)
-    elif scene.kind not in ("concurrent", "analytic"):
-        kind = f"coupling.kind = '{scene.coupling.kind}'"
-        problem = f"does not go with {kind}, which has no tangential tractions"
-        yield "friction", problem, "another coupling.kind, or laws of samples"
-    elif scene.micro.model != "half-space":
-        problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
-        yield "friction", problem, "micro.model = 'half-space'; or laws"
-    elif not loading.shear_key:
-        yield "friction", "has no effect without shear", "load.shear or load.shear_force beside it"
-    yield from _sliding(scene)
-
-
-def _friction_on_mesh(scene: SceneSections) -> Iterator[Problem]:
-    """Yield what has no tangential displacements, which friction of laws needs."""
-    reason = "but friction of laws needs the mesh of the body"
-    if scene.coupling.newton == "condensed":
-        yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
-    if scene.coupling.compliance == "decomposed":
-        yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
-    half_space = scene.counter_body is not None and scene.counter_body.mesh is None
-    if half_space and scene.kind == "isolated":
-        yield (
-            "friction",
-            "does not go with isolated laws against a half-space",
-            "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
-        )
-    if scene.output.contact in ("last", "all"):
-        yield (
-            "output.contact",
-            "the contact problem behind laws does not know what has slipped under them",
-            "'none' or 'auto'; or coupling.kind = 'concurrent'",
-        )
-
-
-def _sliding(scene: SceneSections) -> Iterator[Problem]:
-    """Yield shear forces that friction does not transmit under the prescribed forces."""
-    loading, friction = scene.loading, scene.friction
-    if friction is None or loading.shear_force is None or loading.force is None:
-        return
-    if scene.loads_bodies:  # bolts press as well
-        return
-    along = loading.shear_path == "along"
-    forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
-    for pair, force in zip(loading.shear_force, forces, strict=True):
-        most = friction.coefficient * force
-        if hypot(*pair) >= most:
-            yield (
-                "load.shear_force",
-                f"slides: friction transmits less than {most:.6g} N under {force:.6g} N",
-                f"pairs shorter than {most:.6g} N; or load.shear",
-            )

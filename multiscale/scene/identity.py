@@ -12,8 +12,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from multiscale.scene.keys import dotted
 from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import flat
 
 VERSION = "version of patchlaw"
 CONTENT = "content of "
@@ -46,7 +46,7 @@ def flat_identity(
         files: What stood for the content of the files that it names, by dotted key.
         release: Version of patchlaw.
     """
-    keys = {key: value for key, value in dotted(sections) if key not in _DRAWN}
+    keys = {key: value for key, value in flat(sections) if key not in _DRAWN}
     return keys | {CONTENT + key: each for key, each in files.items()} | {VERSION: release}
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from multiscale.scene.contents import SceneSections
 from multiscale.scene.reader import model_of
+from multiscale.scene.scene_file import flat
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,27 +126,13 @@ def _units(schema: Mapping[str, Any]) -> Iterator[str]:
             yield from _units(part)
 
 
-def dotted(data: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the keys of nested dictionaries, dotted, with their values.
-
-    Args:
-        data: The dictionaries.
-        prefix: What stands before each name.
-    """
-    for name, value in data.items():
-        if isinstance(value, dict):
-            yield from dotted(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
-
-
 def bare_quantities(data: Mapping[str, Any]) -> Iterator[str]:
     """Yield what bare numbers of a scene were taken for, such as ``height = 1 taken in mm``.
 
     Args:
         data: What was written of the scene.
     """
-    for name, value in dotted(data):
+    for name, value in flat(data):
         numbers = value if isinstance(value, list | tuple) else [value]
         bare = any(isinstance(one, int | float) and one for one in numbers)
         if bare and (unit := _key_of(name).unit):

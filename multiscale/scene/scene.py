@@ -158,7 +158,11 @@ def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:
             if not (key := key_of(one)):
                 continue
             if names_a_file(hints[one.name]):
-                yield f"{place}{key}", getattr(value, one.name)
+                named = getattr(value, one.name)
+                several = enumerate(named) if isinstance(named, tuple) else [("", named)]
+                yield from (
+                    (f"{place}{key}.{number}".rstrip("."), name) for number, name in several
+                )
             else:
                 yield from _named_files(getattr(value, one.name), f"{place}{key}.")
     elif isinstance(value, tuple):

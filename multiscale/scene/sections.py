@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
 from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.bodies import Cells
-from multiscale.scene.surface import Auto, RegionSection
+from multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
 from support.errors import InputError
 from support.fields import Count, Limits, PositiveLength, PositivePressure, changed_fields
 
+_BY_LAWS = ("consistent", "isolated", "representative", "auto")
+"""Couplings by laws, and that which may become one."""
 Pair = tuple[Count, Count]
 Radius = PositiveLength | Literal["inf"]
 Seed = Annotated[int, Limits(ge=0, le=LARGEST_SEED)]
@@ -58,21 +60,24 @@ class MicroSection:
     finite_slopes: bool | None = None
     hardness: PositivePressure | None = None
 
+    def problems(self, scene: Any) -> Iterator[Problem]:
+        """Yield what micro models, and patch laws that stand for them, do not know of yielding.
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FrictionSection:
-    """Coulomb friction of the interface; without this section it is frictionless.
-
-    Cells stick and slip where load steps solve half-space contacts themselves, with the couplings
-    ``concurrent`` and ``analytic``. Laws have friction on the mesh of the body: ``consistent``,
-    ``isolated`` and laws of samples. What shears the interface are ``load.shear`` or
-    ``load.shear_force``; with laws the body itself as well, as it bulges or expands.
-
-    Args:
-        coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
-    """
-
-    coefficient: Annotated[float, Limits(gt=0, le=10)]
+        Args:
+            scene: All sections, a `SceneSections`.
+        """
+        if self.hardness is None:
+            return
+        if self.model != "half-space":
+            problem = f"does not go with micro.model = '{self.model}', which has no cells to yield"
+            yield "micro.hardness", problem, "micro.model = 'half-space'"
+        if scene.loading.unloads and scene.kind in _BY_LAWS:
+            yield (
+                "micro.hardness",
+                "does not go with a load that turns back where patch laws stand for the contact: "
+                "they are those of rising loads and have no plastic depth",
+                "coupling.kind = 'concurrent'",
+            )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -210,6 +215,8 @@ class LawSection:
             periodic sample.
         seeds: Of a spectrum: seeds of several samples. The law is that of their mean, and their
             scatter is reported; the seed of the spectrum when not given.
+        samples: Of a ``surface.file``: further maps of the same roughness, read and prepared like
+            it. The law is that of the mean of all, and their scatter is reported.
         largest_pressure: Largest pressure at a point of the face that the laws are made for; when
             not given, ten times the mean one, or more on a crowned face. Laws are extended where a
             load step needs it.
@@ -219,6 +226,7 @@ class LawSection:
 
     kind: Literal["patch", "representative"] = "patch"
     seeds: tuple[Seed, ...] = ()
+    samples: tuple[Annotated[str, NAMES_A_FILE], ...] = ()
     largest_pressure: PositivePressure | None = None
     regions: tuple[RegionSection, ...] = ()
     crown: tuple[Radius, Radius] | None = None
@@ -236,6 +244,37 @@ class LawSection:
     def representative(self) -> bool:
         """Whether the law is that of a periodic sample."""
         return self.kind == "representative"
+
+    def problems(self, scene: Any, of_coupling: Iterable[str]) -> Iterator[Problem]:
+        """Yield the keys that a law of a periodic sample has no use for.
+
+        Args:
+            scene: All sections, a `SceneSections`.
+            of_coupling: The keys that were written of the section on the coupling.
+        """
+        if not self.representative:
+            return
+        law, out = "law.kind = 'representative'", "leave it out"
+        values, default = asdict(scene.coupling), asdict(type(scene.coupling)())
+        stated = set(of_coupling)
+        if stated >= {key for key, value in values.items() if value is not None}:  # written whole
+            stated = {key for key in stated if values[key] != default[key]}
+        for key in sorted(stated - {"table_tolerance"}):
+            yield f"coupling.{key}", f"does not go with {law}, which stands at points", out
+        if scene.patches != type(scene.patches)():
+            yield "patches.grid", f"does not go with {law}, which has no patches", out
+        if scene.micro.model != "half-space":
+            yield "micro.model", f"does not go with {law}", "'half-space'"
+        if scene.output.contact in ("last", "all"):
+            yield "output.contact", f"does not go with {law}, which has no spots", out
+        if self.seeds and scene.surface.spectrum is None:
+            yield "law.seeds", "needs surface.spectrum", "law.samples, which names further maps"
+        if scene.law.samples and scene.surface.file is None:
+            yield "law.samples", "needs surface.file", "law.seeds for a spectrum"
+        if scene.block is not None and self.regions:
+            yield "law.regions", "names faces of a mesh", "with [body]"
+        if scene.body is not None and scene.body.place is not None:
+            yield "body.place", f"does not go with {law}, whose sample has no place", out
 
 
 def _load_steps(value: Any) -> Any:

@@ -18,6 +18,9 @@ from support.checks import real_array
 from support.errors import InputError
 from support.fields import Heights, Length, Limits, PositiveLength, Tag, Unit, changed_fields
 
+Problem = tuple[str, str, str]
+"""A key, why its value makes no sense beside those of other sections, and what is allowed."""
+
 Auto = Literal["auto"]
 """Value of a key that is left to the plan."""
 

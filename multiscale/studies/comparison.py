@@ -131,9 +131,9 @@ def compare(
 ) -> Comparison:
     """Run a scene in every sensible configuration, one after another.
 
-    The values for keys that are ``auto`` are the same in all configurations. One that is predicted
-    to take more time than the budget leaves is left out. With a budget the finest reference with an
-    error bar that leaves time for the others is run first.
+    Keys that are ``auto`` get the same values in all configurations. With a budget, configurations
+    that are predicted to take more time than it leaves are left out, and the finest reference with
+    an error bar that leaves time for the others is run first.
 
     Args:
         scene: The scene.
@@ -141,13 +141,13 @@ def compare(
             process alone.
         against: Kind of the measure that configurations are compared against. By default the best
             that is reached, of an explicit reference, the concurrent coupling and the half-space.
-        budget_s: Wall time for all configurations that are run now [s]; one that exceeds the rest
-            is ended. None for any.
+        budget_s: Wall time of this call [s]; a configuration that exceeds what is left of it is
+            ended. None for any.
         folder: Folder where results are stored, so that the next call goes on from them; None
             stores nothing.
         solve: Runs a configuration on a communicator for so many seconds at most.
         begin: Called with every configuration that is about to be run.
-        observe: Called with every configuration that was run now, and its result.
+        observe: Called with every configuration that this call has run, and its result.
 
     Returns:
         The comparison, with a row for every configuration, run or not.

@@ -16,7 +16,6 @@ import numpy as np
 from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
 from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
-from multiscale.results.data_frames import data_frame
 from multiscale.results.history import History
 from multiscale.results.reading import read_history, result_of_a_run
 from multiscale.scene.scene_file import flat
@@ -32,7 +31,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
-from support.displayed import Displayed, Table
+from support.displayed import Displayed, Table, data_frame
 from support.errors import InputError
 
 _MOST_CHANGES = 40
@@ -79,7 +78,7 @@ class Difference(Displayed):
         histories: Their load steps.
         at: What they have in common: ``"pressure"``, the mean pressure, or ``"approach"``.
         loads: Where they are compared, rising, shape (n,) [MPa or mm].
-        ratios: Every quantity that both know; that which the load does not prescribe first.
+        ratios: Every quantity that both have; that which the load does not prescribe first.
         changes: Keys of the scenes that differ, with both values; empty where not known.
         notes: What a reader should know.
     """
@@ -99,7 +98,7 @@ class Difference(Displayed):
             name: Its name, such as ``"approach_mm"``.
 
         Raises:
-            InputError: When one of the runs does not know it.
+            InputError: When one of the runs does not have it.
         """
         for ratio in self.ratios:
             if ratio.name == name:
@@ -108,7 +107,7 @@ class Difference(Displayed):
         raise InputError("is not known of both runs", key="name", value=name, allowed=known)
 
     def load_text(self, index: int = -1) -> str:
-        """Return a load as people say it.
+        """Return a load with its unit, as text.
 
         Args:
             index: Which of the loads; the largest by default.
@@ -165,7 +164,7 @@ class Difference(Displayed):
         """Return headings and rows: the ratios of all quantities at all loads.
 
         Args:
-            most: Loads that are shown; of more as many at equal distances.
+            most: Largest number of loads shown; of more, so many at equal distances.
         """
         name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
         count = len(self.loads)
@@ -187,7 +186,7 @@ class Difference(Displayed):
         Returns:
             A matplotlib figure; a notebook shows it.
         """
-        return by_matplotlib("studies.difference_figure.difference_figure", self)
+        return by_matplotlib("studies.figures.difference_figure", self)
 
     def displayed(self) -> tuple[str, Table]:
         """Return what is compared in a line, and the table of the last load."""

@@ -141,7 +141,9 @@ def _described(run: Run, history: History) -> dict[str, Any]:
     finite_slopes = run.coupling.meshes_roughness or bool(run.coupling.finite_slopes)
     return {
         "measured": {
-            "phases": run.clock.times, "unknowns": run.unknowns, "finite_slopes": finite_slopes,
+            "phases": run.clock.times,
+            "unknowns": run.coupling.unknowns,
+            "finite_slopes": finite_slopes,
         },
         "arrays": curves | {"patch_pressure": pressure},
-    }  # fmt: skip
+    }

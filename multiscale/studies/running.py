@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.results.history import COLUMNS, History
+from multiscale.loading.load_step import COLUMNS
+from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.identity import changes, told
 from multiscale.scene.scene import Scene

@@ -16,17 +16,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from multiscale.console import case_progress
 from multiscale.figures import by_matplotlib
-from multiscale.progress import case_progress
+from multiscale.loading.load_step import COLUMNS
 from multiscale.readable import column
-from multiscale.results.data_frames import data_frame
-from multiscale.results.history import COLUMNS
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases
 from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from support.collective import on_root, place_in, together
-from support.displayed import Displayed, Table, of_columns, spread
+from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
 
 Array = NDArray[np.float64]

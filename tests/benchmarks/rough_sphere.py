@@ -1,7 +1,7 @@
 """The rough sphere of Greenwood & Tripp 1967 on finite elements, over roughness and mesh.
 
-`.venv/bin/python tests/benchmarks/rough_sphere.py` prints the table of `docs/accuracy.md`; it
-takes two minutes.
+`.venv/bin/python tests/benchmarks/rough_sphere.py` prints the errors that `docs/accuracy.md` sums
+up; it takes two minutes.
 """
 
 import sys

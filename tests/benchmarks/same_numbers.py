@@ -1,12 +1,12 @@
-"""Compare the histories of forty scenes between two checkouts, number by number.
+"""Compare the histories of some fifty scenes between two checkouts, number by number.
 
     python tests/benchmarks/same_numbers.py store before.json CHECKOUT   # with its own .venv
     python tests/benchmarks/same_numbers.py store after.json .
     python tests/benchmarks/same_numbers.py compare before.json after.json
 
-The scenes cover all couplings, micro models, bodies, controls, hardness, conductance,
-counter-bodies and laws. Numbers are all of `LoadStep` but times and iterations, those of patches
-included. The cache is off.
+The scenes cover all couplings, micro models, bodies, controls, hardness, conductance, friction,
+leaks, counter-bodies and laws. Numbers are all of `LoadStep` but times and iterations, those of
+patches and leaks included. The cache is off.
 """
 
 import json
@@ -38,6 +38,9 @@ HEAT = {
     "conductivity": ["50 W/m/K"], "resistivity": ["1.7e-7 ohm m"], "gas": "0.026 W/m/K",
     "temperature_jump": "0.4 um",
 }  # fmt: skip
+OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"]}
+RUBS = {"friction": {"coefficient": 0.3}}
+SHEARED = {**FORCE, "shear": [["0.4 um", "0.1 um"], ["-0.2 um", "0"]], "shear_steps": 2}
 LAW = {"kind": "representative"}
 SAMPLE = {**SURFACE, "grid": [16, 16], "lengths": ["0.1 mm", "0.1 mm"]}
 
@@ -119,6 +122,15 @@ def scenes(folder):
     yield "body concurrent", scene("concurrent", SLOPES, output=CHECKED, **body)
     yield "body full", scene("consistent", coupling={"newton": "full"}, load=TILTED, **body)
     yield "body pair", scene("concurrent", load=FORCE, counter_body=above, **body)
+    yield "concurrent friction", scene("concurrent", load=SHEARED, **RUBS)
+    yield "consistent friction", scene("consistent", load=SHEARED, **RUBS)
+    yield "representative friction", sampled(load=SHEARED, **RUBS, **body)
+    hard = {**HALF, "hardness": "312.7 MPa"}
+    yield "analytic leak", scene("analytic", hard, CYCLE, CHECKED, leak=OIL)
+    yield "concurrent leak", scene("concurrent", output=CHECKED, leak=OIL)
+    yield "consistent leak", scene("consistent", output=CHECKED, leak=OIL)
+    over_face = {**OIL, "inlet": "left", "outlet": "right"}
+    yield "face leak", sampled(load=FORCE, output=CHECKED, leak=over_face, **body)
     auto = scene("", accuracy=0.05, micro=None, block=CONSTANTS, patches=None, load=FORCE)
     del auto["coupling"]
     yield "accuracy", auto
@@ -134,8 +146,11 @@ def write_meshes(folder):
         gmsh.model.occ.addBox(0, 0, z, 1, 1, 1)
         gmsh.model.occ.synchronize()
         gmsh.model.setPhysicalName(3, gmsh.model.addPhysicalGroup(3, [1]), "body")
-        for side, height in (("bottom", z), ("top", z + 1.0)):
-            box = (-1, -1, height - 0.1, 2, 2, height + 0.1)
+        sides = {"bottom": (-1, -1, z - 0.1, 2, 2, z + 0.1)}
+        sides["top"] = (-1, -1, z + 0.9, 2, 2, z + 1.1)
+        sides["left"] = (-0.1, -1, z - 1, 0.1, 2, z + 2)
+        sides["right"] = (0.9, -1, z - 1, 1.1, 2, z + 2)
+        for side, box in sides.items():
             faces = [tag for _, tag in gmsh.model.getEntitiesInBoundingBox(*box, dim=2)]
             gmsh.model.setPhysicalName(2, gmsh.model.addPhysicalGroup(2, faces), side)
         gmsh.option.setNumber("Mesh.MeshSizeMax", 0.25)
@@ -161,6 +176,13 @@ def numbers(history):
                 value = dict(value)
             elif field.name == "patches":
                 value = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
+            elif field.name == "leaks":
+                value = {
+                    f"{leak.way} {one.name}": getattr(leak, one.name)
+                    for leak in value
+                    for one in dataclasses.fields(leak)
+                    if one.name not in ("way", "causes")
+                }
             parts = value if isinstance(value, dict) else {"": value}
             for part, content in parts.items():
                 if content is not None:

@@ -32,8 +32,8 @@ def of_rank(cases: int, keys: list[str], folder: Path) -> None:
     from mpi4py import MPI
 
     from multiscale import Scene, sweep
+    from multiscale.loading.load_step import COLUMNS
     from multiscale.machine import peak_memory
-    from multiscale.results.history import COLUMNS
 
     comm = MPI.COMM_WORLD
     scene = Scene.load(ROOT / "demos/scenes/paper.toml", [*SCENE, *keys])

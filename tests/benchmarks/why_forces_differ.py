@@ -2,7 +2,7 @@
 
     python tests/benchmarks/why_forces_differ.py
 
-The map of ground steel, as ``demos/scenes/my_surface.toml`` presses it, is pressed again with one
+The map of ground steel of ``demos/scenes/my_surface.toml``, elastic, is pressed again with one
 thing changed: under the force of the scene, for its approach and area, and to the approach of the
 scene, for its force.
 """
@@ -12,7 +12,7 @@ from pathlib import Path
 from patchlaw import Scene, run
 
 ROOT = Path(__file__).resolve().parents[2]
-FORCE, APPROACH = "20 N", "0.59 um"  # the second is what the first gives as the scene is
+FORCE, APPROACH = "20 N", "0.59 um"  # the second is what the first gives, elastic
 
 CHANGES = {
     "as it is": {},
@@ -35,12 +35,13 @@ CHANGES = {
     "twice the heights a side": {"surface.resample": [384, 384]},
     "elliptic asperities": {"coupling.kind": "analytic", "micro.model": "elliptic"},
     "hardness 7 GPa": {"micro.hardness": "7 GPa"},
+    "hardness 2.5 GPa": {"micro.hardness": "2.5 GPa"},
 }
 
 
 def main():
     scene = Scene.load(ROOT / "demos" / "scenes" / "my_surface.toml").with_(
-        {"load.steps": 1, "output.check": "none", "output.contact": "none"}
+        {"micro.hardness": None, "load.steps": 1, "output.check": "none", "output.contact": "none"}
     )
     print("| changed | approach under 20 N | area | force at 0.59 µm |\n|---|---|---|---|")
     for name, changes in CHANGES.items():

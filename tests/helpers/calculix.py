@@ -15,6 +15,7 @@ from macro.mesh.contact_face import FacetQuadrature
 PROGRAM = shutil.which("ccx")
 _HEIGHT, _MARGIN = 0.25, 0.25  # of the plate that stands for the rigid plane [mm]
 _TOP = 1e-9  # distance from a face that is rounding [mm]
+_INCREMENTS = {False: "1., 1.", True: "0.005, 1., 1e-6, 0.1"}
 _SQUARE = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
 # per cell: CalculiX' element, its order of our nodes, its faces by its own vertices
 _ELEMENTS = {
@@ -69,16 +70,18 @@ class Solution:
         reaction: Force that the bottom bears [N].
         displacement: Displacements of the block's nodes, in our order, shape (n, 3) [mm].
         pressure: Pressures at the nodes in contact, by our number of the node [MPa].
+        shear: Shear forces on the plane after every shift, shape (m, 2) [N].
     """
 
     force: float
     reaction: float
     displacement: np.ndarray
     pressure: dict
+    shear: np.ndarray
 
 
-def solve(folder, face, laws, control, crown=None):
-    """Press a block under exported laws with CalculiX.
+def solve(folder, face, laws, control, crown=None, shifts=()):
+    """Press a block under exported laws with CalculiX, then shift the plane along it.
 
     Args:
         folder: Folder for the files.
@@ -86,8 +89,10 @@ def solve(folder, face, laws, control, crown=None):
         laws: File of surface interactions, as exported; included as it is.
         control: Approach and tilt of the plane.
         crown: Depth of the face at (x, y) [mm], by which its nodes are lowered; None: flat.
+        shifts: Shifts (x, y) of the plane one after the other [mm].
     """
-    (folder / "block.inp").write_text("\n".join(_deck(face, laws, control, crown)) + "\n")
+    lines = _deck(face, laws, control, crown, shifts)
+    (folder / "block.inp").write_text("\n".join(lines) + "\n")
     return _read(printed(folder, "block"))
 
 
@@ -99,14 +104,14 @@ def printed(folder, deck):
         env=os.environ | {"OMP_NUM_THREADS": "1"},
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=500,
         check=False,
     )
     assert done.returncode == 0 and "*ERROR" not in done.stdout, done.stdout[-2000:]
     return (folder / f"{deck}.dat").read_text()
 
 
-def _deck(face, laws, control, crown):
+def _deck(face, laws, control, crown, shifts):
     """Yield the lines of the input deck."""
     block, nodes = face.body, face.space.tabulate_dof_coordinates().copy()
     top = np.abs(nodes[:, 2]) < _TOP
@@ -143,16 +148,19 @@ def _deck(face, laws, control, crown):
         yield f"FACE_{name}, MASTER"
     yield "*NSET, NSET=BOTTOM"
     yield from (f"{i + 1}," for i in np.flatnonzero(nodes[:, 2] < nodes[:, 2].min() + _TOP))
-    # residuals and corrections of 1e-8 instead of 5e-3: what is compared is the discretisation
-    yield from ("*STEP", "*STATIC", "1., 1.", "*CONTROLS, PARAMETERS=FIELD", "1e-8, 1e-8, , , 1e-8")
-    yield from ("*BOUNDARY", "BOTTOM, 1, 3, 0.", "PLANE, 1, 2, 0.")
     approach = control.approach + (corner - face.patches.middle) @ np.array(control.tilt)
-    for row in plate:
-        yield from (f"{i}, 3, 3, {-down:.12e}" for i, down in zip(row, approach, strict=True))
-    yield from ("*NODE PRINT, NSET=BODY", "U")
-    yield from ("*NODE PRINT, NSET=PLANE, TOTALS=ONLY", "RF")
-    yield from ("*NODE PRINT, NSET=BOTTOM, TOTALS=ONLY", "RF", "*CONTACT PRINT", "CSTR")
-    yield "*END STEP"
+    for x, y in ((0.0, 0.0), *shifts):
+        # residuals and corrections of 1e-8 instead of 5e-3: what is compared is the discretisation
+        yield from ("*STEP, INC=1000", "*STATIC", _INCREMENTS[bool(shifts)])
+        yield from ("*CONTROLS, PARAMETERS=FIELD", "1e-8, 1e-8, , , 1e-8")
+        yield from ("*BOUNDARY", "BOTTOM, 1, 3, 0.")
+        yield from (f"PLANE, 1, 1, {x:.12e}", f"PLANE, 2, 2, {y:.12e}")
+        for row in plate:
+            yield from (f"{i}, 3, 3, {-down:.12e}" for i, down in zip(row, approach, strict=True))
+        yield from ("*NODE PRINT, NSET=BODY, FREQUENCY=1000", "U")
+        yield from ("*NODE PRINT, NSET=PLANE, TOTALS=ONLY, FREQUENCY=1000", "RF")
+        yield from ("*NODE PRINT, NSET=BOTTOM, TOTALS=ONLY, FREQUENCY=1000", "RF")
+        yield from ("*CONTACT PRINT, FREQUENCY=1000", "CSTR", "*END STEP")
 
 
 def _oriented(cells, nodes):
@@ -165,18 +173,22 @@ def _oriented(cells, nodes):
 
 
 def _read(text):
-    """Read the results that were printed."""
+    """Read the results that were printed at the end of every step; those of the last one."""
     blocks = re.split(r"\n\s*\n", text)
-    tables = dict(zip(blocks[::2], blocks[1::2], strict=False))
+    tables = list(zip(blocks[::2], blocks[1::2], strict=False))
 
     def rows(start):
-        (body,) = [body for title, body in tables.items() if title.strip().startswith(start)]
-        return np.array([[float(word) for word in line.split()] for line in body.splitlines()])
+        found = [body for title, body in tables if title.strip().startswith(start)]
+        return [
+            np.array([[float(word) for word in line.split()] for line in body.splitlines()])
+            for body in found
+        ]
 
-    contact = rows("contact stress")
+    plane = -np.concatenate(rows("total force (fx,fy,fz) for set PLANE"))
     return Solution(
-        force=-float(rows("total force (fx,fy,fz) for set PLANE")[0, 2]),
-        reaction=float(rows("total force (fx,fy,fz) for set BOTTOM")[0, 2]),
-        displacement=rows("displacements")[:, 1:],
-        pressure={int(node) - 1: pressure for node, pressure in contact[:, :2]},
+        force=plane[-1, 2],
+        reaction=float(rows("total force (fx,fy,fz) for set BOTTOM")[-1][0, 2]),
+        displacement=rows("displacements")[-1][:, 1:],
+        pressure={int(node) - 1: pressure for node, pressure in rows("contact stress")[-1][:, :2]},
+        shear=-plane[1:, :2],
     )

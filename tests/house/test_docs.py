@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
+from multiscale.loading.load_step import COLUMNS
 from multiscale.output.results import FILES
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
 from multiscale.results.extrapolation import Estimate
-from multiscale.results.history import COLUMNS, PATCH_COLUMNS, PATCH_STIFFNESS
+from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.keys import scene_keys
 

@@ -14,7 +14,7 @@ TEXT = (ROOT / "README.md").read_text(encoding="utf-8")
 DEMOS, DOCS = ROOT / "demos", ROOT / "docs"
 PAGES = sorted(DOCS.glob("*.md"))
 SITE = [
-    ROOT / "README.md", ROOT / "CHANGELOG.md", *PAGES, *DOCS.glob("api/*.md")
+    *ROOT.glob("*.md"), *PAGES, *DOCS.glob("api/*.md")
 ]  # fmt: skip
 LINK = re.compile(r"\]\((?!http)([^)#]*)(?:#([^)]+))?\)")
 
@@ -27,6 +27,7 @@ def tracked_files():
     return set(listed.stdout.splitlines())
 
 
+PLAN = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 FEATURES = (DOCS / "features.md").read_text(encoding="utf-8")
 
 
@@ -97,7 +98,7 @@ def test_every_demo_and_picture_is_shown():
 
 
 def test_every_name_in_the_floor_plan_is_a_folder_or_a_module():
-    block = TEXT[TEXT.index("\nmultiscale/ ") :].partition("```")[0]
+    block = PLAN[PLAN.index("\nmultiscale/ ") :].partition("```")[0]
     package, packages = "", []
     for line in block.strip().splitlines():
         named = re.match(r"(\w+/)? {2,}(.*)", line)
@@ -112,7 +113,7 @@ def test_every_name_in_the_floor_plan_is_a_folder_or_a_module():
 
 
 def test_every_folder_is_in_the_floor_plan():
-    block = TEXT[TEXT.index("\nmultiscale/ ") :].partition("```")[0]
+    block = PLAN[PLAN.index("\nmultiscale/ ") :].partition("```")[0]
     for package in ("multiscale", "micro", "macro"):
         for path in (ROOT / package).glob("*/__init__.py"):
             if path.parent.name not in ("pairs", "complementarity"):

@@ -227,7 +227,7 @@ def test_a_run_goes_on_within_stages(folder, tmp_path, before):
     write_checkpoint(tmp_path / FILE_NAME, checkpoint_of(first, first.state()))
     list(steps)
     again, kept = Run(scene), find_checkpoint(tmp_path, scene)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     assert len(again.steps) == 12
     assert forces(again) == pytest.approx(forces(first), rel=1e-9)  # Newton's residual

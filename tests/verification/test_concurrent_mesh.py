@@ -71,3 +71,24 @@ def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
     found = forces(body=body, counter_body=counter, **SMALL)
     softer = body | {"young_modulus": 0.5 * E}
     np.testing.assert_allclose(found, forces(body=softer, **SMALL), rtol=1e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("first", ["block", "mesh"])
+def test_a_margin_goes_with_a_meshed_counter_body(tmp_path, first):
+    """Two alike bodies, both wider than the surface, are one of half the modulus."""
+    wide = CONSTANTS | {"margin": 0.2}
+    first = {"block": wide} if first == "block" else {"body": cube(tmp_path, 10, margin=0.2)}
+    counter = cube(tmp_path, 10, margin=0.2, above=True)
+    found = forces(counter_body=counter, **first, **SMALL)
+    softer = wide | {"young_modulus": 0.5 * E}
+    np.testing.assert_allclose(found, forces(block=softer, **SMALL), rtol=2e-3)  # that of 10³
+
+
+@pytest.mark.parametrize("slopes", [False, True])
+def test_a_stiff_counter_body_is_a_rigid_plane_beside_a_margin(tmp_path, slopes):
+    """The pair takes more modes, 16 for 13, which change the force by 3e-4."""
+    block, micro = {"block": CONSTANTS | {"margin": 0.1}}, {"micro": {"finite_slopes": slopes}}
+    stiff = cube(tmp_path, 3, above=True) | {"young_modulus": 1e9 * E}
+    found = forces(counter_body=stiff, **block, **micro)
+    np.testing.assert_allclose(found, forces(**block, **micro), rtol=6e-4)

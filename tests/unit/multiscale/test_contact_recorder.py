@@ -158,7 +158,7 @@ def test_contacts_survive_a_checkpoint(tmp_path):
             write_checkpoint(path, checkpoint_of(whole, whole.state()))
     kept = read_checkpoint(path)
     again = Run(whole.given)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
     list(again.load_steps())
     for one, other in zip(again.contacts, whole.contacts, strict=True):
         assert one.step == other.step

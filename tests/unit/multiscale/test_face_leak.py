@@ -47,6 +47,22 @@ def scene(box, leak=OIL, **changes):
     return Scene.from_dict({**data, **changes})
 
 
+@pytest.fixture(scope="module")
+def laws(box):
+    """The laws of the sample, which all its runs have in common."""
+    done = Run(scene(box))
+    table = done.make_laws()
+    done.close()
+    return table
+
+
+def begun(given, laws):
+    """Return a run with laws that are at hand."""
+    done = Run(given)
+    done.coupling.table = laws
+    return done
+
+
 def gaps(model, separation):
     """Return the gaps of a periodic sample at a mean separation."""
     reference = model.reference_height - model.surface.mean_height
@@ -54,9 +70,9 @@ def gaps(model, separation):
 
 
 @pytest.mark.parametrize(("edges", "axis"), [(("left", "right"), 0), (("back", "front"), 1)])
-def test_an_evenly_pressed_box_leaks_as_its_sample(box, edges, axis, tmp_path):
+def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_path):
     leak = OIL | {"inlet": edges[0], "outlet": edges[1]}
-    done = Run(scene(box, leak))
+    done = begun(scene(box, leak), laws)
     steps = list(done.load_steps())
     ((model,),) = done.coupling.periodic_models
     along, across = ((6.0, 4.0), (4.0, 6.0))[axis]
@@ -87,10 +103,10 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, edges, axis, tmp_path):
     done.close()
 
 
-def test_transmissivity_grows_as_the_separation_where_nothing_touches(box):
-    done = Run(scene(box))
+def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws):
+    done = begun(scene(box), laws)
     ((model,),) = done.coupling.periodic_models
-    (law,) = done.make_laws().laws
+    (law,) = laws.laws
     flow = law.transmissivity
     touch = flow.separation[-1]
     np.testing.assert_allclose(
@@ -192,8 +208,9 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     )
 
 
-def test_the_fluid_pressure_is_written_with_the_fields(box, tmp_path):
-    done = Run(scene(box, output={"figures": False, "report": False, "fields": "last"}))
+def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
+    output = {"figures": False, "report": False, "fields": "last"}
+    done = begun(scene(box, output=output), laws)
     list(done.load_steps())
     done.write_fields(tmp_path / "fields.xdmf")
     text = (tmp_path / "fields.xdmf").read_text(encoding="utf-8")

@@ -115,7 +115,7 @@ def test_a_run_goes_on_with_its_sliders(kind, tmp_path):
     write_checkpoint(path, checkpoint_of(first, first.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(scene(kind))
-    second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)
+    second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)
     rest = list(second.load_steps())
     second.close()
     assert [step.step for step in rest] == [5, 6, 7]

@@ -93,7 +93,7 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
     path = tmp_path / "checkpoint.state"
     write_checkpoint(path, checkpoint_of(first, first.state()))
     kept, again = read_checkpoint(path), Run(scene())
-    again.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
     after = list(again.load_steps())
     for name in ("force_N", "plastic_depth_mm", "plastic_work_mJ", "work_mJ"):
         assert [getattr(one, name) for one in after] == [getattr(one, name) for one in steps[2:]]

@@ -9,9 +9,9 @@ import pytest
 from micro.flow.gap_flow import gap_flow
 from multiscale import Run, Scene, gap_flows, make_setup, run
 from multiscale.observers import leak as observer
+from multiscale.observers.leak import leak_text
 from multiscale.output.results import write_results
 from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
-from multiscale.results.leak_notes import leak_text
 from multiscale.results.reading import read_history
 from support.errors import InputError
 
@@ -186,7 +186,7 @@ def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
             write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(done, done.state()))
     kept = read_checkpoint(tmp_path / "checkpoint.state")
     resumed = Run(scene(output={"figures": True, "report": True}))
-    resumed.resume(kept.steps, kept.position, kept.state, kept.laws, kept.contacts)
+    resumed.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
     assert len(list(resumed.load_steps())) == 2
     write_results(tmp_path, done, options=[])
     assert (tmp_path / "leak.png").stat().st_size > 10_000

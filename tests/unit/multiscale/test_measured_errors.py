@@ -153,7 +153,7 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     kept = checkpoint_of(whole, whole.state())
     list(steps)
     again = Run(scene("concurrent"))
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     assert again.steps[-1].errors == whole.steps[-1].errors
 

@@ -90,6 +90,26 @@ def test_top_may_begin_before_the_face(body):
     )
 
 
+def test_modes_of_a_rectangle_within_the_top_lose_nothing(body):
+    moved = BodyModes(LENGTHS, body.matrix, (-0.2, -0.1), 0.5 * body.matrix)
+    inner = moved.within((0.7, 0.5))
+    assert inner.lengths == (0.7, 0.5) and inner.origin == (0.0, 0.0)
+    points = np.array([0.0, 0.4, 0.7]), np.array([0.3, 0.2, 0.5])
+    np.testing.assert_allclose(between(inner, *points), between(moved, *points), rtol=1e-11)
+    np.testing.assert_allclose(inner.rough, 0.5 * inner.matrix, rtol=1e-13)
+    assert body.within(LENGTHS) is body
+
+
+def test_two_bodies_add_whatever_their_modes(body):
+    few, points = body.fewer(2), (np.array([0.1, 1.0]), np.array([0.3, 0.6]))
+    for one, other in ((body, few), (few, body)):
+        found = between(one.plus(other), *points)
+        np.testing.assert_allclose(found, between(body, *points) + between(few, *points))
+    assert few.plus(few).rough is None
+    shown = BodyModes(LENGTHS, body.matrix, rough=0.5 * body.matrix)
+    np.testing.assert_allclose(shown.plus(body).rough, 1.5 * body.matrix)
+
+
 def test_fewer_modes_are_the_first_ones(body):
     x, y = np.array([0.3, 0.9]), np.array([0.1, 0.6])
     cut = body.matrix.reshape(3, 3, 3, 3).copy()

@@ -11,7 +11,7 @@ def errors(contraction, target, steps):
     known, point, found = AndersonMixing(), np.zeros_like(target), []
     for _ in range(steps):
         residual = (contraction @ (point - target).ravel()).reshape(target.shape) + target - point
-        point = known.next(point, residual)
+        point = known.next(point, -point, point + residual, np.ones(point.shape, bool))
         found.append(np.linalg.norm(point - target) / np.linalg.norm(target))
     return found
 
@@ -44,5 +44,5 @@ def test_many_unknowns_converge_faster_than_plain_steps():
 def test_stays_at_the_fixed_point():
     known, point = AndersonMixing(), np.ones(3)
     for _ in range(3):
-        point = known.next(point, np.zeros(3))
+        point = known.next(point, -point, point, np.ones(3, bool))
     assert point.tolist() == [1.0, 1.0, 1.0]

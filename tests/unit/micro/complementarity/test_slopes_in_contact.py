@@ -141,3 +141,23 @@ def test_iterations_of_all_solutions_are_counted(approach, tilt, monkeypatch):
     counts.clear()
     state = MODEL.press(Control(approach=approach, tilt=tilt), start=start.guess)
     assert state.iterations == sum(counts)
+
+
+def test_solutions_nearby_tell_how_slopes_change():
+    """Half-way between two solutions their changes leave the second evaluation next to nothing."""
+    calls, displacement = [], SLOPES.displacement
+
+    class Counted:
+        """Finite slopes whose evaluations are counted."""
+
+        def displacement(self, pressure):
+            calls.append(pressure)
+            return displacement(pressure)
+
+    model = replace(MODEL, slopes=(Counted(),))
+    low, high = (model.solve(approach).guess for approach in (7.5e-3, 8e-3))
+    calls.clear()
+    between = model.solve(7.75e-3, start=low.towards(high, 0.5))
+    assert len(calls) == 2  # 3 without the two solutions
+    # each is right to the change by slopes that ends it, 3e-9 at most
+    assert between.force == pytest.approx(MODEL.solve(7.75e-3).force, rel=4e-9)

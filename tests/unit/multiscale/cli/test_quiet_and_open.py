@@ -12,7 +12,7 @@ from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
-from multiscale.cli.completion import completion
+from multiscale.cli.keys import completion
 from multiscale.scene.keys import scene_keys
 
 

@@ -58,7 +58,7 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     path = write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(first, first.state()))
     last = next(steps)
     kept, again = read_checkpoint(path), Run(scene)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     (resumed,) = again.load_steps()
     # Newton's iteration ends at 1e-9 of the load
     assert resumed.approach_mm == pytest.approx(last.approach_mm, rel=1e-8)

@@ -109,7 +109,7 @@ def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
     next(steps)
     next(steps)
     again = Run(scene(*more))
-    again.resume(first.steps, first.position, first.state(), first.law_bytes, first.contacts)
+    again.resume(first.steps, first.position, first.state(), first.coupling.table, first.contacts)
     list(again.load_steps())
     assert set(again.fields.kept) == {3}
     (tmp_path / "again").mkdir()

@@ -12,12 +12,12 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from micro.complementarity import solver
 from multiscale import Run, Scene, make_setup
+from multiscale.console import Pace
 from multiscale.couplings import cost, patch_laws
 from multiscale.couplings.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
-from multiscale.progress import Pace
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):
@@ -103,7 +103,7 @@ def test_cycles_on_meshes_are_about_as_many_as_counted(way):
     run = Run(given)
     list(run.load_steps())
     counted = run.coupling.work()
-    assert counted.unknowns == (run.unknowns or counted.unknowns)
+    assert counted.unknowns == (run.coupling.unknowns or counted.unknowns)
     cycles = counted.cycles / counted.unknowns - cost.SET_UP_CYCLES
     done = sum(step.linear_iterations for step in run.steps)
     if way == "condensed":  # whose cycles make the compliance, before the first load step

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from geometry import Control
+from geometry import Control, Spectrum, synthesise
 from micro import HalfSpaceModel
 from multiscale.run import run
 from multiscale.scene.scene import Scene
@@ -88,3 +88,29 @@ def test_a_periodic_surface_is_pressed_within_its_gap(tmp_path):
     ):
         make_setup(beyond)
     make_setup(beyond.with_({"micro.hardness": "1 GPa"}))  # which lets cells yield instead
+
+
+def test_further_maps_are_samples_like_seeds(tmp_path):
+    """Maps of the surfaces that seeds draw are the same samples, and are read like any file."""
+    spectrum = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1}
+    extent = {"grid": [24, 24], "lengths": [1.0, 1.0]}
+    for seed in (1, 2, 3):
+        drawn = synthesise(Spectrum(**spectrum, seed=seed), **extent)
+        np.save(tmp_path / f"{seed}.npy", 1e3 * drawn.heights)
+    maps = {"file": "1.npy", "height_unit": "um", "periodic": True, **extent}
+    law = {"kind": "representative"}
+    rest = {
+        "block": {"young_modulus": 4e3, "poisson_ratio": 0.3, "lengths": [9, 9], "height": 9},
+        "load": {"pressure": 1.0},
+    }
+
+    def setup(surface, **samples):
+        data = {"surface": surface, "law": law | samples, **rest}
+        return make_setup(Scene.from_dict(data, source=tmp_path / "scene.toml"))
+
+    found = setup(maps, samples=["2.npy", "3.npy"]).samples[0].surfaces
+    drawn = setup({"spectrum": spectrum, **extent}, seeds=[1, 2, 3]).samples[0].surfaces
+    for one, other in zip(found, drawn, strict=True):
+        np.testing.assert_allclose(one.heights, other.heights, rtol=1e-14, atol=1e-17)
+    with pytest.raises(InputError, match=r"none.npy: law.samples: there is no such file"):
+        setup(maps, samples=["none.npy"])

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
+from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -12,10 +13,9 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from multiscale.output.provenance import provenance
-from multiscale.output.report import citations, report_html, shown_contacts
+from multiscale.output.report import citations, filled, report_html, shown_contacts
 from multiscale.output.results import write_results
 from multiscale.readable import percent, quantity
-from multiscale.results.html_page import filled
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 
@@ -150,7 +150,7 @@ def test_citation_is_that_of_the_file():
     program, paper = citations()
     stated = dict(re.findall(r'^\s*-?\s*([a-z-]+): "?([^"\n]+)"?$', given, re.M))
     assert stated["doi"] in paper and stated["journal"] in paper and stated["year"] in paper
-    assert stated["version"] in program
+    assert version("patchlaw") in program
     for title in re.findall(r'title: "(.*)"', given):
         assert title in program + paper
     for name in re.findall(r'family-names: "?([^"\n]+)"?', given):
@@ -170,8 +170,15 @@ def cycle(folder, *words):
     return (folder / "report.html").read_text()
 
 
-def test_slider_chooses_from_all_recorded_contacts(tmp_path):
-    text = cycle(tmp_path, "output.figures=true", "output.contact=all")
+@pytest.fixture(scope="module")
+def all_contacts(tmp_path_factory):
+    """Folder and text of the report on all contacts of a cycle."""
+    folder = tmp_path_factory.mktemp("cycle")
+    return folder, cycle(folder, "output.figures=true", "output.contact=all")
+
+
+def test_slider_chooses_from_all_recorded_contacts(all_contacts):
+    folder, text = all_contacts
     page = parsed(text)
     (slider,) = [found for tag, found in page.seen if tag == "input"]
     assert (slider["type"], slider["min"], slider["max"]) == ("range", "0", "5")
@@ -187,7 +194,7 @@ def test_slider_chooses_from_all_recorded_contacts(tmp_path):
     assert f"{said} 3, 1.5 N." in page.text
     assert {"loading", "unloading"} <= set(page.text)
     assert "://" not in text and 'src="http' not in text
-    assert not list(tmp_path.glob("contact_of_step_*"))
+    assert not list(folder.glob("contact_of_step_*"))
 
 
 def test_single_contact_has_no_slider(tmp_path):
@@ -195,13 +202,12 @@ def test_single_contact_has_no_slider(tmp_path):
     assert "input" not in {tag for tag, _ in page.seen}
 
 
-def test_slider_works_as_a_browser_runs_it(tmp_path):
+def test_slider_works_as_a_browser_runs_it(all_contacts, tmp_path):
     """Without a browser: the script runs in Node on elements that have what it uses."""
     node = shutil.which("node")
     if node is None:
         pytest.skip("no Node")
-    text = cycle(tmp_path, "output.figures=true", "output.contact=all")
-    script = text.partition("<script>")[2].partition("</script>")[0]
+    script = all_contacts[1].partition("<script>")[2].partition("</script>")[0]
     before = """
     const slider = { value: "2", listeners: {}, attributes: {},
       addEventListener(name, call) { this.listeners[name] = call; },

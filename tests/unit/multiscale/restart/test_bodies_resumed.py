@@ -46,7 +46,7 @@ def test_a_run_goes_on_with_the_same_mesh_alone(tmp_path):
     write_box(mesh, TICKS)
     again = Run(scene)
     kept = find_checkpoint(folder, scene)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     found = [step.approach_mm for step in again.steps]
     assert found == pytest.approx(whole, rel=1e-9)  # Newton's residual, 1e-9 of the load

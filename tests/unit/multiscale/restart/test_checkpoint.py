@@ -84,11 +84,11 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     scale = np.abs(wanted).max(axis=0)
     scale[6:8] = scale[1]  # moments vanish: they count relative to force times 1 mm
     # on the mesh a step is solved to 1e-10 of the load from other first guesses; else bit for bit
-    exact = whole.unknowns is None
+    exact = whole.coupling.unknowns is None
     for done in (1, count - 1):
         again = Run(whole.scene)
         kept = read_checkpoint(tmp_path / f"{done}.h5")
-        again.resume(kept.steps, kept.position, kept.state, kept.laws)
+        again.resume(kept.steps, kept.position, kept.state, kept.table)
         list(again.load_steps())
         off = np.abs(columns(again.steps) - wanted)
         assert np.all(off <= (0.0 if exact else 1e-10) * scale)
@@ -140,7 +140,7 @@ def resumed(folder, changed):
     if found is None:
         return None
     run = Run(changed, resolved=found.resolved)
-    run.resume(found.steps, found.position, found.state, found.laws, found.contacts)
+    run.resume(found.steps, found.position, found.state, found.table, found.contacts)
     return run
 
 
@@ -520,6 +520,6 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     again = Run(left_open, resolved=kept.resolved)
     assert again.scene == whole.scene
     assert again.coupling.micro.surface.grid == whole.coupling.micro.surface.grid
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     np.testing.assert_allclose(columns(again.steps), columns(whole.steps), rtol=0.0, atol=0.0)

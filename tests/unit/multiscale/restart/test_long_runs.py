@@ -111,6 +111,6 @@ def test_resumed_cycles_go_on_where_they_were(tmp_path):
             break
     kept = read_checkpoint(write_checkpoint(tmp_path / "c.h5", checkpoint_of(part, part.state())))
     again = Run(part.given)
-    again.resume(kept.steps, kept.position, kept.state, kept.laws)
+    again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
     assert [step.force_N for step in again.steps] == forces

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid, Regions
-from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.results.history import COLUMNS, History
+from multiscale.loading.load_step import COLUMNS, LoadStep, PatchState
+from multiscale.results.history import History
 from support.errors import InputError
 
 FIRST_COLUMNS = (

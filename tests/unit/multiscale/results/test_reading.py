@@ -6,7 +6,7 @@ from helpers.small_scene import SMALL_SCENE
 
 from multiscale import read_history, run
 from multiscale.cli.command_line import main
-from multiscale.results.history import COLUMNS
+from multiscale.loading.load_step import COLUMNS
 from multiscale.scene.scene import Scene
 from support.errors import InputError
 

@@ -216,6 +216,14 @@ REFUSED = REFUSED_LOADS | {
         },
         "law.seeds: needs surface.spectrum",
     ),
+    "further maps of a spectrum": (
+        {"body": BODY, "law": {"kind": "representative", "samples": ["b.npy"]}},
+        "law.samples: needs surface.file",
+    ),
+    "further maps of patches": (
+        {"law": {"samples": ["b.npy"]}},
+        "law: 'samples' needs kind = 'representative'",
+    ),
     "seeds of patches": ({"law": {"seeds": [1]}}, "law: 'seeds' needs kind = 'representative'"),
     "a seed twice": (
         {"body": BODY, "law": {"kind": "representative", "seeds": [1, 1]}},

@@ -18,7 +18,8 @@ BODY = {
     "mesh": "part.msh", "contact": "top", "supports": [{"surface": "bottom"}],
     "young_modulus": 4e3, "poisson_ratio": 0.3,
 }  # fmt: skip
-LAW = {"kind": "representative", "regions": [{"surface": "rim", **SURFACE, "file": "rim.npy"}]}
+RIM = {"surface": "rim", **SURFACE, "file": "rim.npy"}
+LAW = {"kind": "representative", "samples": ["second.npy"], "regions": [RIM]}
 DATA = {
     "surface": SURFACE,
     "body": BODY,
@@ -28,7 +29,7 @@ DATA = {
 }
 KEYS = {
     "surface.file": "scan.npy", "law.regions.0.file": "rim.npy", "body.mesh": "part.msh",
-    "counter_body.mesh": "plate.xdmf",
+    "counter_body.mesh": "plate.xdmf", "law.samples.0": "second.npy",
 }  # fmt: skip
 
 

@@ -5,9 +5,10 @@ from typing import get_args, get_type_hints
 
 import pytest
 
-from multiscale.scene.keys import bare_quantities, dotted, scene_keys
+from multiscale.scene.keys import bare_quantities, scene_keys
 from multiscale.scene.reader import described
 from multiscale.scene.scene import Scene
+from multiscale.scene.scene_file import flat
 from support.fields import key_of
 
 GIVEN = {
@@ -90,7 +91,7 @@ def test_units_that_bare_numbers_were_taken_in():
     ]
 
 
-def test_dotted_keys():
-    assert dict(dotted({"a": {"b": 1, "c": {"d": [2]}}, "e": None})) == {
+def test_dotted_keys_of_nested_sections():
+    assert dict(flat({"a": {"b": 1, "c": {"d": [2]}}, "e": None})) == {
         "a.b": 1, "a.c.d": [2], "e": None,
     }  # fmt: skip

@@ -1,21 +1,28 @@
-"""The columns of ``history.csv``, each declared once."""
+"""The columns of ``history.csv``: each is declared once, at the attribute of the load step."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import KW_ONLY, MISSING, dataclass, field, fields
+from itertools import count
 from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.loading.load_step import LoadStep
 from multiscale.readable import SCALED_UNITS, usual_unit, with_error
+
+REQUIRED: Any = MISSING
+"""Default of columns that every load step has."""
+
+_COLUMN = "column"
+"""Key of a column in the metadata of a field."""
+_places = count()
 
 
 @dataclass(eq=False)
 class Column:
-    """A column of ``history.csv``, declared as an attribute of `History`.
+    """A column of ``history.csv``, which is an attribute of load steps and of histories.
 
     Of a history it is the array of the values at all load steps; what was not measured is NaN.
 
@@ -29,9 +36,11 @@ class Column:
             it. Empty for none.
         table: The table that the column stands in: ``"curve"``, ``"more"`` for what some runs
             alone know, ``"solver"``.
+        in_report: What reports call the value of the last load step, where they list it.
 
     Attributes:
-        name: Name of the column and of the attribute of `History`.
+        name: Name of the column and of the attribute.
+        place: Place among all columns, in the order in which they are declared.
     """
 
     meaning: str
@@ -41,13 +50,12 @@ class Column:
     digits: int = 4
     error: str = ""
     table: str = "curve"
-    name: str = field(init=False)
+    in_report: str = ""
+    name: str = field(default="", init=False)
+    place: int = field(default_factory=_places.__next__, init=False)
 
     def __post_init__(self) -> None:
         self.__doc__ = f"{self.meaning} [{self.unit}]." if self.unit else f"{self.meaning}."
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name
 
     @overload
     def __get__(self, history: None, owner: type) -> Column: ...
@@ -61,15 +69,15 @@ class Column:
         values = [self.of(step) for step in history.steps]
         return np.array([np.nan if value is None else value for value in values])
 
-    def of(self, step: LoadStep) -> Any:
+    def of(self, step: Any) -> Any:
         """Return the value of a load step, its attribute of this name; None if not measured."""
         return getattr(step, self.name)
 
-    def error_of(self, step: LoadStep) -> float | None:
+    def error_of(self, step: Any) -> float | None:
         """Return the error of the value of a load step; None if not known."""
         return getattr(step, self.error, None)
 
-    def shown(self, steps: Sequence[LoadStep]) -> tuple[str, list[str]]:
+    def shown(self, steps: Sequence[Any]) -> tuple[str, list[str]]:
         """Return the heading with the unit that suits all load steps, and the value of each.
 
         Shares are shown in per cent, and values with their errors.
@@ -94,3 +102,42 @@ class Column:
             for value, error in zip(values, errors, strict=True)
         ]
         return f"{self.heading} [{name}]" if name else self.heading, texts
+
+
+class DerivedColumn(property):
+    """A property of load steps that is a column.
+
+    Args:
+        read: Returns the value of a load step; None if not known.
+        *about: What the column holds, and its unit, as of `Column`.
+        **shown: How it is shown, likewise.
+    """
+
+    def __init__(self, read: Callable[[Any], Any], *about: str, **shown: Any) -> None:
+        self.column = Column(*about, **shown)
+        super().__init__(read, doc=self.column.__doc__)
+
+
+def column(*about: str, default: Any = None, **shown: Any) -> Any:
+    """Return a field of load steps that is a column.
+
+    Args:
+        *about: What the column holds, and its unit, as of `Column`.
+        default: Value where it is not given; `REQUIRED` where there is none.
+        **shown: How it is shown, as of `Column`.
+    """
+    return field(default=default, metadata={_COLUMN: Column(*about, **shown)})
+
+
+def columns_of(record: Any) -> tuple[Column, ...]:
+    """Return the columns of a class of load steps, in the order in which they are declared.
+
+    Args:
+        record: The class, a dataclass.
+    """
+    found = {one.name: one.metadata[_COLUMN] for one in fields(record) if one.metadata}
+    derived = {n: one for n, one in vars(record).items() if isinstance(one, DerivedColumn)}
+    found |= {name: one.column for name, one in derived.items()}
+    for name, one in found.items():
+        one.name = name
+    return tuple(sorted(found.values(), key=lambda one: one.place))

@@ -1,0 +1,69 @@
+"""The picture of the rough brake pad: a map, the pad, CalculiX beside it, and the chip."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pad.calculix import Solution
+from pad.maps import SIDE
+from scipy.interpolate import LinearNDInterpolator
+
+from multiscale import LoadStep
+from multiscale.figures.maps import colour_bar
+from multiscale.figures.style import (
+    BLUE,
+    FULL_WIDTH,
+    HEIGHTS,
+    INK,
+    PRESSURES,
+    VERMILLION,
+    new_figure,
+    use_style,
+)
+
+
+def draw(
+    path: Path,
+    map_file: Path,
+    pads: dict[str, tuple[LoadStep, np.ndarray]],
+    witness: Solution | None,
+    chips: dict[str, Any],
+) -> None:
+    """Draw what the demo found.
+
+    Args:
+        path: File to write.
+        map_file: The map that is shown.
+        pads: Load step and pressures (x, y, p) on the pad, by the kind of its elements.
+        witness: What CalculiX found with linear ones; None without it.
+        chips: Histories of the chip by coupling.
+    """
+    use_style()
+    figure = new_figure(FULL_WIDTH, 5.0)
+    (one, two), (three, four) = figure.subplots(2, 2)
+    heights = 1e3 * np.load(map_file)
+    heights -= np.nanmean(heights)
+    look = {"origin": "lower", "extent": (0.0, SIDE, 0.0, SIDE), "cmap": HEIGHTS}
+    image = one.imshow(heights.T, vmin=-15.0, vmax=15.0, **look)
+    one.set(title="a map as delivered; white: no height", xlabel="x [mm]", ylabel="y [mm]")
+    one.grid(False)
+    colour_bar(image, one, "height [µm]")
+    x, y, pressure = pads["quadratic"][1].T
+    image = two.scatter(y, x, c=pressure, s=3.0, cmap=PRESSURES, vmin=0.0, linewidths=0)
+    image.set_rasterized(True)
+    two.set(aspect="equal", xlabel="y [mm]", ylabel="x [mm]", title="the pad under the law, 8 kN")
+    colour_bar(image, two, "pressure [MPa]")
+    if witness is not None:
+        linear = pads["linear"][1]
+        here = LinearNDInterpolator(linear[:, :2], linear[:, 2])(witness.places)
+        three.plot(here, witness.pressures, ".", color=BLUE, ms=2.0)
+        three.axline((0.0, 0.0), slope=1.0, color=INK, lw=0.7)
+    three.set(xlabel="pressure here [MPa]", ylabel="CalculiX [MPa]", xlim=(0, None), ylim=(0, None))
+    three.set_title("the same law at the nodes of the pad")
+    reference, embedded = chips["reference"], chips["concurrent"]
+    approach = 1e3 * np.append(0.0, embedded.approach_mm)
+    four.plot(approach, np.append(0.0, embedded.force_N), color=BLUE)
+    four.plot(1e3 * reference.approach_mm, reference.force_N, "o", color=VERMILLION)
+    four.set(xlabel="approach [µm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
+    four.set_title("a chip of the pad; points: its roughness meshed")
+    figure.savefig(path, pil_kwargs={"optimize": True})

@@ -1,0 +1,269 @@
+"""The sections of a scene on what the interface does beside bearing: rub, conduct, leak.
+
+Each says what of the other sections it does not go with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot
+from typing import Annotated, Any, Literal
+
+from multiscale.scene.surface import Problem, Tag
+from support.errors import InputError
+from support.fields import Length, Limits, Positive, Pressure, Unit
+from support.quantities import example
+
+_CELLS, _CONCURRENT = "micro.model = 'half-space'", "coupling.kind = 'concurrent'"
+
+Direction = Literal["x", "y"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionSection:
+    """Coulomb friction of the interface; without this section it is frictionless.
+
+    Cells stick and slip where load steps solve half-space contacts themselves, with the couplings
+    ``concurrent`` and ``analytic``. Laws have friction on the mesh of the body: ``consistent``,
+    ``isolated`` and laws of samples. What shears the interface are ``load.shear`` or
+    ``load.shear_force``; with laws the body itself as well, as it bulges or expands.
+
+    Args:
+        coefficient: Coefficient of friction μ: no tangential traction exceeds μ times the pressure.
+        coupled: Whether pressures pull the surface sideways and tractions lift it, as on a body
+            against a rigid plane, or of other elasticity than the other one, and on a finite body.
+            Both problems are then solved in turn until they agree. Without, it is neglected, and
+            the run says how much the shear force would differ. Cells alone can do so.
+    """
+
+    coefficient: Annotated[float, Limits(gt=0, le=10)]
+    coupled: bool = False
+
+    def problems(self, scene: Any) -> Iterator[Problem]:
+        """Yield what has no friction, friction without effect, and loads that it does not bear.
+
+        Args:
+            scene: All sections, a `SceneSections`.
+        """
+        if scene.rubs_on_mesh:
+            yield from self._on_mesh(scene)
+        elif scene.kind not in ("concurrent", "analytic"):
+            kind = f"coupling.kind = '{scene.coupling.kind}'"
+            problem = f"does not go with {kind}, which has no tangential tractions"
+            yield "friction", problem, "another coupling.kind, or laws of samples"
+        elif scene.micro.model != "half-space":
+            problem = f"does not go with micro.model = '{scene.micro.model}', which has no cells"
+            yield "friction", problem, f"{_CELLS}; or laws"
+        elif not scene.loading.shear_key:
+            problem = "has no effect without shear"
+            yield "friction", problem, "load.shear or load.shear_force beside it"
+        yield from self._sliding(scene)
+
+    def _on_mesh(self, scene: Any) -> Iterator[Problem]:
+        """Yield what has no tangential displacements, which friction of laws needs."""
+        if self.coupled:
+            problem = (
+                "is true, but laws do not know how pressures of single contacts pull the surface"
+            )
+            allowed = f"false; or {_CONCURRENT} or 'analytic'"
+            yield "friction.coupled", problem, allowed
+        reason = "but friction of laws needs the mesh of the body"
+        if scene.coupling.newton == "condensed":
+            yield "coupling.newton", f"is 'condensed', {reason}", "'full' or 'auto'"
+        if scene.coupling.compliance == "decomposed":
+            yield "coupling.compliance", f"is 'decomposed', {reason}", "'finite-element' or 'auto'"
+        half_space = scene.counter_body is not None and scene.counter_body.mesh is None
+        if half_space and scene.kind == "isolated":
+            yield (
+                "friction",
+                "does not go with isolated laws against a half-space",
+                "coupling.kind = 'consistent' or 'concurrent'; or a counter-body with a mesh",
+            )
+        if scene.output.contact in ("last", "all"):
+            yield (
+                "output.contact",
+                "the contact problem behind laws does not know what has slipped under them",
+                f"'none' or 'auto'; or {_CONCURRENT}",
+            )
+
+    def _sliding(self, scene: Any) -> Iterator[Problem]:
+        """Yield shear forces that friction does not transmit under the prescribed forces."""
+        loading = scene.loading
+        if loading.shear_force is None or loading.force is None or scene.loads_bodies:
+            return  # bolts press as well
+        along = loading.shear_path == "along"
+        forces = loading.force if along else [loading.force[-1]] * len(loading.shear_force)
+        for pair, force in zip(loading.shear_force, forces, strict=True):
+            most = self.coefficient * force
+            if hypot(*pair) >= most:
+                yield (
+                    "load.shear_force",
+                    f"slides: friction transmits less than {most:.6g} N under {force:.6g} N",
+                    f"pairs shorter than {most:.6g} N; or load.shear",
+                )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ConductanceSection:
+    """Conductance of the interface, from its stiffness by Barber's analogy.
+
+    It is exact for contacts between half-spaces; what the bodies add is left to a thermal or
+    electrical calculation of them. Either of ``conductivity`` and ``resistivity``, or both.
+
+    Args:
+        conductivity: Thermal conductivities of the body below the surface and of the one on the
+            other side; a single value where the other body conducts far better.
+        resistivity: Electrical resistivities of both bodies, or of one, as ``conductivity``.
+        gas: Thermal conductivity k of the gas, which conducts k/(g + M) per area through a gap g
+            beside the contacts. Patch laws know the mean gap alone, which is the least that it can
+            be.
+        temperature_jump: Length M that the jumps of temperature between gas and faces add to the
+            gaps; 0 when not given. For air at 1 bar about 0.4 um. Without it what passes beside
+            contacts, where gaps close, has no bound, and depends on the grid.
+        temperature: Absolute temperature of both faces, for radiation across the gaps.
+        emissivity: Effective emissivity of both faces, 1/(1/ε₁ + 1/ε₂ − 1), for radiation across
+            the gaps.
+    """
+
+    conductivity: Annotated[tuple[float, ...], Unit("W/m/K", several=True)] | None = None
+    resistivity: Annotated[tuple[float, ...], Unit("ohm*m", several=True)] | None = None
+    gas: Annotated[float, Unit("W/m/K"), Positive] | None = None
+    temperature_jump: Annotated[Length, Limits(ge=0)] | None = None
+    temperature: Annotated[float, Unit("K"), Positive] | None = None
+    emissivity: Annotated[float, Limits(gt=0, le=1)] | None = None
+
+    def __post_init__(self) -> None:
+        _check_pair("conductivity", self.conductivity, "W/m/K")
+        _check_pair("resistivity", self.resistivity, "ohm*m")
+        if self.conductivity is None and self.resistivity is None:
+            raise InputError(
+                "needs conductivities",
+                allowed="conductivity = ['50 W/m/K', '0.2 W/m/K'] for heat, "
+                "resistivity = ['1.7e-8 ohm m'] for currents, or both",
+            )
+        if self.temperature_jump is not None and self.gas is None:
+            raise InputError("'temperature_jump' is about the gas", allowed="with 'gas' beside it")
+        for key in ("gas", "temperature", "emissivity"):
+            if getattr(self, key) is not None and self.conductivity is None:
+                raise InputError(f"'{key}' is about heat", allowed="with 'conductivity' beside it")
+        if (self.temperature is None) != (self.emissivity is None):
+            raise InputError(
+                "radiation needs both 'temperature' and 'emissivity'", allowed="both, or neither"
+            )
+
+    def problems(self, scene: Any) -> Iterator[Problem]:
+        """Yield contacts whose stiffness says nothing of what they conduct.
+
+        Args:
+            scene: All sections, a `SceneSections`.
+        """
+        by_laws = scene.kind in ("consistent", "isolated", "representative")
+        if scene.micro.hardness is not None and (by_laws or scene.kind == "auto"):
+            yield (
+                "conductance",
+                "does not go with micro.hardness where patch laws stand for the contact: their "
+                "stiffness is that of contacts that yield, which conduct all the same",
+                _CONCURRENT,
+            )
+        if scene.micro.model != "half-space" and not by_laws:
+            problem = f"does not go with micro.model = '{scene.micro.model}' without laws"
+            allowed = f"{_CELLS}; or coupling.kind = 'consistent' or 'isolated'"
+            yield "conductance", problem, allowed
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LeakSection:
+    """Flow of a fluid through the gaps between two opposite sides, or edges of a contact face.
+
+    Reynolds' equation: laminar flow without inertia of an incompressible fluid of constant
+    viscosity, without cavitation, that sticks to both walls. Fluid pressure does not move them. The
+    sides along the flow are walls, unless the surface is periodic.
+
+    Args:
+        viscosity: Dynamic viscosity η of the fluid.
+        pressures: Fluid pressures at the side where x, or y, is 0, and at the opposite one, or at
+            inlet and outlet; their difference drives the flow.
+        direction: Axis along which it flows; or both, one after the other.
+        inlet: Physical name or number of a face of the body that shares an edge with the contact
+            face, where the first pressure is; with a law of samples (``law.kind =
+            "representative"``) on a mesh, which needs it. Other edges are walls.
+        outlet: The same of the second pressure.
+    """
+
+    viscosity: Annotated[float, Unit("Pa*s"), Positive]
+    pressures: tuple[Pressure, Pressure]
+    direction: Literal["x", "y", "both"] = "both"
+    inlet: Tag | None = None
+    outlet: Tag | None = None
+
+    def __post_init__(self) -> None:
+        if (self.inlet is None) != (self.outlet is None):
+            missing = "inlet" if self.inlet is None else "outlet"
+            raise InputError(
+                "is missing: a leak over a contact face needs both edges",
+                key=missing,
+                allowed="names of faces that share an edge with it",
+            )
+        if self.between_edges and self.direction != "both":
+            raise InputError("'direction' does not go with edges", allowed="leave it out")
+        if self.between_edges and self.inlet == self.outlet:
+            raise InputError("is the inlet", key="outlet", value=self.outlet, allowed="another")
+        first, second = self.pressures
+        if first == second:
+            raise InputError(
+                "drives no flow",
+                key="pressures",
+                value=list(self.pressures),
+                allowed='two different pressures such as ["2 bar", "1 bar"]',
+            )
+
+    @property
+    def between_edges(self) -> bool:
+        """Whether the fluid flows over a contact face, from edge to edge."""
+        return self.inlet is not None
+
+    @property
+    def drop(self) -> float:
+        """Fluid pressure at the first side less that at the opposite one [MPa]."""
+        return self.pressures[0] - self.pressures[1]
+
+    @property
+    def viscosity_MPa_s(self) -> float:
+        """Dynamic viscosity [MPa s]."""
+        return 1e-6 * self.viscosity
+
+    @property
+    def directions(self) -> tuple[Direction, ...]:
+        """The axes along which the fluid flows."""
+        return ("x", "y") if self.direction == "both" else (self.direction,)
+
+    def problems(self, scene: Any) -> Iterator[Problem]:
+        """Yield gaps that are not known, and edges of faces that there are none of.
+
+        Args:
+            scene: All sections, a `SceneSections`.
+        """
+        over_face = "law.kind = 'representative' on a [body]"
+        if self.between_edges and (scene.body is None or not scene.law.representative):
+            yield "leak.inlet", f"needs {over_face}, whose face has edges", "leave out both edges"
+        if scene.law.representative and not self.between_edges:
+            problem = "is required with law.kind = 'representative': the fluid flows over the face"
+            yield "leak.inlet", problem, "leak.inlet and leak.outlet, faces of a [body]"
+        if (model := scene.micro.model) != "half-space":
+            problem = (
+                f"does not go with micro.model = '{model}', which knows no gaps beside summits"
+            )
+            yield "leak", problem, _CELLS
+
+
+def _check_pair(key: str, values: tuple[float, ...] | None, unit: str) -> None:
+    """Refuse anything but positive values of one body or of both."""
+    problem = ""
+    if values is not None and len(values) not in (1, 2):
+        problem = "needs a value for one body or for both"
+    elif values and not min(values) > 0.0:
+        problem = "must be greater than 0"
+    if problem:
+        allowed = f"one or two quantities > 0 such as {example(unit)}"
+        raise InputError(problem, key=key, value=list(values or ()), allowed=allowed)

@@ -1,0 +1,167 @@
+"""CalculiX shears a sphere on a block, and runs exported laws with ``*FRICTION``.
+
+A rigid plane with the gap of a sphere presses a block and shifts along it. With a law that is a
+line a node is one spring with one slider, in CalculiX (a slope of sticking up to the coefficient of
+friction times the pressure) as here. Both solve one discrete problem, but for the increments of the
+path: a part of the friction is used up while the plane presses, as the block bulges.
+"""
+
+import tomllib
+
+import numpy as np
+import pytest
+import ufl
+from dolfinx import fem
+from dolfinx.mesh import locate_entities_boundary
+from helpers import calculix
+from helpers.block_cases import block_of
+from helpers.small_scene import SMALL_SCENE
+
+from geometry.materials import mindlin_ratio
+from geometry.patches import PatchGrid
+from geometry.rigid_plane import Control
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction, SpringBed
+from macro import ContactProblem, Interface, LawContactProblem, LoadedFace
+from multiscale.exports.export import export_laws
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+
+pytestmark = [
+    pytest.mark.skipif(calculix.PROGRAM is None, reason="CalculiX is not installed"),
+    pytest.mark.long,
+]
+
+LOAD, APPROACH, MU, NU = 1e9, 8e-6, 0.3, 0.15
+PATCHES = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+FRICTION = Friction(coefficient=MU, poisson_ratio=NU)
+RATIO = mindlin_ratio(NU)
+STIFFNESS = 40.0 * LOAD
+"""Of the law [MPa/mm]: contacts give way by a tenth of what the block does."""
+DEPTH = 4.0 * APPROACH
+"""Gap of the sphere 0.5 mm from the middle [mm]: the contact's radius is 0.25 mm."""
+FULL = MU * APPROACH
+WAY = ((0.1 * FULL, 0.0), (0.6 * FULL, 0.0), (0.6 * FULL, 0.6 * FULL), (-2.0 * FULL, 0.0))
+"""Shifts: sticking, partial slip, a turn, and back to nearly sliding [mm]."""
+
+
+class Line:
+    """The law p = K c, one spring."""
+
+    springs = SpringBed(start=np.zeros(1), width=np.zeros(1), stiffness=np.array([STIFFNESS]))
+
+    def pressure(self, closure):
+        return STIFFNESS * np.maximum(closure, 0.0)
+
+    def stiffness(self, closure):
+        return np.where(np.asarray(closure) > 0.0, STIFFNESS, 0.0)
+
+
+def sphere(x, y):
+    return 4.0 * DEPTH * ((x - 0.5) ** 2 + (y - 0.5) ** 2)
+
+
+def path(parts):
+    """Yield the loads in parts: the plane presses, then goes through all shifts."""
+    for part in range(1, parts + 1):
+        approach = part / parts * APPROACH
+        yield Control(approach=approach, shear=ShearControl(shift=(0.0, 0.0)))
+    last = np.zeros(2)
+    for end in map(np.array, WAY):
+        for part in range(1, parts + 1):
+            x, y = last + part / parts * (end - last)
+            yield Control(approach=APPROACH, shear=ShearControl(shift=(x, y)))
+        last = end
+
+
+def shear_forces(press, parts):
+    """Return the shear forces at the end of every shift by ``press``, and what it returned last."""
+    found = [press(control) for control in path(parts)]
+    return np.array([one.shear.force for one in found[2 * parts - 1 :: parts]]), found[-1]
+
+
+def on_nodes(cells):
+    block = block_of(cells=cells, young_modulus=LOAD)
+    face = LoadedFace.of_block(block, PATCHES)
+    return calculix.NodalFace(block, face.facets, PATCHES)
+
+
+def sheared_on_nodes(face, parts):
+    laws = [Line()]
+    problem = LawContactProblem(face, laws, "pointwise", crown=sphere, friction=FRICTION)
+    return shear_forces(problem.solve, parts)
+
+
+def sheared_by_interface(face, parts):
+    """Shear the same mesh as a user does: an `Interface` in a problem of dolfinx."""
+    space, block = face.space, face.body
+    u, v = fem.Function(space), ufl.TestFunction(space)
+    lame, shear = block.material.lame
+    strain = ufl.sym(ufl.grad(u))
+    stress = lame * ufl.tr(strain) * ufl.Identity(3) + 2.0 * shear * strain
+    place = space.tabulate_dof_coordinates()[:, 2]
+    bottom = np.flatnonzero(np.isclose(place, -1.0)).astype(np.int32)
+    top = locate_entities_boundary(space.mesh, 2, lambda x: np.isclose(x[2], 0.0))
+    held = fem.dirichletbc(np.zeros(3), bottom, space)
+    rough = Interface(
+        space, None, top, laws=Line(), indenter=Control(approach=0.0),
+        crown=sphere, friction=FRICTION,
+    )  # fmt: skip
+    problem = ContactProblem(ufl.inner(stress, ufl.sym(ufl.grad(v))) * ufl.dx, u, [held], rough)
+
+    def press(control):
+        rough.indenter = control
+        problem.solve()
+        return rough.state
+
+    return shear_forces(press, parts)
+
+
+def test_sphere_on_a_block_slips_as_in_calculix(tmp_path):
+    file = tmp_path / "line.inp"
+    file.write_text(
+        "*SURFACE INTERACTION, NAME=PATCH_0_0\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR\n"
+        f"0., 0.\n{STIFFNESS:.9e}, 1.\n*FRICTION\n{MU:.9g}, {STIFFNESS / RATIO:.9e}\n"
+    )
+    face = on_nodes((10, 10, 5))
+    found = calculix.solve(tmp_path, face, file, Control(approach=APPROACH), sphere, WAY)
+    ours, last = sheared_on_nodes(face, 20)
+    # 5, 10 and 20 parts are 5e-3, 1e-3 and 1e-4 off; the last shift is four times as long
+    scale = np.hypot(*ours.T)
+    off = np.hypot(*(found.shear - ours).T) / scale
+    assert off[:3].max() < 3e-4
+    assert off[3] < 2e-3
+    assert found.force == pytest.approx(last.force, rel=2e-4)
+    assert scale[3] > 0.85 * MU * last.force
+
+
+def test_interface_approaches_the_laws_at_nodes():
+    differences = []
+    for n in (6, 12):
+        face = on_nodes((n, n, n // 2))
+        nodes, points = sheared_on_nodes(face, 4)[0], sheared_by_interface(face, 4)[0]
+        differences.append(np.abs(points - nodes).max() / np.abs(nodes).max())
+    # the trapezoidal rule errs by h², and the edge of the contact by h
+    assert differences[1] < 0.5 * differences[0]
+    assert differences[1] < 0.03
+
+
+def test_exported_laws_stick_and_slide(tmp_path):
+    scene = tomllib.loads(SMALL_SCENE)
+    scene["coupling"]["kind"] = "isolated"
+    scene["patches"]["grid"] = [1, 1]
+    scene["surface"]["spectrum"]["rms_slope"] = 2e-4
+    scene["block"]["young_modulus"] = 4.0 * LOAD
+    scene["load"]["approach"] = 1.2 * APPROACH
+    table = Run(Scene.from_dict(scene)).make_laws()
+    (file,) = export_laws(table, tmp_path, "calculix", friction=MU)
+    words = file.read_text(encoding="ascii").split("*FRICTION\n")[1].splitlines()[0].split(",")
+    coefficient, stiffness = map(float, words)
+    assert coefficient == MU
+    block = block_of(cells=(3, 3, 2), young_modulus=1e3 * LOAD)  # contacts alone give way
+    face = calculix.NodalFace(block, LoadedFace.of_block(block, PATCHES).facets, PATCHES)
+    little, much = 0.01 * FULL, 20.0 * FULL
+    control = Control(approach=APPROACH)
+    found = calculix.solve(tmp_path, face, file, control, None, [(little, 0.0), (0.0, much)])
+    assert found.shear[0] == pytest.approx([stiffness * little, 0.0], rel=0.01)
+    assert np.hypot(*found.shear[1]) == pytest.approx(MU * found.force, rel=1e-4)
