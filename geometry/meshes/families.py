@@ -30,7 +30,7 @@ from support.errors import InputError
 Shape: TypeAlias = BlockShape | RefinedShape
 Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 
-EDGES = 3.5
+EDGES = 3.0
 """Edges along the radius of a typical contact in the finest tetrahedra, by default."""
 
 _GROWTH = 1.05
