@@ -30,6 +30,7 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
         ("pl/s", 1e-6),
         ("fl/s", 1e-9),
     ),
+    "MPa/mm": (("TPa/mm", 1e6), ("GPa/mm", 1e3), ("MPa/mm", 1.0)),
     "mm²": (("mm²", 1.0), ("µm²", 1e-6), ("nm²", 1e-12)),
     "N/mm": (("GN/m", 1e6), ("MN/m", 1e3), ("kN/m", 1.0), ("N/m", 1e-3)),
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
@@ -43,7 +44,8 @@ SCALED_UNITS = frozenset(_PREFIXES)
 
 _USUAL = {"mm": "µm", "N/mm": "kN/m"}
 """Units that columns and headlines keep as long as their numbers are of a handy size."""
-_HANDY = 0.1, 1e4
+_HANDY = {"MPa": (0.1, 1e3), "mm²": (0.01, 1e6)}
+"""Sizes of numbers that keep them, from the first on and below the second; else 0.1 and 1e4."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -103,7 +105,8 @@ def usual_unit(values: Iterable[float], unit: str) -> tuple[str, float]:
     """
     name, size = next(one for one in _PREFIXES[unit] if one[0] == _USUAL.get(unit, unit))
     largest = max((abs(value) for value in values if math.isfinite(value)), default=0.0)
-    if not largest or _HANDY[0] <= largest / size < _HANDY[1]:
+    least, most = _HANDY.get(unit, (0.1, 1e4))
+    if not largest or least <= largest / size < most:
         return name, size
     return _fitting(largest, unit)
 
@@ -118,6 +121,11 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
     """
     if not error or not math.isfinite(error):
         return number(value, digits)
+    power = math.floor(math.log10(max(abs(value), error)))
+    if power < -4:
+        shift = 10.0**-power
+        ten = f"·10{str(power).translate(_SUPERSCRIPTS)}"
+        return f"({with_error(value * shift, error * shift)}){ten}"
     places = max(1 - math.floor(math.log10(error)), 0)
     return f"{value:.{places}f} ± {error:.{places}f}"
 
@@ -166,6 +174,17 @@ def measured(value: float, error: float | None, unit: str, digits: int = 4) -> s
     """
     name, size = usual_unit([value], unit)
     return f"{with_error(value / size, error and error / size, digits)} {name}"
+
+
+def usual(value: float, unit: str, digits: int = 4) -> str:
+    """Return a quantity in its usual unit, as columns of tables have it, such as ``0.5899 µm``.
+
+    Args:
+        value: The magnitude in ``unit``.
+        unit: A key of the prefixes, such as mm, N or MPa.
+        digits: Significant digits.
+    """
+    return measured(value, None, unit, digits)
 
 
 def percent(share: float, digits: int = 2) -> str:

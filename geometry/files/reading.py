@@ -132,7 +132,7 @@ def _surface(
     """Return the surface of what a file or an array holds."""
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
-        said.append(f"heights taken in {unit}")
+        said.append(f"heights taken in {unit.replace('um', 'µm')}")
     notes: list[str] = []
     heights = content.heights
     if heights.ndim == 2 and heights.size:

@@ -40,7 +40,7 @@ def dimensions(parts: SceneParts) -> str:
     solid = "a half-space"
     if parts.has_body:
         solid = f"a {what} {quantity(parts.body.depth, 'mm')} high"
-    return f"{lx} × {ly} on {solid}{' as sample' if parts.regions else ''}"
+    return f"{'samples of ' if parts.regions else ''}{lx} × {ly} on {solid}"
 
 
 def _constants(material: Material) -> str:

@@ -24,20 +24,22 @@ from multiscale.figures.maps import (
 from multiscale.figures.style import (
     BLUE,
     DEPTHS,
+    FULL_WIDTH,
     GAPS,
     ONE_COLUMN,
     PRESSURES,
     VERMILLION,
-    panels,
+    map_panels,
     styled,
 )
 from multiscale.figures.surface import draw_surface
-from multiscale.readable import number, quantity, usual_unit
+from multiscale.readable import number, usual, usual_unit
 
 
 def load_text(step: Any) -> str:
     """Return approach and force of a load step, as titles say them."""
-    return f"approach {quantity(step.approach_mm, 'mm')}, force {quantity(step.force_N, 'N')}"
+    approach, force = usual(step.approach_mm, "mm"), usual(step.force_N, "N")
+    return f"approach {approach}, force {force}"
 
 
 def record_text(record: Any) -> str:
@@ -63,7 +65,7 @@ def contact_figure(record: Any, scales: ContactScales | None = None) -> Figure:
     """
     scales = scales or ContactScales.of([record])
     if record.pressure_MPa is None:
-        figure, (spots, sizes) = panels(1, 2, 2.9, bars=[0], title=record_text(record))
+        figure, (spots, sizes, *_) = map_panels(record.lengths_mm, 1, 1, title=record_text(record))
         draw_contact(spots, record, scales)
         _draw_sizes(sizes, record)
         return figure
@@ -90,9 +92,8 @@ def contact_maps(record: Any, scales: ContactScales) -> Figure:
 def _maps(record: Any, scales: ContactScales, more_rows: int) -> tuple[Figure, list[Any]]:
     """Return a figure with the maps of a contact, and its two panels of each further row."""
     yields = record.plastic_depth_mm is not None
-    rows, bars = 1 + yields + more_rows, [0, 1, *([2] if yields else [])]
-    title = record_text(record)
-    figure, (pressures, gaps, *others) = panels(rows, 2, 2.7 * rows, bars=bars, title=title)
+    maps, plots, title = 2 + yields, yields + 2 * more_rows, record_text(record)
+    figure, (pressures, gaps, *others) = map_panels(record.lengths_mm, maps, plots, title=title)
     draw_contact(pressures, record, scales)
     _draw_gaps(gaps, record, scales.gap)
     if yields:
@@ -138,7 +139,7 @@ def _draw_gaps(axes: Any, record: Any, top: float) -> None:
     scale = Normalize(0.0, top / size or 1.0)
     image = _draw_field(axes, record, shown, GAPS, scale, largest=False)
     colour_bar(image, axes, f"gap [{unit}]")
-    axes.set_title("gap; contact in red" if closed.any() else "gap; no contact")
+    axes.set_title("gap; contact in orange" if closed.any() else "gap; no contact")
 
 
 def _draw_depths(axes: Any, record: Any, top: float) -> None:
@@ -233,7 +234,9 @@ def pressure_figure(history: Any) -> Figure:
     Args:
         history: A `multiscale.results.history.History`.
     """
-    figure, (axes,) = panels(1, 1, 2.9, width=ONE_COLUMN, bars=[0])
+    lengths = history.patches.lengths
+    width = FULL_WIDTH if lengths[0] > 2.0 * lengths[1] else ONE_COLUMN
+    figure, (axes,) = map_panels(lengths, 1, width=width)
     last = history.steps[-1]
     draw_pressures(axes, history.patches, last.patches.pressure_MPa)
     bar = f" ({history.reference.label})" if history.reference else ""
@@ -253,7 +256,7 @@ def overview_figure(
         history: A `multiscale.results.history.History`.
         face: Pressures on a face with laws of samples, see `face_figure`; None without.
     """
-    figure, (left, right) = panels(1, 2, 2.8, bars=[0, 1])
+    figure, (left, right) = map_panels(surface.lengths, 2)
     draw_surface(left, surface, None)
     left.set_title("surface" + " of a sample" * is_sample)
     record, last = history.contact, history.steps[-1]
@@ -278,8 +281,8 @@ def face_figure(points: NDArray[np.float64], step: Any) -> Figure:
         points: Columns x, y [mm] and pressure [MPa], shape (n, 3).
         step: The load step.
     """
-    figure, (axes,) = panels(1, 1, 4.2, bars=[0])
+    figure, (axes,) = map_panels(np.ptp(points[:, :2], axis=0), 1)
     draw_face(axes, points)
-    mean = quantity(step.mean_pressure_MPa, "MPa", 3)
+    mean = usual(step.mean_pressure_MPa, "MPa", 3)
     axes.set_title(f"{load_text(step)}, mean pressure {mean}")
     return figure

@@ -125,7 +125,10 @@ def law_figure(table: Any) -> Figure:
     few = len(closing) <= 36  # the dots of more would hide the curves
     what = "regions" if not isinstance(table.patches, PatchGrid) else "patches"
     rows = "; dots are their rows" if few else ""
-    title = f"laws of {len(closing)} of {table.patches.count} {what}{rows}"
+    share = "" if len(closing) == table.patches.count else f"{len(closing)} of "
+    title = f"laws of {share}{table.patches.count} {what}{rows}"
+    if table.patches.count == 1:
+        title = "the law and its rows"
     figure, (pressure, area, *key) = panels(1, 2 + on_grid, 2.7, title=title)
     for index in closing:
         law, look = table.laws[index], {"color": colours[index], "lw": 1.2 if few else 0.6}

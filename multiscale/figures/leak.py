@@ -21,7 +21,9 @@ from multiscale.figures.style import (
     ONE_COLUMN,
     ORANGE,
     VERMILLION,
+    map_panels,
     panels,
+    plain_logarithmic,
     show_unit,
     styled,
 )
@@ -57,10 +59,12 @@ def leak_figure(
         return _face_figure(history, section, fluid)
     shown = section.directions if record is not None and not over_face else ()
     title = f"flow at load step {record.step}" if shown else ""
-    rows, height = (2, 5.6) if len(shown) == 2 else (1, 2.9)
-    columns, width = (1, ONE_COLUMN) if over_face else (2, FULL_WIDTH)
-    bars = range(len(shown))
-    figure, axes = panels(rows, columns, height, width=width, bars=bars, title=title)
+    if shown:
+        plots = 2 if len(shown) == 2 else 1
+        figure, axes = map_panels(record.lengths_mm, len(shown), plots, title=title)
+    else:
+        columns, width = (1, ONE_COLUMN) if over_face else (2, FULL_WIDTH)
+        figure, axes = panels(1, columns, 2.9, width=width)
     for place, direction in zip(axes, shown, strict=False):
         gap = np.where(record.pressure_MPa > 0.0, 0.0, np.maximum(record.gap_mm, 0.0))
         flow = solved_gap_flow(gap, record.lengths_mm, direction, periodic=periodic)
@@ -158,24 +162,28 @@ def _means(field: Any, steps: list[int]) -> Any:
 
 def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
     """Draw the leak over the mean pressure, with error bars; closed load steps at the bottom."""
-    pressure = history.mean_pressure_MPa
+    pressure, any_closed = history.mean_pressure_MPa, False
     for way in ways:
         rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
         error = np.nan_to_num(error)
         leaks = rate > 0.0
         look: dict[str, Any] = {"color": _COLOURS[way]}
+        mark = "s-" if way == "y" else "o-"
         low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
         axes.errorbar(
-            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt="o-", ms=3.0, lw=1.2,
+            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=mark, ms=3.0, lw=1.2,
             elinewidth=0.8, label=f"along {way}", **look,
         )  # fmt: skip
         closed = ~leaks & ~np.isnan(rate)
+        any_closed |= bool(closed.any())
         axes.plot(
             pressure[closed], np.full(closed.sum(), 0.03), "v", ms=4.0, mfc="white", clip_on=False,
             transform=axes.get_xaxis_transform(), **look,
         )  # fmt: skip
-    axes.set(yscale="log", ylabel="leak [mm³/s]", title="leak; triangles: closed")
-    axes.set_xlim(0.0, None)
+    title = "leak" + "; triangles: closed" * any_closed
+    axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
+    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
+        plain_logarithmic(axes.yaxis)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
     if len(ways) > 1:
         axes.legend()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
@@ -41,7 +43,19 @@ def map_axes(axes: Any, lengths: tuple[float, float]) -> float:
     axes.set(xlabel=f"x [{unit}]", ylabel=f"y [{unit}]")
     axes.spines[:].set_visible(True)
     axes.grid(False)
+    wide, _ = _drawn_inches(axes)
+    if wide < 1.5:  # labels of the ticks would meet
+        axes.locator_params(axis="x", nbins=max(1, int(wide / 0.4)))
     return scale
+
+
+def _drawn_inches(axes: Any) -> tuple[float, float]:
+    """Return width and height of axes as they are drawn, those of a map to scale [inch]."""
+    wide, high = (side / axes.figure.dpi for side in (axes.bbox.width, axes.bbox.height))
+    if axes.get_aspect() == "auto":
+        return wide, high
+    ratio = float(np.ptp(axes.get_ylim()) / np.ptp(axes.get_xlim()))
+    return min(wide, high / ratio), min(high, wide * ratio)
 
 
 def say(axes: Any, text: str) -> None:
@@ -67,12 +81,15 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     Returns:
         The colour bar.
     """
-    inches = axes.bbox.width / axes.figure.dpi
-    wide = 0.05 * min(1.0, 2.2 / inches)
+    inches, high = _drawn_inches(axes)
+    wide = 0.11 / inches
     beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
-    bar.set_label(label)
+    text = fill(label, max(12, int(high / 0.06)))
+    bar.set_label(text, labelpad=1.0 if "\n" in text else 4.0, linespacing=1.0)
+    if high < 1.5:
+        bar.locator = MaxNLocator(max(2, int(high / 0.25)), steps=[1, 2, 5, 10])
     return bar
 
 

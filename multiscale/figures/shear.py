@@ -9,7 +9,7 @@ from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from multiscale.figures.maps import coarsened, colour_bar, map_axes
-from multiscale.figures.style import BLUE, NO_CONTACT, PRESSURES, VERMILLION, panels, styled
+from multiscale.figures.style import BLUE, NO_CONTACT, PRESSURES, VERMILLION, map_panels, styled
 from multiscale.readable import percent, usual_unit
 
 _STICK, _SLIP = 1.0, 2.0
@@ -25,7 +25,7 @@ def shear_figure(history: Any, record: Any) -> Figure:
         record: A `multiscale.results.contact_record.ContactRecord` with tractions.
     """
     title = f"load step {record.step}: shear of the contact"
-    figure, (cells, tractions, loop, lost) = panels(2, 2, 5.4, bars=[1], title=title)
+    figure, (cells, tractions, loop, lost) = map_panels(record.lengths_mm, 2, 2, title=title)
     _draw_cells(cells, record)
     _draw_tractions(tractions, record)
     _draw_loop(loop, history)

@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib import colormaps, cycler, rc_context, rcParams
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from multiscale.readable import number, usual_unit
 
@@ -61,8 +62,13 @@ ERROR_BAND = {"color": "#e8eaed", "zorder": 0}
 ONE_COLUMN, FULL_WIDTH = 3.5, 7.2
 """Widths of figures [inch]: of one column of a paper, and of its page."""
 
-MARGINS = {"left": 0.62, "right": 0.14, "bar": 0.86, "below": 0.46, "above": 0.28, "title": 0.26}
+MARGINS = {"left": 0.62, "right": 0.14, "bar": 0.9, "below": 0.46, "above": 0.28, "title": 0.26}
 """Room around panels for their labels, for a colour bar, and for the title of a figure [inch]."""
+
+_PANEL_HEIGHT = 1.96
+"""Height of a panel beside square maps [inch]."""
+_OBLONG = 0.5
+"""Ratio of the sides of a face from which on maps of it have rows of their own."""
 
 DOTS_PER_INCH = 200
 """Resolution of PNG files."""
@@ -156,19 +162,83 @@ def panels(
         below: Height below a panel for its labels [inch].
         title: Title of the figure.
     """
-    figure = StyledFigure(figsize=(width, height))
-    top, axes = height - MARGINS["title"] * bool(title), []
-    for panel in range(rows * columns):
-        row, column = divmod(panel, columns)
-        beside = MARGINS["left"] + MARGINS["bar" if panel in bars else "right"]
-        left = column * width / columns + MARGINS["left"]
-        bottom = top - (row + 1) * top / rows + below
-        wide, high = width / columns - beside, top / rows - below - MARGINS["above"]
-        place = (left / width, bottom / height, wide / width, high / height)
-        axes.append(figure.add_axes(place))
+    rows_ = [(columns, height / rows)] * rows
+    count = rows * columns
+    return _in_rows(rows_, count, width=width, bars=bars, below=below, title=title, height=height)
+
+
+def map_panels(
+    lengths: tuple[float, float],
+    maps: int,
+    plots: int = 0,
+    *,
+    width: float = FULL_WIDTH,
+    below: float = MARGINS["below"],
+    title: str = "",
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with maps of one face, each with a colour bar, and then other panels.
+
+    Rows are as high as the maps need. Oblong maps have rows of their own: one each where they are
+    wide, all side by side where they are tall.
+
+    Args:
+        lengths: Sides of the face [mm].
+        maps: Number of maps.
+        plots: Number of other panels.
+        width: Width of the figure [inch].
+        below: Height below a panel for its labels [inch].
+        title: Title of the figure.
+    """
+    ratio, around = lengths[1] / lengths[0], below + MARGINS["above"]
+
+    def row(columns: int, most: float = _PANEL_HEIGHT) -> tuple[int, float]:
+        wide = width / columns - MARGINS["left"] - MARGINS["bar"]
+        return columns, around + min(max(wide * ratio, 0.25), most)
+
+    plain = 2, around + _PANEL_HEIGHT
+    if maps + plots == 1:
+        rows = [row(1, 1.9 * _PANEL_HEIGHT)]
+    elif ratio <= _OBLONG:
+        columns = 3 if plots == 3 else 2
+        rows = [row(1)] * maps + [(columns, plain[1])] * -(-plots // columns)
+    elif ratio * _OBLONG >= 1.0:
+        columns = max(2, maps)
+        left = plots - (columns - maps)
+        rows = [row(columns, 2.0 * _PANEL_HEIGHT)] + [plain] * -(-left // 2)
+    else:
+        rows = [row(2) if 2 * k + 1 < maps else plain for k in range(-(-(maps + plots) // 2))]
+    shape: dict[str, Any] = {"width": width, "below": below, "title": title}
+    return _in_rows(rows, maps + plots, bars=range(maps), **shape)
+
+
+def _in_rows(
+    rows: Sequence[tuple[int, float]],
+    count: int,
+    *,
+    width: float,
+    bars: Sequence[int],
+    below: float,
+    title: str,
+    height: float = 0.0,
+) -> tuple[Figure, list[Any]]:
+    """Return a figure with rows of panels, of which the number and the height [inch] are given."""
+    above = MARGINS["title"] * bool(title)
+    height = height or sum(high for _, high in rows) + above
+    figure, top, axes = StyledFigure(figsize=(width, height)), height - above, list[Any]()
+    scale = top / sum(high for _, high in rows)  # of rows that share a height with the title
+    for columns, high in rows:
+        top -= scale * high
+        for column in range(columns):
+            beside = MARGINS["left"] + MARGINS["bar" if len(axes) in bars else "right"]
+            left = column * width / columns + MARGINS["left"]
+            wide, tall = width / columns - beside, scale * high - below - MARGINS["above"]
+            place = (left / width, (top + below) / height, wide / width, tall / height)
+            axes.append(figure.add_axes(place))
     if title:
         figure.suptitle(title)
-    return figure, axes
+    for spare in axes[count:]:
+        spare.remove()
+    return figure, axes[:count]
 
 
 def encoded(figure: Figure, kinds: Sequence[str] = ("png",)) -> dict[str, bytes]:
@@ -220,6 +290,19 @@ def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) 
     axis.set_label_text(f"{text} [{name}]")
     if size != drawn:
         axis.set_major_formatter(lambda place, _: number(place * drawn / size))
+
+
+def plain_logarithmic(axis: Any) -> None:
+    """Label a logarithmic axis by plain numbers, more than powers of ten where these are too few.
+
+    Args:
+        axis: The x or y axis, with its limits.
+    """
+    low, high = axis.get_view_interval()
+    if high < 100.0 * low:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(lambda value, _: number(value))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def add_legend(figure: Figure) -> None:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
 from numpy.typing import NDArray
 
 from geometry.asperities import Asperities
@@ -21,10 +20,11 @@ from multiscale.figures.style import (
     HEIGHTS,
     INK,
     VERMILLION,
-    panels,
+    map_panels,
+    plain_logarithmic,
     styled,
 )
-from multiscale.readable import quantity, usual_unit
+from multiscale.readable import usual, usual_unit
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,8 @@ def surface_figure(
         patches: The partition of the interface.
         target: The spectrum that the surface was synthesised from; None for another surface.
     """
-    figure, (map_, heights, spectrum, bearing) = panels(2, 2, 5.4, bars=[0], below=0.6)
+    figure, axes = map_panels(surface.lengths, 1, 3, below=0.6)
+    map_, heights, spectrum, bearing = axes
     draw_surface(map_, surface, asperities, patches)
     draw_heights(heights, surface)
     draw_spectrum(spectrum, surface, target)
@@ -121,7 +122,7 @@ def draw_heights(axes: Any, surface: Surface) -> None:
         normal = np.exp(-0.5 * (h / sq) ** 2) / (np.sqrt(2.0 * np.pi) * sq)
         axes.plot(h, normal, "--", color=INK, lw=1.1, label="normal distribution")
         axes.set_title(
-            f"Sq {quantity(rough.sq, 'mm', 3)}, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}"
+            f"Sq {usual(rough.sq, 'mm', 3)}, skewness {rough.ssk:.2f}, kurtosis {rough.sku:.2f}"
         )
     axes.set(xlabel=f"height over the mean plane [{unit}]", ylabel=f"share of heights per {unit}")
     axes.legend(loc="upper left")
@@ -149,9 +150,8 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
     axes.minorticks_off()  # drawing them takes as long as all the rest
-    if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:  # powers of ten would be too few
-        axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.xaxis.set_major_formatter("{x:g}")
+    if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:
+        plain_logarithmic(axes.xaxis)
     axes.set_title(f"rms gradient {roughness(surface).sdq:.3g}")
 
 

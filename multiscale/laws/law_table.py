@@ -201,7 +201,7 @@ def _scatter_note(region: str, law: PatchLaw) -> str | None:
         row = int(np.searchsorted(rows.pressure, share * rows.pressure[-1]))
         scatter, stiffness = rows.pressure_scatter[row], law.along(rows.approach[row]).stiffness
         found.append(
-            f"{scatter / rows.pressure[row]:.1%} at {quantity(rows.pressure[row], 'MPa', 3)} "
+            f"{percent(scatter / rows.pressure[row])} at {quantity(rows.pressure[row], 'MPa', 3)} "
             f"({quantity(scatter / float(stiffness), 'mm', 2)} of closure)"
         )
     return (

@@ -15,7 +15,16 @@ import numpy as np
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import COLUMNS, LoadStep
-from multiscale.readable import Caution, Detail, duration, measured, number, percent, quantity
+from multiscale.readable import (
+    Caution,
+    Detail,
+    duration,
+    measured,
+    number,
+    percent,
+    quantity,
+    usual,
+)
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
 from multiscale.run import Run
@@ -38,6 +47,9 @@ _OF_INPUTS = ("surface", "two rough sides", "load", "micro model", "coupling", "
 CONTACT_OF_STEP = "contact_of_step_"
 """Beginning of the names of pictures that stand in the report alone, which a slider chooses from;
 the number of the load step follows."""
+
+_MOST_COLUMNS = 7
+"""Columns of a table beside its first, of those whose number depends on the run."""
 
 _MOST_CONTACTS = 40
 """Contacts that a report shows at most, each with a picture of some 100 kB."""
@@ -106,7 +118,7 @@ def _contacts(history: History, pictures: Mapping[str, bytes]) -> dict[str, Any]
     for record in known:
         way = "unloading" if record.unloading else "loading"
         spots = f"{len(record.spots)} spots" if record.force_N > 0.0 else "no contact"
-        load = f"{quantity(record.approach_mm, 'mm')}, force {quantity(record.force_N, 'N')}"
+        load = f"{usual(record.approach_mm, 'mm')}, force {usual(record.force_N, 'N')}"
         caption = f"Load step {record.step}, {way}: approach {load}, {spots}."
         contacts.append((f"{CONTACT_OF_STEP}{record.step}.png", caption))
     forces = [record.force_N for record in known]
@@ -143,26 +155,26 @@ def results(last: LoadStep, coupling: Coupling, run: Run) -> Iterator[tuple[str,
         remark = "prescribed" if given else "" if error else "error not measured"
         yield name, measured(value, None if given else error, unit), remark
     if (approach := last.first_touch_approach_mm) is not None:
-        above = f"which is {quantity(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
-        yield "approach from first touch", quantity(approach, "mm"), above
+        above = f"which is {usual(last.zero_mm, 'mm')} above the {coupling.scene.loading.zero}"
+        yield "approach from first touch", usual(approach, "mm"), above
     face = coupling.area
     if verdict := run.history().accuracy:
         kept = {True: "kept", False: "not kept", None: "not known whether it is kept"}
         yield "accuracy asked for", percent(verdict.requested, 3), kept[verdict.kept]
     share = last.contact_area_fraction
-    yield "real contact area", percent(share, 3), f"{quantity(share * face, 'mm²', 3)} of the face"
+    yield "real contact area", percent(share, 3), f"{usual(share * face, 'mm²', 3)} of the face"
     if last.peak_pressure_MPa:
-        yield "peak pressure", quantity(last.peak_pressure_MPa, "MPa", 3), ""
+        yield "peak pressure", usual(last.peak_pressure_MPa, "MPa", 3), ""
     record = run.history().contact
     spots = len(record.spots) if record and record.step == last.step else last.contacts
     if spots:
         yield "contact spots", number(spots, 9), ""
-    yield "mean pressure", quantity(last.mean_pressure_MPa, "MPa"), "over the whole face"
+    yield "mean pressure", usual(last.mean_pressure_MPa, "MPa"), "over the whole face"
     for observer in run.observers:
         yield from ((name, value, "") for name, value in observer.results(last))
     for column in COLUMNS:
         if column.in_report and (value := column.of(last)):
-            yield column.in_report, quantity(value, column.unit), ""
+            yield column.in_report, usual(value, column.unit), ""
 
 
 def _inputs(coupling: Coupling) -> Iterator[tuple[str, str]]:
@@ -209,6 +221,19 @@ def filled(template: str, **content: Any) -> str:
     return _templates().get_template(template).render(**content) + "\n"
 
 
+def _look(picture: bytes) -> str:
+    """Return the class of a picture in PNG: narrow where it is no wider than a column of text."""
+    return "narrow" if int.from_bytes(picture[16:20], "big") < 1000 else "wide"
+
+
+def _parted(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> Iterator[Any]:
+    """Yield parts of a table that fit a page, each with its first column."""
+    headings, rows = table
+    for start in range(1, len(headings), _MOST_COLUMNS):
+        part = slice(start, start + _MOST_COLUMNS)
+        yield (headings[0], *headings[part]), [(row[0], *row[part]) for row in rows]
+
+
 @cache
 def _templates() -> Environment:
     """Return the templates; jinja2, whose import takes 40 ms, is loaded only when one is used."""
@@ -224,5 +249,6 @@ def _templates() -> Environment:
     )
     templates.filters["base64"] = lambda content: b64encode(content).decode()
     templates.filters["duration"] = duration
+    templates.filters |= {"look": _look, "parted": _parted}
     templates.globals["table"] = lambda *content: Markup(table_html(*content))
     return templates

@@ -15,9 +15,10 @@ import numpy as np
 
 from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
-from multiscale.readable import SCALED_UNITS, number, percent, usual_unit, with_error
+from multiscale.readable import SCALED_UNITS, number, percent, quantity, usual_unit, with_error
 from multiscale.results.history import History
 from multiscale.results.reading import read_history, result_of_a_run
+from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import flat
 from multiscale.studies import AT
 from multiscale.studies.run_curves import (
@@ -347,16 +348,20 @@ def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
     first, second = (dict(flat(scene)) for scene in scenes if scene is not None)
     keys = [key for key in (first | second) if not key.startswith("output.")]
     differing = [key for key in keys if first.get(key) != second.get(key)]
+    known = scene_keys()
     for key in differing[:_MOST_CHANGES]:
-        yield key, _said(first.get(key)), _said(second.get(key))
+        unit = known[key].unit if key in known else ""
+        yield key, _said(first.get(key), unit), _said(second.get(key), unit)
     if len(differing) > _MOST_CHANGES:
         yield "…", f"{len(differing) - _MOST_CHANGES} more", ""
     if runs[0].heights != runs[1].heights:
         yield "heights, SHA-256", runs[0].heights[:12] + "…", runs[1].heights[:12] + "…"
 
 
-def _said(value: Any) -> str:
-    """Return a value as a cell shows it."""
+def _said(value: Any, unit: str = "") -> str:
+    """Return a value as a cell shows it, a number with its unit."""
+    if isinstance(value, float) and unit in SCALED_UNITS:
+        return quantity(value, unit, 6)
     text = "–" if value is None else str(value)
     return text if len(text) <= 60 else f"{text[:59]}…"
 

@@ -22,6 +22,7 @@ from multiscale.figures.style import (
     VERMILLION,
     add_legend,
     panels,
+    plain_logarithmic,
     show_unit,
     styled,
 )
@@ -41,7 +42,6 @@ LEAST_SHARE = 0.2
 NUMBER_SIZE = (10.0, 8.0)
 """Width and height that a number takes [pt]."""
 
-_POINTS: dict[str, Any] = {"marker": "o", "ms": 4.0}  # curves of one load step
 _PLAIN: dict[str, Any] = {"ms": 5.0, "zorder": 4, "ls": "none"}
 _RING = _PLAIN | {"mec": "0.1", "mew": 1.1, "ms": 7.5, "zorder": 5}
 _BEATEN = _PLAIN | {"mew": 0.0, "alpha": PALE, "zorder": 3}
@@ -68,12 +68,15 @@ def sweep_figure(sweep: Any) -> Figure:
     """
     figure, (force, area) = panels(1, 2, 3.0)
     ensembles = sweep.ensembles()[:8]  # more cannot be told apart
-    for colour, (values, part), (_, statistics) in zip(
-        cycle(PALETTE), ensembles, sweep.statistics, strict=False
+    looks = zip(cycle(PALETTE), cycle("osD^vPX*"))  # eight at most
+    for (colour, mark), (values, part), (_, statistics) in zip(
+        looks, ensembles, sweep.statistics, strict=False
     ):
         few = slice(200 // len(ensembles))  # the band shows those beyond
         approach, pressure = 1e3 * part.approach_mm[few], part.mean_pressure_MPa[few]
-        look = {"color": colour} | (_POINTS if approach.shape[1] == 1 else {})
+        look: dict[str, Any] = {"color": colour}
+        if approach.shape[1] <= 50:
+            look |= {"marker": mark, "ms": 4.0}
         thin = look | {"lw": 0.5, "alpha": PALE}
         force.plot(approach.T, pressure.T, **thin)
         area.plot(pressure.T, 100.0 * part.contact_area_fraction[few].T, **thin)
@@ -94,7 +97,9 @@ def _label(values: Mapping[str, Any]) -> str:
     """Return the values of keys as a legend shows them, without sections and folders."""
     names = {key: key.rpartition(".")[2].replace("_", " ") for key in values}
     return ", ".join(
-        Path(value).name if names[key] in ("file", "mesh") else f"{names[key]} {value}"
+        Path(value).name
+        if names[key] in ("file", "mesh")
+        else f"{names[key]} {value}".replace(" um", " µm")
         for key, value in values.items()
     )
 
@@ -136,9 +141,9 @@ def comparison_figure(comparison: Comparison) -> Figure:
     """
     response = comparison.response
     titles = {
-        f"{response}_max": f"{response}: largest error over the curve",
-        "area_max": "contact area: largest error over the curve",
-        "distribution": "pressures: distance / mean",
+        f"{response}_max": f"{response}, over the curve",
+        "area_max": "contact area, over the curve",
+        "distribution": "distribution of pressures",
     }
     ahead = {row.name for error in titles for row in comparison.frontier(error)}
     ahead.add(str(comparison.measure))
@@ -151,8 +156,8 @@ def comparison_figure(comparison: Comparison) -> Figure:
     for one, (error, title) in zip(axes, titles.items(), strict=True):
         _draw_errors(one, comparison, error)
         _draw_numbers(one, comparison, error)
-        one.set_title(title, fontsize=6.5)
-    axes[0].set_ylabel("relative to the measure")
+        one.set_title(title)
+    axes[0].set_ylabel("error [% of the measure]")
     _draw_legend(figure.add_axes((0.0, low / high, 1.0, 0.6 / high)), comparison)
     figure.text(0.5, 0.05 / high, "\n".join(lines), ha="center", va="bottom", fontsize=6.5)
     return figure
@@ -176,16 +181,18 @@ def _draw_errors(axes: Any, comparison: Comparison, error: str) -> None:
         look = _PLAIN if row in frontier else _BEATEN
         if row.is_measure or row.status != "done":
             look = _RING if row.is_measure else _EARLY
-        axes.plot(seconds, size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
+        axes.plot(seconds, 100.0 * size, MARKERS[row.kind], color=COLOURS[row.kind], **look)
     axes.set(xscale="log", yscale="log", xlabel="wall time [s]")
     axes.margins(0.15)
     axes.autoscale_view()
     axes.autoscale(False)
+    plain_logarithmic(axes.xaxis)
+    plain_logarithmic(axes.yaxis)
     if np.isfinite(bar) and bar > 0.0:
-        axes.axhspan(1e-3 * axes.get_ylim()[0], bar, **ERROR_BAND)
+        axes.axhspan(1e-3 * axes.get_ylim()[0], 100.0 * bar, **ERROR_BAND)
     if frontier:
         times = [*(row.seconds for row in frontier), axes.get_xlim()[1]]
-        steps = [max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
+        steps = [100.0 * max(comparison.error(row, error), LEAST_ERROR) for row in frontier]
         axes.step(times, [*steps, steps[-1]], where="post", color="0.25", lw=1.2)
 
 
@@ -198,6 +205,7 @@ def _draw_numbers(axes: Any, comparison: Comparison, error: str) -> None:
     for *point, number, row in sorted(_points(comparison, error), key=lambda point: point[0]):
         if row not in frontier and not row.is_measure:
             continue
+        point = [point[0], 100.0 * point[1]]
         mark = 72.0 / axes.figure.dpi * axes.transData.transform(point)
         spot = mark - (8.0, 7.0)
         while (np.abs(placed - spot) < NUMBER_SIZE).all(axis=1).any():
@@ -232,11 +240,11 @@ def difference_figure(both: Difference) -> Figure:
         both: The two runs.
     """
     figure, (force, area, gap, ratios) = panels(2, 2, 5.2)
-    colours = (BLUE, VERMILLION)
-    for history, name, colour in zip(both.histories, both.names, colours, strict=True):
+    colours, marks = (BLUE, VERMILLION), "os"
+    for history, name, colour, mark in zip(both.histories, both.names, colours, marks, strict=True):
         look: dict[str, Any] = {"color": colour, "label": name}
         if len(history) <= 100:
-            look |= {"marker": "o", "ms": 3.0}
+            look |= {"marker": mark, "ms": 3.0}
         pressure, falls = history.mean_pressure_MPa, history.unloading
         draw_path(force, 1e3 * history.approach_mm, pressure, falls, look)
         draw_path(area, pressure, 100 * history.contact_area_fraction, falls, look)
@@ -261,14 +269,16 @@ def _draw_ratios(axes: Any, both: Difference) -> None:
     at_pressure = both.at == "pressure"
     load = both.loads if at_pressure else 1e3 * both.loads
     axes.axhline(1.0, color="0.7", lw=0.8)
-    for one in both.ratios:
-        if one.name in _SHOWN:
-            look = {"color": _COLOURS[one.name], "marker": "o", "ms": 3.0, "label": one.text}
-            axes.plot(load, one.ratio, **look)
-            known = np.isfinite(one.error) & (one.error > 0.0)
-            bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
-            axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
+    shown = [one for one in both.ratios if one.name in _SHOWN]
+    for one, mark in zip(shown, "osD^", strict=False):
+        look = {"color": _COLOURS[one.name], "marker": mark, "ms": 3.0, "label": one.text}
+        axes.plot(load, one.ratio, **look)
+        known = np.isfinite(one.error) & (one.error > 0.0)
+        bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
+        axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
     text, unit, drawn = ("mean pressure", "MPa", 1.0) if at_pressure else ("approach", "mm", 1e-3)
     show_unit(axes.xaxis, text, unit, both.loads, drawn)
     axes.set(ylabel="second over first", title=f"{both.names[1]} over {both.names[0]}")
-    axes.legend()
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high + 0.18 * len(shown) * (high - low))  # for the legend
+    axes.legend(loc="upper left")

@@ -113,7 +113,7 @@ def draw(picture, path):
     )  # fmt: skip
     face.scatter(*spots.T, s=2, c=style.VERMILLION)
     map_axes(face, (1.0, 1.0))
-    face.set_title("face, contact in red")
+    face.set_title("face, contact in orange")
     colour_bar(image, face, "moves down by [µm]")
     curves = figure.add_axes((0.72, 0.17, 0.27, 0.76))
     _draw_curves(curves, dict(picture["curves"]))

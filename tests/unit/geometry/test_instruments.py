@@ -103,7 +103,7 @@ def test_lengths_are_passed_on_to_formats_without(tmp_path):
     surface = read_surface(tmp_path / "scan.mat", lengths=(0.7, 0.5), height_unit="um")
     assert surface.lengths == (0.7, 0.5)
     assert np.ptp(surface.heights) == pytest.approx(1e-6 * np.ptp(files.NUMBERS))
-    assert surface.source.endswith("heights taken in um")
+    assert surface.source.endswith("heights taken in µm")
 
 
 @pytest.mark.parametrize("words", [("Channel", "Width", "Height"), ("Kanal", "Breite", "Höhe")])

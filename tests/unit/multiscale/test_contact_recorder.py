@@ -185,7 +185,7 @@ def test_figure_shows_pressures_gaps_and_sizes(model):
     figure = run(scene(model=model)).contact.plot()
     titles = [axes.get_title() for axes in figure.axes]
     assert "sizes of the spots" in titles
-    assert ("gap; contact in red" in titles) == (model == "half-space")
+    assert ("gap; contact in orange" in titles) == (model == "half-space")
 
 
 def test_modulus_scales_pressure_and_stiffness():

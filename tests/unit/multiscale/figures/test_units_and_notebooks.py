@@ -25,7 +25,7 @@ def record(peak):
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("peak", "unit"), [(14.1e3, "GPa"), (9.1e3, "MPa"), (14.1e4, "GPa")])
+@pytest.mark.parametrize(("peak", "unit"), [(14.1e3, "GPa"), (9.1e3, "GPa"), (14.1e4, "GPa")])
 def test_pressures_of_a_figure_have_one_unit(peak, unit):
     figure = contact_figure(record(peak))
     texts = [text.get_text() for text in figure.findobj(Text)]

@@ -150,7 +150,7 @@ def test_citation_is_that_of_the_file():
     program, paper = citations()
     stated = dict(re.findall(r'^\s*-?\s*([a-z-]+): "?([^"\n]+)"?$', given, re.M))
     assert stated["doi"] in paper and stated["journal"] in paper and stated["year"] in paper
-    assert version("patchlaw") in program
+    assert "version" not in stated and version("patchlaw") in program
     for title in re.findall(r'title: "(.*)"', given):
         assert title in program + paper
     for name in re.findall(r'family-names: "?([^"\n]+)"?', given):
