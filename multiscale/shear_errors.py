@@ -178,7 +178,8 @@ def _gone(normal: HalfSpaceModel, friction: FrictionModel, path: Sequence[Contro
 
 
 def _apart(one: Array, other: Array) -> float:
-    return float(np.hypot(*(one - other)))
+    known = np.isfinite(one).all() and np.isfinite(other).all()
+    return float(np.hypot(*(one - other))) if known else math.inf
 
 
 def with_shear_errors(step: LoadStep, parts: dict[str, float], *, by_shift: bool) -> LoadStep:
