@@ -12,7 +12,13 @@ from multiscale.auto.keys import auto_keys
 from multiscale.inputs.bodies import LAW_BLOCK_CELLS
 from multiscale.scene.scene import Scene
 from multiscale.studies.comparison import ranked, refinements, resolved_scene
-from multiscale.studies.configurations import OWN, SMALL_SLOPES, configurations, pressure_grid
+from multiscale.studies.configurations import (
+    OWN,
+    SMALL_SLOPES,
+    coarser_grids,
+    configurations,
+    pressure_grid,
+)
 from multiscale.studies.errors import Row
 from multiscale.studies.measured_run import measured_run
 from multiscale.studies.running import CaseResult
@@ -56,9 +62,8 @@ def test_cheapest_come_first_and_none_twice():
 def test_coarser_surfaces_still_carry_the_band():
     halves = {one.heights[0] for one in made() if one.name.startswith("analytic, half-space")}
     assert sorted(halves) == [32, 64, 128, 256]
-    waves = made("surface.spectrum.waves=[2, 30]")
-    halves = {one.heights[0] for one in waves if one.name.startswith("analytic, half-space")}
-    assert sorted(halves) == [128, 256]  # three heights per wave
+    scene = Scene.load(PAPER, ["surface.spectrum.waves=[2, 30]"])
+    assert coarser_grids((256, 256), scene) == [(128, 128), (256, 256)]  # three heights per wave
 
 
 def test_heights_from_a_file_are_taken_as_they_are(tmp_path):

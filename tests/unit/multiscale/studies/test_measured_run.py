@@ -29,10 +29,16 @@ def only(monkeypatch):
     return lambda *ones: monkeypatch.setattr(comparison, "configurations", lambda *_: list(ones))
 
 
+@pytest.fixture(scope="module")
+def every():
+    """All configurations of the scene."""
+    return configurations(SCENE)
+
+
 @pytest.fixture
-def some(only):
+def some(only, every):
     """Three configurations by summits, which are all that comparisons have here."""
-    found = [one for one in configurations(SCENE) if one.kind == "analytic"][:3]
+    found = [one for one in every if one.kind == "analytic"][:3]
     only(*found)
     return found
 
