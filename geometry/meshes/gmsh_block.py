@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,14 +12,18 @@ from geometry.meshes.bisection import Tetrahedra
 from geometry.meshes.gmsh_session import gmsh_session
 from support.arrays import Array
 
-if TYPE_CHECKING:
-    from geometry.meshes.refined_block import RefinedShape
-
 _TETRAHEDRA = 4
 """gmsh's number of the tetrahedra with four nodes."""
 
 
-def block_by_gmsh(shape: RefinedShape) -> Tetrahedra:
+def block_by_gmsh(
+    interface: tuple[float, float],
+    height: float,
+    near: list[tuple[float, Array]],
+    *,
+    coarse: float,
+    growth: float,
+) -> Tetrahedra:
     """Mesh a flat block with gmsh's frontal algorithm and edge lengths that grow from its places.
 
     The block is meshed with its largest side as the unit of length, because gmsh's CAD kernel
@@ -28,31 +32,35 @@ def block_by_gmsh(shape: RefinedShape) -> Tetrahedra:
     flipped. A gmsh session of the caller goes on afterwards, with its model and options.
 
     Args:
-        shape: The block and its edge lengths.
+        interface: Sides (Lx, Ly) of the top [mm].
+        height: Height of the block [mm].
+        near: Edge lengths [mm], each with the places on the top where it holds, shape (n, 2) [mm].
+        coarse: Edge length far from all of them [mm].
+        growth: Increase of the edge length per distance.
 
     Returns:
         The mesh in mm, without marked facets.
     """
-    unit = max(*shape.interface, shape.height)
+    unit = max(*interface, height)
     with gmsh_session("patchlaw refined block") as gmsh:
-        width, depth, height = (_digits(side / unit) for side in (*shape.interface, shape.height))
-        gmsh.model.occ.addBox(0.0, 0.0, -height, width, depth, height)
-        classes = [(_digits(edge / unit), places / unit) for edge, places in shape.edge_classes()]
+        width, depth, low = (_digits(side / unit) for side in (*interface, height))
+        gmsh.model.occ.addBox(0.0, 0.0, -low, width, depth, low)
+        classes = [(_digits(edge / unit), places / unit) for edge, places in near]
         tags = []
         for edge, places in classes:
             decimals = 3 + math.ceil(-math.log10(edge))
             at = np.clip(np.round(places, decimals), 0.0, (width, depth))
             tags.append([gmsh.model.occ.addPoint(x, y, 0.0) for x, y in at])
         gmsh.model.occ.synchronize()
-        coarse, fields = _digits(shape.coarse / unit), gmsh.model.mesh.field
+        most, fields = _digits(coarse / unit), gmsh.model.mesh.field
         sizes = [
-            _size_near(fields, points, edge, (coarse - edge) / shape.growth, coarse)
+            _size_near(fields, points, edge, (most - edge) / growth, most)
             for points, (edge, _) in zip(tags, classes, strict=True)
         ]
         smallest = fields.add("Min")
         fields.setNumbers(smallest, "FieldsList", sizes)
         fields.setAsBackgroundMesh(smallest)
-        _generate(gmsh, height, classes)
+        _generate(gmsh, low, classes)
         return _tetrahedra(gmsh, unit)
 
 

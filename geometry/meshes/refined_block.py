@@ -129,7 +129,8 @@ class RefinedShape:
         if self.mesher == "gmsh":
             from geometry.meshes.gmsh_block import block_by_gmsh  # bisection works without gmsh
 
-            return block_by_gmsh(self)
+            sizes = {"coarse": self.coarse, "growth": self.growth}
+            return block_by_gmsh(self.interface, self.height, self.edge_classes(), **sizes)
         sides = (*self.interface, self.height)
         longest = 0.5 * min(sides)
         x, y, z = (max(1, round(side / longest)) for side in sides)
