@@ -24,7 +24,6 @@ from dolfinx.fem import petsc as fem_petsc
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.meshes.gmsh_session import sigint_untouched
 from macro.form_cache import TIMEOUT, explained
 from support.errors import InputError
 
@@ -80,26 +79,6 @@ def _compiling() -> Iterator[None]:
 
 
 @quiet_compiler()
-def mesh_from_gmsh(model: Any, comm: Any) -> Any:
-    """Distribute the gmsh model of rank 0.
-
-    Args:
-        model: ``gmsh.model`` on rank 0; ignored on other ranks.
-        comm: MPI communicator.
-
-    Note:
-        Collective. There are ghost cells in dolfinx 0.5, and none later.
-    """
-    with sigint_untouched():  # the import loads gmsh, which lattices do not need
-        try:
-            from dolfinx.io import gmsh as reader
-        except ImportError:
-            from dolfinx.io import gmshio as reader
-    data = reader.model_to_mesh(model, comm, 0, gdim=3)
-    return data.mesh if hasattr(data, "mesh") else data[0]
-
-
-@quiet_compiler()
 def mesh_from_cells(
     cells: NDArray[np.int64],
     points: NDArray[np.float64],
@@ -119,7 +98,8 @@ def mesh_from_cells(
         comm: MPI communicator.
 
     Note:
-        Collective. The coordinate element is that of `mesh_from_gmsh`: compiled forms serve both.
+        Collective. The coordinate element is that of dolfinx' own readers: compiled forms serve
+        both.
     """
     kind, degree = _SHAPES[cells.shape[1]]
     older = "ghost_mode" in inspect.signature(dmesh.create_mesh).parameters  # dolfinx 0.5

@@ -1,1 +1,1 @@
-"""Shapes of blocks and their meshes by gmsh, families of them, and the files of gmsh."""
+"""Shapes of blocks and their meshes, families of them, and the files of gmsh."""

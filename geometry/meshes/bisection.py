@@ -190,7 +190,7 @@ def from_hexahedra(points: Array, cells: Table, facets: Table) -> tuple[Array, T
     Returns:
         All nodes; tetrahedra, 24 of every cell in turn; triangles, 4 of every facet in turn.
     """
-    sides = cells[:, _HEXAHEDRON].reshape(-1, 4)
+    sides = hexahedron_sides(cells)
     every, which = np.unique(
         np.sort(np.concatenate([sides, facets]), axis=1), axis=0, return_inverse=True
     )
@@ -207,6 +207,11 @@ _HEXAHEDRON = np.array(
     [(0, 1, 2, 3), (0, 1, 4, 5), (0, 2, 4, 6), (1, 3, 5, 7), (2, 3, 6, 7), (4, 5, 6, 7)]
 )
 """Corners of the facets of a hexahedron, as tensor products."""
+
+
+def hexahedron_sides(cells: Table) -> Table:
+    """Return the facets of hexahedra (m, 8), six of every cell in turn, shape (6 m, 4)."""
+    return cells[:, _HEXAHEDRON].reshape(-1, 4)
 
 
 def _around(squares: Table, middle: Table) -> Table:

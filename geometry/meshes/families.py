@@ -1,29 +1,27 @@
 """Families of meshes of a rough block, coarse to fine, whose results can be extrapolated.
 
-All sizes of a family fall together. Where contact can occur the finest tetrahedra have a stated
-number of edges along the radius of a typical contact. That radius is estimated from the surface
-alone: of a cap that the plane can touch, Hertz's contact takes half the area, whatever its
-curvature.
-
-The force converges from above. Curved quadratic tetrahedra with n edges along a contact's radius
-err like 1/n³: by 1.4 and 2.0 % with n = 1.5 and by 0.2 and 0.3 % with n = 3, on two surfaces of
-Set 1 (Waddad et al. 2016, table 1) at an approach of 8 µm, heights × 0.1, against concurrent
-coupling corrected for the 0.28 % of finite slopes that remain there. Single meshes scatter by
-where their nodes happen to lie, so that an order observed on three of them does too. Linear
-tetrahedra err by 3.4 % with n = 6, at the cost of quadratic ones with n = 2.
+The finest tetrahedra have a stated number n of edges along the radius of a contact, wherever
+contact is expected; from there their size grows by γ = 1.05/n of the distance. Curved quadratic
+tetrahedra err by two parts. Beside contacts cells are too stiff for the stresses around these: the
+force is too large by 0.75 γ², measured as 0.12, 0.07, 0.03 and 0.008 % with γ = 0.4, 0.3, 0.2 and
+0.1. At their borders it matters where nodes happen to lie: 1.4 %/n³, of either sign, for one
+contact, measured on spheres in ten places and on a single asperity of Set 1 (Waddad et al. 2016,
+table 1), with n of 1.5 to 6. Therefore the members of a family differ by h in γ and in the edges
+far away, and by √h in those where contact is: most of their difference is then of the first kind,
+which falls with h² and can be extrapolated.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
+from scipy.ndimage import distance_transform_edt, label
 
 from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refined_block import Mesher, RefinedShape
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from support.arrays import Array
@@ -34,6 +32,83 @@ Cells: TypeAlias = Literal["tetrahedra", "hexahedra"]
 
 EDGES = 3.0
 """Edges along the radius of a typical contact in the finest tetrahedra, by default."""
+
+_GROWTH = 1.05
+"""Increase of the edge length per distance, times the edges along the radius of a contact."""
+
+_SHARE = 1.0 / 6.0
+"""Power of a contact's force by which its edges are more: cells then lessen the error of the whole
+force most, as every contact costs n³ of them and errs by 1/n³ of its force."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ContactMap:
+    """Where a surface is expected to be in contact, and how wide the contacts are.
+
+    Attributes:
+        places: Places in contact, shape (n, 2) [mm].
+        radius: Radius of the contact that each is in [mm], times a power of the share in the load:
+            what edges are in proportion to, shape (n,).
+        typical: Radius of a contact on average over the load [mm].
+        effective: Number of equal contacts with the same spread of loads, (Σ F)²/Σ F².
+    """
+
+    places: Array
+    radius: Array
+    typical: float
+    effective: float
+
+    @classmethod
+    def of_pressures(cls, surface: Surface, pressures: Array) -> ContactMap:
+        """Return the map of a contact that was solved for, on the grid of the surface.
+
+        In a disc of radius a the mean distance from the edge is a/3, which is used for contacts of
+        any form.
+
+        Args:
+            surface: The surface.
+            pressures: Pressures of its cells, some of them positive [MPa].
+        """
+        touching, spacing = pressures > 0.0, surface.spacing
+        region, count = label(touching, structure=np.ones((3, 3)))
+        # a cell is on average half its width further inside than its distance from those outside
+        depth = distance_transform_edt(np.pad(touching, 1), sampling=spacing)[1:-1, 1:-1]
+        depth = depth[touching] - 0.5 * min(spacing)
+        of_cell = region[touching] - 1
+        cells = np.bincount(of_cell, minlength=count)
+        radius = np.maximum(3.0 * np.bincount(of_cell, depth) / cells, max(spacing))
+        force = np.bincount(of_cell, pressures[touching])
+        usual = float(force @ force / force.sum())
+        x, y = np.nonzero(touching)
+        return cls(
+            places=np.column_stack([surface.x[x], surface.y[y]]),
+            radius=(radius * (usual / force) ** _SHARE)[of_cell],
+            typical=float(force @ radius / force.sum()),
+            effective=float(force.sum()) / usual,
+        )
+
+    @classmethod
+    def of_interference(
+        cls,
+        surface: Surface,
+        approach: float,
+        *,
+        tilt: tuple[float, float] = (0.0, 0.0),
+        spacing: float | None = None,
+    ) -> ContactMap:
+        """Return what the surface alone says: where it interferes with the plane.
+
+        Args:
+            surface: The surface.
+            approach: Approach at its middle [mm].
+            tilt: Slopes of the approach along x and y.
+            spacing: Distance between places [mm].
+        """
+        radius = contact_radius(surface, approach, tilt=tilt)
+        places = places_in_reach(surface, approach, spacing=spacing or radius / EDGES, tilt=tilt)
+        return cls(
+            places=places, radius=np.full(len(places), radius), typical=radius, effective=1.0
+        )
 
 
 def reference_shapes(
@@ -48,26 +123,28 @@ def reference_shapes(
     cells: tuple[int, int, int] | None = None,
     grading: float = 8.0,
     element: str | None = None,
-    radius: float | None = None,
+    contact: ContactMap | None = None,
+    mesher: Mesher = "bisection",
 ) -> tuple[Shape, ...]:
     """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
 
-    Two or more meshes span a factor of 2 in size, in equal ratios; hexahedra as near to it as
-    whole numbers of cells come (see `characteristic_size`).
+    Two or more meshes span a factor of 2 in size, in equal ratios: hexahedra as near to it as
+    whole numbers of cells come, quadratic tetrahedra of √2 where contact occurs (see the module).
 
     Args:
         surface: The rough surface, which covers the block's top.
         approach: Largest approach that the meshes are for [mm].
         height: Height of the block [mm].
         count: Number of meshes.
-        fine: Edge length of the finest tetrahedra where contact can occur [mm]; by default
-            `suggested_fine`.
+        fine: Edge length of the finest tetrahedra in a typical contact [mm]; by default
+            `EDGES` of them are along its radius.
         tilt: Slopes of the approach along x and y.
         mesh: ``"tetrahedra"``, small where contact can occur, or ``"hexahedra"`` everywhere.
         cells: Hexahedra of the finest mesh along x, y and over the height.
         grading: Height of the bottom layer of hexahedra relative to the top layer.
         element: ``P1`` or ``P2`` (default) tetrahedra; ``Q1`` (default) or ``Q2`` hexahedra.
-        radius: The `contact_radius` at this approach where it is known [mm].
+        contact: Where contact is expected; by default where the surface interferes with the plane.
+        mesher: What makes the tetrahedra.
 
     Raises:
         InputError: When a value is out of its range, hexahedra come without their number, or they
@@ -82,26 +159,29 @@ def reference_shapes(
         raise InputError(
             "these cells are unknown", value=mesh, allowed=", ".join(map(repr, get_args(Cells)))
         )
-    radius = radius or contact_radius(surface, approach, tilt=tilt)
-    smallest = radius / EDGES if fine is None else fine
-    if not 0.0 < smallest < math.inf:
+    if fine is not None and not 0.0 < fine < math.inf:
         raise InputError("the finest edge length is out of range", value=fine, allowed="> 0 mm")
+    known = contact or ContactMap.of_interference(surface, approach, tilt=tilt, spacing=fine)
+    smallest = known.typical / EDGES if fine is None else fine
+    most, element = known.typical / smallest, element or "P2"
 
-    def member(fine: float) -> RefinedShape:
-        """Return a shape, whose sizes all follow from the edges along a contact's radius."""
-        edges = radius / fine
-        coarse = min(*surface.lengths, height) / max(2.0, 2.0 * edges)
+    def member(factor: float) -> RefinedShape:
+        """Return a shape whose sizes are larger than those of the finest by a factor."""
+        fine = smallest * (math.sqrt(factor) if element == "P2" else factor)
+        coarse = factor * min(*surface.lengths, height) / max(2.0, 2.0 * most)
         return RefinedShape(
             interface=surface.lengths,
             height=height,
-            places=places_in_reach(surface, approach, spacing=fine, tilt=tilt),
+            places=known.places,
             fine=fine,
             coarse=max(coarse, fine),
-            growth=1.2 / edges,
-            element=element or "P2",
+            growth=factor * _GROWTH / most,
+            element=element,
+            relative=known.radius / known.typical,
+            mesher=mesher,
         )
 
-    return tuple(member(smallest * factor) for factor in factors)
+    return tuple(map(member, factors))
 
 
 def _hexahedra(

@@ -34,19 +34,26 @@ _MIDDLES: Mapping[str, Sequence[Sequence[int]]] = {
 }
 """Corners, as gmsh counts them, between which its nodes of second order lie."""
 
+_SECOND_ORDER: Mapping[str, Sequence[int]] = {
+    "tetrahedron": (8, 9, 5, 7, 6, 4),
+    "hexahedron": (*range(8, 14), 15, 14, *range(16, 27)),
+}
+"""gmsh's nodes of second order in the order of dolfinx, which is that of basix' edges and faces."""
+
 NO_GROUP = 0
 """Tag of cells without a physical group, where other cells have one; its name is the number."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeshArrays:
-    """A whole mesh of straight tetrahedra or hexahedra, with the groups of its cells and facets.
+    """A whole mesh of tetrahedra or hexahedra, with the groups of its cells and facets.
 
     Attributes:
         points: Nodes that cells use, shape (n, 3), in the unit of the file.
-        cells: Nodes of the cells in the order of dolfinx, shape (m, 4 or 8).
+        cells: Nodes of the cells in the order of dolfinx, shape (m, 4 or 8), or (m, 10 or 27) where
+            some edge is curved.
         cell_tags: Group of every cell, shape (m,).
-        facets: Nodes of the facets that have a group, shape (k, 3 or 4); −1 where no cell has one.
+        facets: Corners of the facets that have a group, (k, 3 or 4); −1 where no cell has one.
         facet_tags: Their groups, shape (k,).
         cell_names: Tags by the names of the cells' groups; groups without a name have their number.
         facet_names: Tags by the names of the facets' groups, in the same way.
@@ -71,8 +78,8 @@ def read_gmsh_file(path: Path) -> MeshArrays:
         path: The file.
 
     Raises:
-        InputError: When it is no such file, or holds no mesh of tetrahedra alone or hexahedra alone
-            with straight edges, or when a volume or a surface has two groups.
+        InputError: When it is no such file, or holds no mesh of tetrahedra or hexahedra alone, or
+            when a volume or a surface has two groups.
     """
     try:
         return _arrays(msh_content(path.read_bytes()))
@@ -92,10 +99,11 @@ def _arrays(content: MshContent) -> MeshArrays:
     name = KINDS[kind][2]
     cells, cell_tags, cell_names = _tagged(content, 3, name, KINDS[kind][1])
     table = _rows(numbers, cells)
-    corners = len(_CORNERS[name])
-    if cells.shape[1] > corners:
-        _check_straight(points[table], _MIDDLES[name][: cells.shape[1] - corners])
-    table = table[:, _CORNERS[name]]
+    order = [*_CORNERS[name]]
+    if cells.shape[1] > len(order) and _is_curved(points[table], _MIDDLES[name]):
+        points, table = _with_middles(points, table, _MIDDLES[name])
+        order += _SECOND_ORDER[name]
+    table = table[:, order]
     _check_repeated(table)
     facets, facet_tags, facet_names = _tagged(content, 2, *_FACETS[name])
     rows = _rows(numbers, facets)
@@ -171,25 +179,51 @@ def _rows(numbers: Table, nodes: Table) -> Table:
     return rows
 
 
-def _check_straight(nodes: Array, middles: Sequence[Sequence[int]]) -> None:
-    """Refuse cells of second order, nodes (m, count, 3), unless their edges and faces are flat.
+def _is_curved(nodes: Array, middles: Sequence[Sequence[int]]) -> bool:
+    """Tell whether edges or faces of cells of second order, nodes (m, count, 3), are curved.
 
     Args:
         nodes: Places of the nodes, corners first.
         middles: Between which corners each of the others lies.
     """
-    corners = nodes.shape[1] - len(middles)
-    off = np.zeros(len(nodes), dtype=bool)
+    corners = 1 + max(max(ends) for ends in middles)
     size = np.ptp(nodes[:, :corners], axis=1).max(axis=1)
-    for k, ends in enumerate(middles, start=corners):
+    for k, ends in enumerate(middles[: nodes.shape[1] - corners], start=corners):
         straight = nodes[:, list(ends)].mean(axis=1)
-        off |= np.abs(nodes[:, k] - straight).max(axis=1) > 1e-6 * size
-    if off.any():
-        raise InputError(
-            f"{off.sum()} of {len(off)} cells are of second order with curved edges; make a mesh "
-            'of first order: element = "quadratic" gives quadratic displacements on it',
-            allowed="cells with straight edges",
+        if np.any(np.abs(nodes[:, k] - straight).max(axis=1) > 1e-6 * size):
+            return True
+    return False
+
+
+def _with_middles(
+    points: Array, cells: Table, middles: Sequence[Sequence[int]]
+) -> tuple[Array, Table]:
+    """Return nodes and cells with the middles of faces and cells that serendipity ones lack.
+
+    The shape of a hexahedron of 20 nodes is one of 27 nodes: a face's middle is half the sum of its
+    edges' less a quarter of that of its corners, a cell's a quarter of both.
+    """
+    if cells.shape[1] in (10, 27):
+        return points, cells
+    nodes, edges = points[cells], middles[:12]
+    added = []
+    for corners in middles[12:]:
+        inner = [8 + k for k, ends in enumerate(edges) if set(ends) <= set(corners)]
+        share = 0.5 if len(corners) == 4 else 0.25
+        added.append(
+            share * nodes[:, inner].sum(axis=1) - 0.25 * nodes[:, list(corners)].sum(axis=1)
         )
+    places = np.stack(added, axis=1)
+    keys = np.column_stack([cells[:, list(corners)] for corners in middles[12:18]])
+    faces = np.sort(keys.reshape(-1, 4), axis=1)
+    _, first, which = np.unique(faces, axis=0, return_index=True, return_inverse=True)
+    of_faces = places[:, :6].reshape(-1, 3)[first]
+    numbers = len(points) + which.reshape(-1, 6)
+    hubs = len(points) + len(first) + np.arange(len(cells))[:, None]
+    return (
+        np.concatenate([points, of_faces, places[:, 6]]),
+        np.concatenate([cells, numbers, hubs], axis=1),
+    )
 
 
 def _check_repeated(cells: Table) -> None:

@@ -264,7 +264,7 @@ def _kind(kind: int) -> tuple[int, int, str]:
     if kind not in KINDS:
         raise InputError(
             f"the mesh has elements of gmsh's kind {kind}",
-            allowed="elements of first order, or of second order with straight edges",
+            allowed="elements of first or second order",
         )
     return KINDS[kind]
 

@@ -88,7 +88,7 @@ class LeakingFace:
         least = float((self._area / facets.area).min(initial=1.0))
         if min(self.comm.allgather(least)) < _LEAST_COVERED:
             raise InputError("a part of the contact face has no laws, or no face opposite")
-        all_corners = self.comm.allgather(facets.corners)
+        all_corners = self.comm.allgather(facets.vertices)
         self._counts = [len(one) for one in all_corners]
         triangles, self._triangle_facet = facet_triangles(np.concatenate(all_corners))
         self._face = TriangleFace(triangles, *(self._places(one) for one in edges))
@@ -141,7 +141,7 @@ class LeakingFace:
             second: Pressure at the outlet [MPa].
             name: Name of the function.
         """
-        count, corners = len(self._triangle_facet), self._facets.corners.shape[1]
+        count, corners = len(self._triangle_facet), self._facets.vertices.shape[1]
         at = np.empty((sum(self._counts), corners))
         if corners == 3:
             at[:] = flow.pressure

@@ -337,7 +337,7 @@ def _located(facets: ContactFacets, points: Array) -> tuple[NDArray[np.intp], Ar
         facets: Facets in the plane.
         points: Points in the plane, shape (n, 2) [mm].
     """
-    count, corners = len(facets.corners), facets.corners
+    count, corners = len(facets.vertices), facets.vertices
     facet, local = np.full(len(points), -1), np.zeros_like(points)
     if not count or not len(points):
         return facet, local

@@ -16,7 +16,7 @@ from macro import compat
 from macro.contact.contact_forces import ContactLaw
 from macro.contact.loaded_face import Mode
 from macro.mesh.contact_face import ContactFacets, contact_facets
-from macro.mesh.facets import facet_indices
+from macro.mesh.facets import facet_indices, facet_outline
 from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face
 from support.arrays import Array
 from support.collective import together
@@ -50,13 +50,12 @@ def check_space(space: Any) -> None:
         InputError: On all ranks.
     """
     fits = compat.holds_displacements(space)
-    straight = fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8)
-    if not straight:
+    if not (fits and compat.cell_vertices(space.mesh).shape[1] in (4, 8, 10, 27)):
         raise InputError(
-            "the space of the displacements does not fit" if not fits else "the cells are curved",
+            "the space of the displacements does not fit" if not fits else "the cells do not fit",
             value=str(space.ufl_element()),
             allowed="a continuous Lagrange space of degree 1 or 2 with three components, on "
-            "tetrahedra or hexahedra with straight edges",
+            "tetrahedra or hexahedra of first or second order",
         )
 
 
@@ -99,7 +98,7 @@ def chosen_face(
             allowed=f"{plane.frame.normal.tolist()}, out of the body",
         )
     placed = contact_facets(mesh, facets, frame)
-    corner, other = bounding_box(placed.corners.reshape(-1, 2), mesh.comm)
+    corner, other = bounding_box(facet_outline(placed.corners), mesh.comm)
     lengths = (float(other[0] - corner[0]), float(other[1] - corner[1]))
     return ChosenFace(facets=placed, marked=marked, lower=corner, lengths=lengths)
 

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from geometry.face_frame import FaceFrame
 from geometry.meshes.bisection import (
@@ -21,14 +20,13 @@ from geometry.meshes.bisection import (
     from_hexahedra,
     reentrant_edges,
     refined,
-    with_middles,
 )
-from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refined_block import EdgeLengths, RefinedShape
 from geometry.surface import Surface
 from macro import compat
 from macro.bodies import MeshedBody
 from macro.contact.rough_face import RoughFace
-from macro.mesh.block import MeshQuality, move_onto
+from macro.mesh.block import MeshQuality, distributed, move_onto
 from macro.mesh.facets import exterior_facets, facet_nodes
 from macro.mesh.from_file import cell_tags, facet_tags
 from macro.mesh.supports import Support
@@ -36,13 +34,6 @@ from macro.mesh.tagged import TaggedMesh
 from support.arrays import Array, Flags
 from support.collective import on_root
 from support.errors import InputError
-
-_LONGEST = 1.75
-"""Longest edge of bisected cells over the edge of a regular tetrahedron as large as their mean."""
-
-_AT_HOLLOWS = 0.2
-"""Edge length at re-entrant edges over that around them. With 1 instead, the compliance of an L
-1.5 mm high in cells of 0.1 mm is too small by 0.1 %."""
 
 _STEEP = 0.5
 """Vertical component of the normals of sides, which move with the roughness; a bottom has more."""
@@ -58,6 +49,9 @@ class FlatBody:
         frame: Frame of that face; the rough rectangle begins at its origin.
         lengths: Sides of the rectangle [mm].
 
+    Raises:
+        InputError: When the cells are curved, whose parts would be straight.
+
     Note:
         Everything here is collective. Rank 0 has the whole mesh while it is refined.
     """
@@ -66,6 +60,13 @@ class FlatBody:
     contact: int
     frame: FaceFrame
     lengths: tuple[float, float]
+
+    def __post_init__(self) -> None:
+        if compat.geometry_degree(self.body.mesh.mesh) == 2:
+            raise InputError(
+                "a mesh of curved cells is not divided for a reference",
+                allowed="a mesh of straight cells, or another coupling",
+            )
 
     @property
     def comm(self) -> Any:
@@ -169,7 +170,7 @@ class FlatBody:
         def refine() -> tuple[Table, NDArray[np.int32]]:
             """Return the marked facets of the refined mesh, and their tags."""
             assert whole is not None
-            made.append(refined(whole, _Sizes(shape, self._hollows)))
+            made.append(refined(whole, EdgeLengths(shape, self._hollows)))
             facets, tags = made[0].facets, made[0].facet_tags.copy()
             middles = made[0].points[facets].mean(axis=1)[:, :2]
             inside = np.all((middles > 0.0) & (middles < self.lengths), axis=1)
@@ -178,15 +179,9 @@ class FlatBody:
             return facets[marked], tags[marked]
 
         facets, tags = on_root(self.comm, refine)
-        if made:
-            quadratic = shape.degree == 2
-            points, cells = with_middles(made[0]) if quadratic else (made[0].points, made[0].cells)
-            of_cells = made[0].cell_tags
-        else:
-            points, of_cells = np.empty((0, 3)), np.empty(0, np.int32)
-            cells = np.empty((0, {1: 4, 2: 10}[shape.degree]), np.int64)
-        mesh = compat.mesh_from_cells(cells, points, None, self.comm)
-        of_cells = self.comm.bcast(of_cells)
+        own = made[0] if made else None
+        mesh = distributed(own, shape.degree, self.comm)
+        of_cells = self.comm.bcast(None if own is None else own.cell_tags)
         tagged = TaggedMesh(
             mesh=mesh,
             facet_tags=facet_tags(mesh, facets, tags),
@@ -230,45 +225,3 @@ def _own_part(tagged: TaggedMesh) -> dict[str, Array]:
         "facets": numbers[facet_nodes(mesh, outer).corners],
         "facet_tags": tags[outer],
     }
-
-
-class _Sizes:
-    """Largest lengths of edges by their middles, in the coordinates of the face.
-
-    They grow from `fine` around the places of contact, and from `coarse` around the rectangle. At
-    re-entrant edges of the body they are a part of that, and grow from there.
-
-    Args:
-        shape: The sizes of cells.
-        hollows: Ends of the re-entrant edges, shape (n, 2, 3).
-    """
-
-    def __init__(self, shape: RefinedShape, hollows: Array) -> None:
-        self._shape = shape
-        self._near = cKDTree(np.column_stack([shape.places, np.zeros(len(shape.places))]))
-        start, end = hollows[:, :1], hollows[:, 1:]
-        length = np.linalg.norm(end - start, axis=2).ravel()
-        least = _AT_HOLLOWS * self._around(0.5 * (start + end)[:, 0])
-        count = np.ceil(length / least).astype(int) + 1
-        share = np.concatenate([np.linspace(0.0, 1.0, n) for n in count] or [np.empty(0)])
-        which = np.repeat(np.arange(len(count)), count)
-        self._seams = start[which, 0] + share[:, None] * (end - start)[which, 0]
-        self._least = least[which]
-        self._seam_tree = cKDTree(self._seams) if len(self._seams) else None
-
-    def _around(self, points: Array) -> Array:
-        """Return the edge length that roughness and distance from the rectangle allow."""
-        shape = self._shape
-        on_rectangle = np.clip(points, 0.0, [*shape.interface, 0.0])
-        distance = np.linalg.norm(points - on_rectangle, axis=1)
-        return np.asarray(shape.coarse + shape.growth * distance)
-
-    def __call__(self, middles: Array) -> Array:
-        """Return the largest lengths for middles (n, 3), shape (n,) [mm]."""
-        shape = self._shape
-        away = np.maximum(self._near.query(middles)[0] - 2.0 * shape.fine, 0.0)
-        size = np.minimum(shape.fine + shape.growth * away, self._around(middles))
-        if self._seam_tree is not None:
-            distance, seam = self._seam_tree.query(middles)
-            size = np.minimum(size, self._least[seam] + shape.growth * distance)
-        return np.asarray(_LONGEST * size)

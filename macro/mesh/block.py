@@ -1,11 +1,10 @@
-"""Distributed dolfinx meshes of blocks with marked faces, by gmsh or as a lattice; rough ones, too.
+"""Distributed dolfinx meshes of blocks with marked faces, flat and rough.
 
 Theory: section 12 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
+from geometry.meshes.bisection import Tetrahedra, with_middles
 from geometry.meshes.block import BlockShape
 from geometry.meshes.lattice import (
     cells_beyond,
@@ -67,16 +67,15 @@ def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
     """Mesh a block, distributed over all ranks.
 
     A flat block is a lattice, of which every rank makes a box of cells of its own. A refined block
-    is meshed whole by gmsh on rank 0 and distributed by dolfinx, so that time and memory of rank 0
-    grow with the whole mesh.
+    is meshed whole on rank 0 and distributed by dolfinx, so that time and memory of rank 0 grow
+    with the whole mesh.
 
     Args:
         shape: Size, cells and element of the block.
         comm: MPI communicator that the mesh will live on.
 
     Raises:
-        InputError: When gmsh cannot make the shape. Errors of gmsh on rank 0 are raised on every
-            rank.
+        InputError: When the shape cannot be meshed; on every rank.
 
     Note:
         Collective. A lattice of 10⁵ hexahedra takes 0.3 s and 0.07 GB, one of 10⁶ 2.7 s and 0.7 GB;
@@ -87,16 +86,32 @@ def block_mesh(shape: BlockShape | RefinedShape, comm: Any) -> BlockMesh:
     if isinstance(shape, BlockShape):
         mesh, planes = _from_lattice(shape, comm)
     else:
-        with ExitStack() as gmsh_session:
-            models: list[Any] = []
-            on_root(comm, lambda: models.append(gmsh_session.enter_context(shape.meshed())))
-            mesh = compat.mesh_from_gmsh(models[0] if models else None, comm)
-        mesh.geometry.x[:] *= shape.unit
+        whole: list[Tetrahedra] = []
+        on_root(comm, lambda: whole.append(shape.meshed()))
+        mesh = distributed(whole[0] if whole else None, shape.degree, comm)
     facets = exterior_facets(mesh)
     level = dmesh.compute_midpoints(mesh, 2, facets)[:, 2] / shape.height
     markers = np.select([level < -1.0 + FLAT, level > -FLAT], [BOTTOM, TOP], SIDES)
     tags = dmesh.meshtags(mesh, 2, facets, markers.astype(np.int32))
     return BlockMesh(mesh=mesh, facet_tags=tags, shape=shape, planes=planes)
+
+
+def distributed(whole: Tetrahedra | None, degree: int, comm: Any) -> Any:
+    """Return the dolfinx mesh of tetrahedra that rank 0 has, with nodes in their edges on request.
+
+    Args:
+        whole: The mesh; None but on rank 0.
+        degree: 1, or 2 for nodes in the middles of edges, which can be moved.
+        comm: MPI communicator.
+
+    Note:
+        Collective.
+    """
+    if whole is None:
+        points, cells = np.empty((0, 3)), np.empty((0, {1: 4, 2: 10}[degree]), np.int64)
+    else:
+        points, cells = with_middles(whole) if degree == 2 else (whole.points, whole.cells)
+    return compat.mesh_from_cells(cells, points, None, comm)
 
 
 def _from_lattice(shape: BlockShape, comm: Any) -> tuple[Any, NDArray[np.intp]]:

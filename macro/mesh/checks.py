@@ -64,7 +64,17 @@ def _refuse(comm: Any, bad: NDArray[np.bool_], mesh: Any, vertices: NDArray[np.i
 
 
 def _volumes(x: Array) -> tuple[Array, Array]:
-    """Return the least relative volume at a corner of each cell (n, 4 or 8, 3), and its hand."""
+    """Return the least relative volume at a node of each cell, and its hand.
+
+    Args:
+        x: Nodes of the cells, shape (n, 4, 8, 10 or 27, 3).
+    """
+    if x.shape[1] in (10, 27):
+        name = {10: "tetrahedron", 27: "hexahedron"}[x.shape[1]]
+        slopes = compat.lagrange_gradients(name, 2)
+        volumes = np.linalg.det(np.einsum("qmk,nmi->nqki", slopes, x))
+        hand, size = np.sign(volumes.sum(axis=1)), np.ptp(x, axis=1).prod(axis=1)
+        return (hand[:, None] * volumes).min(axis=1) / np.where(size > 0.0, size, 1.0), hand
     if x.shape[1] == 4:
         lengths = np.linalg.norm(x[:, :, None] - x[:, None], axis=3) + np.eye(4)
         volume = np.linalg.det(x[:, 1:] - x[:, :1])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from geometry.face_frame import UPWARD, FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.mesh.block import TOP, BlockMesh
-from macro.mesh.facets import facet_indices, facet_nodes
+from macro.mesh.facets import BETWEEN, facet_basis, facet_indices, facet_nodes, facet_rule
 from support.arrays import Array
 
 
@@ -48,14 +48,17 @@ class FacetQuadrature:
 class ContactFacets:
     """Facets of a contact face whose cells this rank owns: triangles, or quadrilaterals.
 
+    Those of curved cells have nodes between their corners, too, see `facet_basis`; m is the number
+    of their nodes, 3, 4, 6 or 9.
+
     Args:
         frame: Frame of the face, or of the one that it is pressed on.
         outward: Unit normal out of the body, shape (3,): that of the frame, or its opposite.
         cell: Rank-local cell that the facet belongs to, shape (n,).
         side: Index of the facet in its cell, shape (n,).
         reference: Vertices on the reference cell, shape (n, 3 or 4, 3).
-        corners: Vertices in the plane, shape (n, 3 or 4, 2) [mm].
-        depth: Depths of the vertices below the plane, into the body, shape (n, 3 or 4) [mm].
+        corners: Nodes in the plane, vertices first, shape (n, m, 2) [mm].
+        depth: Depths of the nodes below the plane, into the body, shape (n, m) [mm].
     """
 
     frame: FaceFrame
@@ -79,9 +82,14 @@ class ContactFacets:
     @property
     def area(self) -> Array:
         """Areas in the plane, shape (n,) [mm²]."""
-        triangles, facet = facet_triangles(self.corners)
-        areas = np.bincount(facet, triangle_areas(triangles), minlength=len(self.corners))
-        return np.asarray(areas, dtype=np.float64)
+        exact = 4 if self.corners.shape[1] > 4 else 1  # for the determinants of the maps
+        rule, weights = facet_rule(self.reference.shape[1], exact)
+        return np.asarray(np.abs(_jacobians(self.corners[:, None], rule[None]) @ weights))
+
+    @property
+    def vertices(self) -> Array:
+        """Vertices in the plane, shape (n, 3 or 4, 2) [mm]."""
+        return self.corners[:, : self.reference.shape[1]]
 
     def joined(self, others: Sequence[ContactFacets]) -> ContactFacets:
         """Return these facets and others of the same face."""
@@ -102,21 +110,21 @@ class ContactFacets:
             facet: The facet of each point, shape (n,).
             points: Points in the plane, shape (n, 2) [mm].
         """
-        corners = self.corners
+        corners = self.vertices
         edges = np.swapaxes(corners[:, 1:3] - corners[:, :1], 1, 2)
         offset = points - corners[facet, 0]
-        s = np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset)
-        if corners.shape[1] == 3:
-            return s
-        twist = corners[:, 0] - corners[:, 1] - corners[:, 2] + corners[:, 3]
-        # a parallelogram needs no Newton step to invert the map
-        bent = (np.abs(twist).max(axis=1) > 1e-12 * np.abs(edges).max(axis=(1, 2)))[facet]
-        edges, twist = edges[facet[bent]], twist[facet[bent]]
+        s = np.asarray(np.einsum("nij,nj->ni", np.linalg.inv(edges)[facet], offset))
+        # straight triangles and parallelograms need no Newton step to invert the map
+        bent = _off_parallel(self.corners)[facet]
+        at, nodes = s[bent], self.corners[facet[bent]]
         for _ in range(8 if bent.any() else 0):
-            at = s[bent]
-            miss = np.einsum("nij,nj->ni", edges, at) + twist * at.prod(axis=1)[:, None]
-            slope = edges + twist[:, :, None] * at[:, None, ::-1]
-            s[bent] = at - np.linalg.solve(slope, (miss - offset[bent])[..., None])[..., 0]
+            values, slopes = facet_basis(nodes.shape[1], at)
+            miss = np.einsum("nm,nmi->ni", values, nodes) - points[bent]
+            at = (
+                at
+                - np.linalg.solve(np.einsum("nmi,nmj->nij", nodes, slopes), miss[..., None])[..., 0]
+            )
+        s[bent] = at
         return s
 
     def pull_back(self, facet: NDArray[np.intp], local: Array) -> Array:
@@ -126,11 +134,8 @@ class ContactFacets:
 
     def depths(self, facet: NDArray[np.intp], local: Array) -> Array:
         """Return depths below the plane at coordinates (n, 2) on given facets, shape (n,) [mm]."""
-        s, t = local.T
-        weights = [1.0 - s - t, s, t]
-        if self.corners.shape[1] == 4:
-            weights = [(1.0 - s) * (1.0 - t), s * (1.0 - t), (1.0 - s) * t, s * t]
-        return np.einsum("kn,nk->n", np.array(weights), self.depth[facet])
+        values, _ = facet_basis(self.depth.shape[1], local)
+        return np.einsum("nk,nk->n", values, self.depth[facet])
 
 
 def facet_quadrature(
@@ -147,26 +152,33 @@ def facet_quadrature(
         parts: Patches on the face, in its frame; or the part that each whole facet is of, (n,).
         degree: Polynomial degree that is integrated exactly.
     """
-    triangles, facet = facet_triangles(facets.corners)
+    triangles, facet, curved = _divided(facets.corners)
+    part = np.arange(len(facet))
     if isinstance(parts, PatchGrid):
-        triangles, facet = _cut_into_patches(triangles, facet, parts)
+        triangles, part = _cut_into_patches(triangles, part, parts)
         patch = parts.index_of(*triangles.mean(axis=1).T)
     else:
         patch = parts[facet]
     order = np.argsort(patch, kind="stable")
-    triangles, facet, patch = triangles[order], facet[order], patch[order]
+    triangles, part, patch = triangles[order], part[order], patch[order]
 
     points, weights = compat.triangle_rule(degree)
     edges = triangles[:, 1:] - triangles[:, :1]
     positions = (triangles[:, :1] + np.einsum("qk,nkj->nqj", points, edges)).reshape(-1, 2)
-    facet, patch = np.repeat(facet, len(weights)), np.repeat(patch, len(weights))
-    local = facets.local(facet, positions)
+    weight = np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel()
+    part, patch = np.repeat(part, len(weights)), np.repeat(patch, len(weights))
+    facet = facet[part]
+    if curved is None:
+        local = facets.local(facet, positions)
+    else:
+        local, positions, share = curved.placed(part, positions, facets.corners[facet])
+        weight = share * weight
     reference = facets.pull_back(facet, local)
     return FacetQuadrature(
         x=positions[:, 0],
         y=positions[:, 1],
         depth=facets.depths(facet, local),
-        weight=np.multiply.outer(2.0 * triangle_areas(triangles), weights).ravel(),
+        weight=weight,
         patch=patch,
         cell=facets.cell[facet],
         reference=reference,
@@ -198,7 +210,7 @@ def contact_facets(
     owned = nodes.cell < mesh.topology.index_map(3).size_local
     vertices, shapes = compat.reference_facets(mesh.topology.cell_name())
     side = nodes.side[owned]
-    corners = mesh.geometry.x[nodes.corners[owned]]
+    corners = mesh.geometry.x[nodes.nodes[owned]]
     return ContactFacets(
         frame=frame,
         outward=side_of_body * frame.normal,
@@ -227,6 +239,106 @@ def facet_triangles(corners: Array) -> tuple[Array, NDArray[np.intp]]:
     # Tensor order: vertices 0 and 3 of a square are opposite. The orientation decides the diagonal
     # of what is left of a triangle cut by a border, on which the quadrature error depends.
     return np.concatenate([corners[:, [0, 2, 1]], corners[:, [3, 1, 2]]]), np.tile(facet, 2)
+
+
+_PARTS = 4
+"""Parts of an edge of second order, in which borders of patches are taken for straight."""
+
+
+class _CurvedParts(NamedTuple):
+    """Triangles that facets of second order are divided into, straight on the unit facet.
+
+    Attributes:
+        corners: Their corners in the plane, shape (n, 3, 2) [mm].
+        local: Their corners on the unit triangle or square, shape (n, 3, 2).
+    """
+
+    corners: Array
+    local: Array
+
+    def placed(
+        self, part: NDArray[np.intp], positions: Array, nodes: Array
+    ) -> tuple[Array, Array, Array]:
+        """Return where points of straight triangles lie in curved facets.
+
+        Args:
+            part: The triangle of every point, shape (n,).
+            positions: Points in the straight triangles in the plane, shape (n, 2) [mm].
+            nodes: Nodes of the facet of each, shape (n, 6 or 9, 2) [mm].
+
+        Returns:
+            Their coordinates on the unit facet and in the plane, shape (n, 2), and the area there
+            over that of the straight triangle, shape (n,).
+        """
+        plane, unit = (np.swapaxes(c[:, 1:] - c[:, :1], 1, 2) for c in self)
+        map_ = unit @ np.linalg.inv(plane)
+        offset = positions - self.corners[part, 0]
+        local = self.local[part, 0] + np.einsum("nij,nj->ni", map_[part], offset)
+        values, _ = facet_basis(nodes.shape[1], local)
+        share = _jacobians(nodes, local) * np.linalg.det(map_)[part]
+        return local, np.einsum("nm,nmi->ni", values, nodes), np.abs(share)
+
+
+def _jacobians(nodes: Array, local: Array) -> Array:
+    """Return the determinants of the maps of facets to the plane.
+
+    Args:
+        nodes: Nodes of the facets in the plane, shape (n, m, 2) or (n, 1, m, 2) [mm].
+        local: Coordinates on the unit facets, shape (n, 2) or (1, q, 2).
+
+    Returns:
+        Determinants, shape (n,) or (n, q) [mm²].
+    """
+    _, slopes = facet_basis(nodes.shape[-2], local.reshape(-1, 2))
+    slopes = slopes.reshape(*local.shape[:-1], *slopes.shape[1:])
+    return np.asarray(np.linalg.det(np.einsum("...mi,...mj->...ij", nodes, slopes)))
+
+
+def _divided(nodes: Array) -> tuple[Array, NDArray[np.intp], _CurvedParts | None]:
+    """Return triangles of facets, the facet of each, and what they are of facets of second order.
+
+    Args:
+        nodes: Nodes of the facets in the plane, shape (m, 3, 4, 6 or 9, 2) [mm].
+    """
+    if nodes.shape[1] < 5:
+        return *facet_triangles(nodes), None
+    unit = _lattice_triangles({6: 3, 9: 4}[nodes.shape[1]])
+    values, _ = facet_basis(nodes.shape[1], unit.reshape(-1, 2))
+    triangles = np.einsum("km,nmi->nki", values, nodes).reshape(-1, 3, 2)
+    facet = np.repeat(np.arange(len(nodes)), len(unit))
+    return triangles, facet, _CurvedParts(triangles, np.tile(unit, (len(nodes), 1, 1)))
+
+
+def _lattice_triangles(count: int) -> Array:
+    """Return the parts of the unit triangle (3) or square (4), shape (parts, 3, 2)."""
+    found, n = [], _PARTS
+    for i in range(n):
+        for j in range(n):
+            a, b, c, d = (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)
+            if count == 4 or i + j < n:
+                found.append((a, b, c))
+            if count == 4 or i + j < n - 1:
+                found.append((d, c, b))
+    return np.array(found) / n
+
+
+def _is_bent(nodes: Array) -> NDArray[np.bool_]:
+    """Tell which facets have nodes in the plane that lie off the middles of their corners, (n,)."""
+    if nodes.shape[1] < 5:
+        return np.zeros(len(nodes), dtype=bool)
+    count = {6: 3, 9: 4}[nodes.shape[1]]
+    middles = np.stack([nodes[:, list(ends)].mean(axis=1) for ends in BETWEEN[count]], axis=1)
+    size = np.ptp(nodes[:, :count], axis=1).max(axis=1)
+    return np.asarray(np.abs(nodes[:, count:] - middles).max(axis=(1, 2)) > 1e-9 * size)
+
+
+def _off_parallel(nodes: Array) -> NDArray[np.bool_]:
+    """Tell which facets have a map to the plane that is not linear, shape (n,)."""
+    bent = _is_bent(nodes)
+    if nodes.shape[1] in (4, 9):
+        twist = nodes[:, 0] - nodes[:, 1] - nodes[:, 2] + nodes[:, 3]
+        bent |= np.abs(twist).max(axis=1) > 1e-12 * np.ptp(nodes[:, :4], axis=1).max(axis=1)
+    return bent
 
 
 def _cut_into_patches(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -28,11 +29,35 @@ class FacetNodes:
         side: Indices of the facets in them, shape (n,).
         corners: Rows of ``mesh.geometry.x``, shape (n, 3 or 4); those of a quadrilateral as a
             tensor product, 0 and 3 being opposite.
+        nodes: The same with the nodes between corners of cells that may be curved, in the order of
+            `facet_basis`, shape (n, 3, 4, 6 or 9).
     """
 
     cell: NDArray[np.int32]
     side: NDArray[np.intp]
     corners: NDArray[np.int32]
+    nodes: NDArray[np.int32]
+
+
+def facet_outline(nodes: Array) -> Array:
+    """Return points of facets that they extend to: their nodes, or more on edges that are curved.
+
+    Args:
+        nodes: Nodes of facets, shape (n, m, k).
+
+    Returns:
+        Points, shape (n', k).
+    """
+    if nodes.shape[1] > 4:
+        steps = np.linspace(0.0, 1.0, 17)
+        zero, one = np.zeros(17), np.ones(17)
+        sides = [(steps, zero), (zero, steps)]
+        sides += [(1.0 - steps, steps)] if nodes.shape[1] == 6 else [(steps, one), (one, steps)]
+        values, _ = facet_basis(
+            nodes.shape[1], np.concatenate([np.stack(s, axis=1) for s in sides])
+        )
+        nodes = np.concatenate([nodes, np.einsum("qm,nmk->nqk", values, nodes)], axis=1)
+    return nodes.reshape(-1, nodes.shape[2])
 
 
 def facet_indices(mesh: Any, facets: Any) -> NDArray[np.int32]:
@@ -65,7 +90,7 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     """Return cells and corners of facets.
 
     Args:
-        mesh: dolfinx mesh of straight cells.
+        mesh: dolfinx mesh.
         facets: Rank-local facets, shape (n,); there may be none.
     """
     topology = mesh.topology
@@ -76,8 +101,78 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
     cell = cells_of.array[cells_of.offsets[facets]]
     sides = facets_of.array.reshape(-1, len(shapes))[cell]
     side = np.argmax(sides == np.asarray(facets)[:, None], axis=1)
-    corners = np.take_along_axis(compat.cell_vertices(mesh)[cell], shapes[side], axis=1)
-    return FacetNodes(cell=cell, side=side, corners=corners)
+    rows = compat.cell_vertices(mesh)[cell]
+    corners = np.take_along_axis(rows, shapes[side], axis=1)
+    nodes = corners
+    if compat.geometry_degree(mesh) == 2:
+        nodes = np.take_along_axis(rows, _side_nodes(topology.cell_name())[side], axis=1)
+    return FacetNodes(cell=cell, side=side, corners=corners, nodes=nodes)
+
+
+BETWEEN: dict[int, list[tuple[int, ...]]] = {
+    3: [(0, 1), (0, 2), (1, 2)],
+    4: [(0, 1), (0, 2), (1, 3), (2, 3), (0, 1, 2, 3)],
+}
+"""Corners of a facet, by their number, between which its nodes of second order lie."""
+
+
+@cache
+def _side_nodes(cell_name: str) -> NDArray[np.intp]:
+    """Return the nodes of second order of the facets of a cell, shape (facets, 6 or 9)."""
+    vertices, shapes = compat.reference_facets(cell_name)
+    points = compat.lagrange_points(cell_name, 2)
+    between = [*((k,) for k in range(shapes.shape[1])), *BETWEEN[shapes.shape[1]]]
+    places = np.array(
+        [[vertices[list(side[list(ends)])].mean(axis=0) for ends in between] for side in shapes]
+    )
+    apart = np.linalg.norm(places[:, :, None] - points, axis=3)
+    return np.asarray(apart.argmin(axis=2))
+
+
+def facet_basis(count: int, local: Array) -> tuple[Array, Array]:
+    """Return the basis of a facet's shape, and its slopes.
+
+    Args:
+        count: Nodes of the facet: 3, 4, or with those between corners 6 or 9.
+        local: Coordinates on the unit triangle or square, shape (n, 2).
+
+    Returns:
+        Values, shape (n, count), and slopes along both coordinates, shape (n, count, 2).
+    """
+    s, t = local.T
+    if count in (3, 6):
+        basis = np.stack([1.0 - s - t, s, t], axis=1)
+        slopes = np.broadcast_to([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]], (len(s), 3, 2))
+        if count == 3:
+            return basis, slopes
+        pairs = np.array(BETWEEN[3])
+        first, second = basis[:, pairs[:, 0]], basis[:, pairs[:, 1]]
+        products = 4.0 * (
+            first[..., None] * slopes[:, pairs[:, 1]] + second[..., None] * slopes[:, pairs[:, 0]]
+        )
+        return (
+            np.concatenate([basis * (2.0 * basis - 1.0), 4.0 * first * second], axis=1),
+            np.concatenate([(4.0 * basis - 1.0)[..., None] * slopes, products], axis=1),
+        )
+    if count == 4:
+        lines = [
+            (np.stack([1.0 - z, z]), np.stack([-np.ones_like(z), np.ones_like(z)])) for z in (s, t)
+        ]
+        at = [(0, 0), (1, 0), (0, 1), (1, 1)]
+    else:  # ends, then the middle
+        lines = [
+            (
+                np.stack([(1.0 - 2.0 * z) * (1.0 - z), z * (2.0 * z - 1.0), 4.0 * z * (1.0 - z)]),
+                np.stack([4.0 * z - 3.0, 4.0 * z - 1.0, 4.0 - 8.0 * z]),
+            )
+            for z in (s, t)
+        ]
+        at = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (1, 2), (2, 1), (2, 2)]
+    (along_s, slope_s), (along_t, slope_t) = lines
+    i, j = np.array(at).T
+    values = along_s[i] * along_t[j]
+    slopes = np.stack([slope_s[i] * along_t[j], along_s[i] * slope_t[j]], axis=-1)
+    return values.T, np.moveaxis(slopes, 0, 1)
 
 
 def parts(mesh: Any) -> list[int]:
@@ -209,7 +304,7 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     cell, side = outer.cell, outer.side
     shape_nodes = compat.cell_vertices(mesh)[cell]
     shape = compat.geometry_degree(mesh)
-    rule, weights = _facet_rule(corners.shape[1], exact)
+    rule, weights = facet_rule(corners.shape[1], exact)
     first = vertices[corners[:, 0]]
     tangents = vertices[corners[:, 1:3]] - first[:, None]  # (sides, 2, 3)
     reference = first[:, None] + rule @ tangents
@@ -238,8 +333,13 @@ def outer_facets(space: Any, exact: int) -> OuterFacets:
     )
 
 
-def _facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
-    """Return points (q, 2) and weights of the unit triangle or square."""
+def facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
+    """Return points (q, 2) and weights (q,) of the unit triangle or square.
+
+    Args:
+        corners: 3 or 4.
+        exact: Polynomial degree that is integrated exactly.
+    """
     if corners == 3:
         return compat.triangle_rule(exact)
     nodes, weights = legendre.leggauss(exact // 2 + 1)

@@ -24,7 +24,8 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
     """Read a body's mesh from a file, distributed over all ranks.
 
     Two kinds of files are read. Those of gmsh, ``.msh`` of format 2 or 4, text or binary, keep the
-    names of their physical groups; gmsh reads them on rank 0. Those of dolfinx, ``.xdmf`` with a
+    names of their physical groups, and cells of second order that are curved; they are read on
+    rank 0. Those of dolfinx, ``.xdmf`` with a
     mesh, tags of facets and tags of cells in one file, have numbers for names; all ranks read them.
 
     Args:
@@ -33,8 +34,8 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
         unit: Millimetres per unit of length of the file.
 
     Raises:
-        InputError: On all ranks, when the file cannot be read, when it holds no mesh of straight
-            tetrahedra or hexahedra alone, when cells are inverted or without volume, when the mesh
+        InputError: On all ranks, when the file cannot be read, when it holds no mesh of tetrahedra
+            or hexahedra alone, when cells are inverted or without volume, when the mesh
             is in several parts, or when a facet or a cell has two tags.
 
     Note:
@@ -105,9 +106,10 @@ def facet_tags(
     """Return the tags of the facets of the cells that this rank owns; there may be none.
 
     Args:
-        mesh: dolfinx mesh of straight cells.
-        facets: Marked facets of all ranks together: rows of the points that the mesh was made of,
-            in any order, shape (n, 3 or 4); negative for points that no cell has.
+        mesh: dolfinx mesh.
+        facets: Marked facets of all ranks together: rows of the corners among the points that
+            the mesh was made of, in any order, shape (n, 3 or 4); negative for points that no cell
+            has.
         tags: Their tags, shape (n,).
         names: Names of the tags, for errors.
 

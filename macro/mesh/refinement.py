@@ -18,6 +18,7 @@ from macro import compat
 from macro.mesh.from_file import cell_tags, facet_tags
 from macro.mesh.tagged import TaggedMesh
 from support.arrays import Array
+from support.errors import InputError
 
 Numbers = NDArray[np.int64]
 
@@ -49,16 +50,27 @@ def _hexahedron() -> list[list[str]]:
     return [[name(np.add(part, corner)) for corner in corners] for part in corners]
 
 
-def refined(tagged: TaggedMesh, times: int = 1) -> TaggedMesh:
+def refined(tagged: TaggedMesh, times: int = 1, *, key: str | None = None) -> TaggedMesh:
     """Return a mesh refined uniformly, with its tags, distributed anew over the ranks.
 
     Args:
         tagged: The mesh.
         times: How often; 0 returns the mesh itself.
+        key: Key of the scene that says so, for errors.
+
+    Raises:
+        InputError: When cells are curved, whose parts would be straight.
 
     Note:
         Collective. Mesh and tags do not depend on the number of ranks but for their order.
     """
+    if times and compat.geometry_degree(tagged.mesh) == 2:
+        raise InputError(
+            "a mesh of curved cells is not refined",
+            value=times,
+            key=key,
+            allowed="0; a finer mesh from gmsh",
+        )
     for _ in range(times):
         tagged = _refined_once(tagged)
     return tagged

@@ -10,7 +10,7 @@ import numpy as np
 
 from geometry.face_frame import FaceFrame
 from macro import compat
-from macro.mesh.facets import exterior_facets, facet_nodes
+from macro.mesh.facets import exterior_facets, facet_basis, facet_nodes, facet_outline, facet_rule
 from support.arrays import Array
 from support.errors import InputError, did_you_mean
 
@@ -185,7 +185,7 @@ def planar_face(
     if np.linalg.norm(total) < 0.5 * area:
         raise refused("is not planar: its facets face different ways and close around a body")
     frame = FaceFrame.across(total, along=along)
-    lower, upper = bounding_box(corners.reshape(-1, 3) @ frame.axes.T, comm)
+    lower, upper = bounding_box(facet_outline(corners) @ frame.axes.T, comm)
     upright = outward @ frame.normal / np.where(areas > 0.0, areas, 1.0)
     flattest = comm.allreduce(float(upright.min(initial=1.0)), min)
     lengths, off = upper[:2] - lower[:2], 0.5 * float(upper[2] - lower[2])
@@ -205,7 +205,7 @@ def planar_face(
 
 
 def surface_area(tagged: TaggedMesh, tag: int) -> float:
-    """Return the area of a body's outer surface with a tag, of straight facets [mm²].
+    """Return the area of a body's outer surface with a tag [mm²].
 
     Args:
         tagged: The mesh.
@@ -214,27 +214,39 @@ def surface_area(tagged: TaggedMesh, tag: int) -> float:
     Note:
         Collective.
     """
-    areas = np.linalg.norm(_facets(tagged, tag)[1], axis=1)
+    nodes = _facets(tagged, tag)[0]
+    areas = np.linalg.norm(_area_elements(nodes), axis=2)
     return float(tagged.comm.allreduce(float(areas.sum())))
+
+
+def _area_elements(nodes: Array) -> Array:
+    """Return vectors as long as the parts of facets at q quadrature points, shape (q, n, 3) [mm²].
+
+    Args:
+        nodes: Nodes of the facets, shape (n, 3, 4, 6 or 9, 3) [mm].
+    """
+    # their sums are exact: tangents of quadratic maps have products of degree 3 along a coordinate
+    count = nodes.shape[1]
+    rule, weights = facet_rule({3: 3, 6: 3, 4: 4, 9: 4}[count], 4 if count > 4 else 1)
+    _, slopes = facet_basis(count, rule)
+    along = np.einsum("qmk,nmi->qkni", slopes, nodes)
+    return np.asarray(weights[:, None, None] * np.cross(along[:, 0], along[:, 1]))
 
 
 def _facets(tagged: TaggedMesh, tag: int) -> tuple[Array, Array, int]:
     """Return this rank's outer facets of a face.
 
     Returns:
-        Their corners, shape (n, 3 or 4, 3) [mm]; outward vectors as long as their areas, shape
+        Their nodes, shape (n, 3, 4, 6 or 9, 3) [mm]; outward vectors as long as their areas, shape
         (n, 3) [mm²]; the number of facets between two cells, each counted on one rank.
     """
     mesh, facets = tagged.mesh, np.asarray(tagged.facet_tags.find(tag))
     outer = np.isin(facets, exterior_facets(mesh))
     own = facets < mesh.topology.index_map(2).size_local
     nodes = facet_nodes(mesh, facets[outer])
-    corners = mesh.geometry.x[nodes.corners]
+    corners = mesh.geometry.x[nodes.nodes]
     middle = mesh.geometry.x[compat.cell_vertices(mesh)[nodes.cell]].mean(axis=1)
-    # half the product of the diagonals of a quadrilateral
-    ends = (1, 0, 2, 0) if corners.shape[1] == 3 else (3, 0, 2, 1)
-    u, v = (corners[:, ends[k]] - corners[:, ends[k + 1]] for k in (0, 2))
-    areas = 0.5 * np.cross(u, v)
+    areas = _area_elements(corners).sum(axis=0)
     away = np.einsum("ni,ni->n", areas, corners.mean(axis=1) - middle)
     inner = int((own & ~outer).sum())
     return corners, areas * np.where(away < 0.0, -1.0, 1.0)[:, None], inner

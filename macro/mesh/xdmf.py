@@ -18,13 +18,17 @@ from macro.mesh.tagged import TaggedMesh
 from support.collective import on_root
 from support.errors import InputError
 
-_CELLS = {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}
+_CELLS = {
+    "tetrahedron": "triangle",
+    "tetrahedron_10": "triangle_6",
+    "hexahedron": "quadrilateral",  # those of 27 nodes are written by dolfinx, but not read
+}
 """Names of the cells' topology, without capitals, and of their facets'."""
 
 NAMES = "patchlaw tags"
 """Name of the entry with the names of the tags, as JSON: tags of ``facets`` and ``cells``."""
 
-_ALLOWED = "one mesh of first-order tetrahedra or hexahedra, as dolfinx writes it"
+_ALLOWED = "one mesh of tetrahedra or straight hexahedra, as dolfinx writes it"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -97,7 +97,7 @@ class _Reader:
         from macro.mesh.refinement import refined
 
         mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])
-        mesh = refined(mesh, self._section.refinements)
+        mesh = refined(mesh, self._section.refinements, key=f"{self._key}.refinements")
         note = size_note(mesh, key=f"{self._key}.mesh_unit")
         tags = [mesh.facet_tag(self._section.contact or 0, key=f"{self._key}.contact")]
         for region in regions:

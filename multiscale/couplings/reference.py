@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 
 from geometry import Control, PatchGrid, RefinedShape, RigidPlane
 from geometry.contact_state import ContactState, Spots, peaks_of
+from geometry.meshes.families import ContactMap
 from micro import HalfSpaceModel, influence_matrix
 from multiscale.couplings import describe
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
@@ -47,6 +48,9 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
 
 _COUNTED = 0.9
 """Part of what the face of a body moves that its meshes count on."""
+
+_MOST_CELLS = 512
+"""Heights along a side on which contact is estimated."""
 
 
 class RoughMesh(NamedTuple):
@@ -207,7 +211,8 @@ class ReferenceCoupling(PressedSurface):
         parts["seconds"]["load estimate"] = time.perf_counter() - began
         coupling = cls(plane_at_largest_load=plane, nodes=source.nodes, **parts)
         if scene.block is not None:
-            coupling.arranged = coupling._arranged(plane)
+            compliance = _block_compliance(scene, surface.lengths, parts["body"].depth)
+            coupling.arranged = coupling._arranged(coupling._plane_over_face(compliance))
         return coupling
 
     def attach(self, comm: Any, meshes: Meshes) -> None:
@@ -223,9 +228,25 @@ class ReferenceCoupling(PressedSurface):
         """Return the meshes under a plane in coordinates of the rough face; on one process."""
         scene, surface = self.scene, self.surface
         check_reference_memory(scene, surface, plane, self.nodes)
-        found = reference_meshes(scene, surface, self.body, plane)
+        contact = self._contact_under(plane)
+        found = reference_meshes(scene, surface, self.body, plane, contact)
         check_reference_memory(scene, surface, plane, self.nodes, found)
         return found
+
+    def _contact_under(self, plane: RigidPlane) -> ContactMap:
+        """Return where a half-space would be in contact under a plane.
+
+        A body moves that little: contacts under the same load differ by finite slopes alone.
+        """
+        count_x, count_y = self.surface.grid
+        model = HalfSpaceModel(self.surface, contact_modulus=self.materials.contact_modulus)
+        model = model.resampled((min(count_x, _MOST_CELLS), min(count_y, _MOST_CELLS)))
+        state = model.press(Control(approach=plane.approach, tilt=plane.tilt))
+        if state.pressures is None or not state.contacts:
+            return ContactMap.of_interference(self.surface, plane.approach, tilt=plane.tilt)
+        return ContactMap.of_pressures(
+            model.surface, np.reshape(state.pressures, model.surface.grid)
+        )
 
     @property
     def rough_meshes(self) -> ReferenceMeshes:
@@ -311,9 +332,10 @@ class ReferenceCoupling(PressedSurface):
         from macro.contact.rough_body import FlatBody
 
         tag = first.body.mesh.facet_tag(section.contact)
-        return FlatBody(
-            body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
-        )
+        with located(self.scene, "body.mesh"):
+            return FlatBody(
+                body=first.body, contact=tag, frame=first.frame, lengths=self.surface.lengths
+            )
 
     def _rough(self, shape: Shape, flat: FlatBody | None) -> tuple[Block | RoughFace, MeshQuality]:
         """Return a body with its roughness meshed."""
@@ -354,6 +376,10 @@ class ReferenceCoupling(PressedSurface):
             [one.problem.body.dofs for one in self.solver.meshes],
             force_order=meshes.force_order,
             area_order=meshes.area_order,
+            scatter=meshes.scatter(
+                np.array([step.contact_area_fraction for step in steps], float),
+                np.array([step.contacts for step in steps], float),
+            ),
         )
         return record.without_bars(np.array([self._misses(step) for step in steps], dtype=bool))
 
@@ -453,6 +479,17 @@ class ReferenceCoupling(PressedSurface):
         yield from describe.locking(self.body.poisson_ratio, self.rough_meshes.degree)
 
 
+def _block_compliance(scene: Scene, lengths: tuple[float, float], height: float) -> Array:
+    """Return the same of a block as `_face_compliance` of a body, a column that is pressed."""
+    block = block_section(scene)
+    nu, modulus = block.material.poisson_ratio, block.material.young_modulus
+    confined = (1.0 + nu) * (1.0 - 2.0 * nu) / (1.0 - nu) if block.sides == "roller" else 1.0
+    column = confined * height / modulus
+    parts = PatchGrid(grid=(1, 1), lengths=lengths)
+    half_space = float(influence_matrix(parts)[0, 0]) * block.material.surface_compliance / np.pi
+    return np.array([column - half_space, 0.0, 0.0])
+
+
 def _face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
     """Return what a body adds to a half-space under a uniform pressure on its rough rectangle.
 
@@ -461,7 +498,7 @@ def _face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
         lengths: Sides of the rectangle [mm].
 
     Returns:
-        Displacement of the middle into the body [mm/MPa], at least 0, and its slopes along x and y
+        Displacement of the middle into the body [mm/MPa], and its slopes along x and y
         [1/MPa], shape (3,): the plane through the mean displacements of 4 × 4 parts.
 
     Note:
@@ -477,4 +514,4 @@ def _face_compliance(body: SceneBody, lengths: tuple[float, float]) -> Array:
     moved = moved - influence_matrix(parts) @ uniform[0] * material.surface_compliance / np.pi
     arms = parts.centres - 0.5 * np.asarray(lengths)
     plane = np.linalg.lstsq(np.column_stack([np.ones(parts.count), arms]), moved, rcond=None)[0]
-    return np.asarray(plane * (plane[0] > 0.0))
+    return np.asarray(plane)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
-from geometry.meshes.families import Shape, characteristic_size, contact_radius, reference_shapes
+from geometry.meshes.families import ContactMap, Shape, characteristic_size, reference_shapes
 from multiscale.inputs.bodies import BodyFacts, block_unknowns
 from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located
@@ -21,7 +21,11 @@ from multiscale.scene.scene import Scene
 from support.arrays import Array
 
 _BISECTED = 1.6
-"""Cells by bisection for one of gmsh's where contact can occur: 1.4 to 2 on cubes and on a foot."""
+"""Cells by bisection for a regular tetrahedron of their size, calibrated by unknowns of blocks."""
+
+_SCATTER = 0.04
+"""Scatter of the force on quadratic meshes by where nodes happen to lie, for one edge along the
+radius of one contact: twice the 1.4 % that spheres show, and a part more by extrapolation."""
 
 BYTES_PER_UNKNOWN = {1: 2000, 2: 3500}
 """Memory of mesh, stiffness and multigrid per unknown, by the element's degree [B]."""
@@ -36,12 +40,14 @@ class ReferenceMeshes:
         sizes: Edge lengths where contact can occur, falling, shape (meshes,) [mm].
         across: Edges of the finest mesh across a typical contact at the largest load, estimated.
         unknowns: Degrees of freedom, estimated for tetrahedra.
+        contacts: Number of equal contacts with as wide a spread of loads, estimated.
     """
 
     shapes: tuple[Shape, ...]
     sizes: Array
     across: float
     unknowns: tuple[int, ...]
+    contacts: float
 
     @property
     def hexahedral(self) -> bool:
@@ -60,8 +66,30 @@ class ReferenceMeshes:
 
     @property
     def force_order(self) -> float:
-        """Known order of the force in the mesh size."""
-        return self.degree + 1.0
+        """Known order of the force in the edge length where contact occurs.
+
+        In families of quadratic tetrahedra all other edges fall with the square of that.
+        """
+        if self.hexahedral:
+            return self.degree + 1.0
+        return {1: 2.0, 2: 4.0}[self.degree]
+
+    def scatter(self, area: Array, contacts: Array) -> Array:
+        """Return the relative scatter of forces by where nodes happen to lie, shape (steps,).
+
+        It falls with the cube of the edges along a contact's radius, and by averaging over several
+        contacts. With the load contacts shrink.
+
+        Args:
+            area: Contact area of load steps, shape (steps,) [mm²].
+            contacts: Number of their contacts, shape (steps,).
+        """
+        if self.hexahedral or not np.any(area):
+            return np.zeros(len(area))
+        each = area / np.maximum(contacts, 1.0)
+        shrunk = np.sqrt(each / each[np.argmax(area)])
+        edges = np.clip(0.5 * self.across * shrunk, 1.0, 0.5 * self.across)
+        return _SCATTER / edges**3 / np.sqrt(np.clip(contacts, 1.0, self.contacts))
 
     @property
     def area_order(self) -> float:
@@ -76,7 +104,7 @@ class ReferenceMeshes:
     @property
     def gathered(self) -> float:
         """Memory of rank 0 while it makes the largest mesh, roughly; 0 for hexahedra [B]."""
-        # while gmsh makes tetrahedra, 1 kB for each cell
+        # while tetrahedra are divided, 1 kB for each cell
         each = {1: 1900, 2: 250}[self.degree]
         return 0.0 if self.hexahedral else float(max(self.unknowns)) * each
 
@@ -89,7 +117,8 @@ class ReferenceMeshes:
             kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
             where, unknowns = "edges", [f"{count}" for count in self.unknowns]
         else:  # unknowns are an estimate, which is worth two digits
-            kind = f"tetrahedra ({finest.element}), small only where contact can occur"
+            by = " by gmsh" * (finest.mesher == "gmsh")
+            kind = f"tetrahedra ({finest.element}){by}, small only where contact can occur"
             where = "edges there"
             unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
         count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(self.shapes)]
@@ -123,7 +152,11 @@ class ReferenceMeshes:
 
 
 def reference_meshes(
-    scene: Scene, surface: Surface, body: BodyFacts, plane_at_largest_load: RigidPlane
+    scene: Scene,
+    surface: Surface,
+    body: BodyFacts,
+    plane_at_largest_load: RigidPlane,
+    contact: ContactMap,
 ) -> ReferenceMeshes:
     """Return the meshes of a scene's reference.
 
@@ -132,6 +165,7 @@ def reference_meshes(
         surface: Its surface.
         body: What is known of its body.
         plane_at_largest_load: The rigid plane at the largest load, relative to the rough face.
+        contact: Where contact is expected then.
 
     Raises:
         InputError: When they cannot be made; names file and key.
@@ -140,9 +174,7 @@ def reference_meshes(
     reference = scene.reference
     hexahedral = reference.hexahedral
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
-    prescribed = _plane_is_prescribed(scene)
     with located(scene, _key(hexahedral)):
-        radius = contact_radius(surface, approach, tilt=tilt)
         element = None
         if scene.block is not None and body.element[0] == ("Q" if hexahedral else "P"):
             element = body.element
@@ -157,14 +189,16 @@ def reference_meshes(
             cells=reference.cells,
             grading=1.0 if scene.block is None else scene.block.grading,
             element=element,
-            radius=radius if prescribed else None,
+            contact=contact,
+            mesher=reference.mesher,
         )
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     return ReferenceMeshes(
         shapes=shapes,
         sizes=sizes,
-        across=2.0 * radius / float(sizes[-1]),
+        across=2.0 * contact.typical / float(sizes[-1]),
         unknowns=tuple(mesh_unknowns(shape, body) for shape in shapes),
+        contacts=contact.effective,
     )
 
 
@@ -222,7 +256,7 @@ def reference_requests(scene: Scene, meshes: ReferenceMeshes) -> Iterator[Memory
         meshes: Its meshes.
     """
     yield _request(scene, "the reference", shared=meshes.bytes)
-    yield _request(scene, "gmsh on rank 0, which meshes the reference,", root_only=meshes.gathered)
+    yield _request(scene, "rank 0, which meshes the reference,", root_only=meshes.gathered)
 
 
 def _request(scene: Scene, purpose: str, **sizes: Any) -> MemoryRequest:
@@ -244,6 +278,13 @@ def _check_body(scene: Scene) -> None:
     """Refuse keys of the body that do not go with a reference."""
     block = scene.block
     if block is None:
+        if scene.reference.mesher == "gmsh":
+            raise InputError(
+                "does not go with [body], whose mesh of the file is bisected",
+                key="reference.mesher",
+                value="gmsh",
+                allowed="bisection",
+            )
         if scene.reference.hexahedral:
             raise InputError(
                 "does not go with [body], whose meshes of a reference are of tetrahedra",
@@ -278,33 +319,40 @@ def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
     if isinstance(shape, BlockShape):
         return block_unknowns(shape)
     nodes = {1: 1.1, 2: 8.4}[shape.degree]  # of tetrahedra per cube of their edge
-    if body is None or not body.on_mesh:
-        return round(3.0 * nodes * _cubes(shape))
     # a linear mesh has an eighth of the nodes of quadratic displacements
-    own = body.unknowns * 8.0 ** (shape.degree - body.degree)
-    return round(_BISECTED * 3.0 * nodes * _cubes(shape) + own)
+    on_mesh = body is not None and body.on_mesh
+    own = body.unknowns * 8.0 ** (shape.degree - body.degree) if body and on_mesh else 0.0
+    more = _BISECTED if shape.mesher == "bisection" else 1.0
+    return round(more * 3.0 * nodes * _cubes(shape) + own)
 
 
 def _cubes(shape: RefinedShape) -> float:
     """Return the number of cubes as large as the edges at their place that fill a block."""
     counts = [int(np.clip(np.ceil(length / shape.fine), 8, 400)) for length in shape.interface]
     spacing = np.divide(shape.interface, counts)
-    away = np.ones(counts, dtype=bool)
     near = np.minimum((shape.places / spacing).astype(int), np.array(counts) - 1)
-    away[near[:, 0], near[:, 1]] = False
-    # distance to the nearest place of contact, in layers half as thick as the edges at their depth
-    beside = np.asarray(distance_transform_edt(away, sampling=spacing))
-    depths, total = [0.0], 0.0
-    while depths[-1] < shape.height and _edge(shape, depths[-1]) < shape.coarse:
-        depths.append(min(depths[-1] + 0.5 * _edge(shape, depths[-1]), shape.height))
+    classes = np.rint(np.log2(shape.edges / shape.fine) / 0.3).astype(int)
+    beside, edges = [], []
+    for one in np.unique(classes):
+        away, chosen = np.ones(counts, dtype=bool), classes == one
+        away[near[chosen, 0], near[chosen, 1]] = False
+        beside.append(np.asarray(distance_transform_edt(away, sampling=spacing)))
+        edges.append(float(shape.edges[chosen].mean()))
+
+    def density(depth: float) -> float:
+        """Return cubes per volume, summed over the columns of the grid."""
+        size = np.full(counts, shape.coarse + shape.growth * depth)
+        for distance, edge in zip(beside, edges, strict=True):
+            away = np.maximum(np.hypot(distance, depth) - 2.0 * edge, 0.0)
+            np.minimum(size, edge + shape.growth * away, out=size)
+        return float(np.sum(size**-3.0))
+
+    # layers half as thick as the edges at their depth below the smallest
+    depths, total, least = [0.0], 0.0, min(edges)
+    while depths[-1] < shape.height:
+        grown = least + shape.growth * max(depths[-1] - 2.0 * least, 0.0)
+        edge = min(grown, shape.coarse + shape.growth * depths[-1])
+        depths.append(min(depths[-1] + 0.5 * edge, shape.height))
     for above, below in pairwise(depths):
-        distance = np.hypot(beside, 0.5 * (above + below))
-        total += (below - above) * float(np.sum(_edge(shape, distance) ** -3.0))
-    total += (shape.height - depths[-1]) * beside.size * shape.coarse**-3.0  # all alike below
+        total += (below - above) * density(0.5 * (above + below))
     return total * float(np.prod(spacing))
-
-
-def _edge(shape: RefinedShape, distance: Any) -> Any:
-    """Return the edge length at a distance from the places of contact [mm]."""
-    grown = shape.fine + shape.growth * np.maximum(distance - 2.0 * shape.fine, 0.0)
-    return np.minimum(grown, shape.coarse)

@@ -160,7 +160,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     shear_force_x_N: float | None = column(
         "Shear force on the plane along x", "N",
-        heading="shear force x", table="more", in_report="shear force along x",
+        heading="shear force x", table="more", error="shear_force_error_N",
+        in_report="shear force along x",
     )  # fmt: skip
     shear_force_y_N: float | None = column(
         "Shear force on the plane along y", "N",
@@ -168,7 +169,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     shear_x_mm: float | None = column(
         "Shift of the plane along x from where it first touched", "mm",
-        heading="shift x", table="more", in_report="shift along x",
+        heading="shift x", table="more", error="shear_error_mm",
+        in_report="shift along x",
     )  # fmt: skip
     shear_y_mm: float | None = column(
         "Shift of the plane along y from where it first touched", "mm",

@@ -55,15 +55,15 @@ class ReferenceRecord:
         return (self.approach, "mm") if self.by_force else (self.force, "N")
 
     @property
-    def _at_largest_force(self) -> tuple[float, float, float]:
-        """Return value, error and rate of the response at the largest force, in mm or N."""
+    def _at_largest_force(self) -> tuple[float, float]:
+        """Return value and error of the response at the largest force, in mm or N."""
         found, step = self._response[0], int(np.argmax(self.force_N[-1]))
-        return float(found.value[step]), float(found.error[step]), float(found.rate[step])
+        return float(found.value[step]), float(found.error[step])
 
     @property
     def label(self) -> str:
         """The error bar relative to the response at the largest force, for tables and legends."""
-        value, error, _ = self._at_largest_force if self.force_N.any() else (0.0, np.nan, 0.0)
+        value, error = self._at_largest_force if self.force_N.any() else (0.0, np.nan)
         if not np.isfinite(error):
             return "no error bar"
         return f"± {percent(error / (abs(value) or 1.0))}"
@@ -77,14 +77,9 @@ class ReferenceRecord:
             return "no load step, no error bar"
         if not self.force_N.any():
             return "no contact on any mesh, no error bar"
-        value, error, rate = self._at_largest_force
+        value, error = self._at_largest_force
         _, unit = self._response
-        if np.isnan(rate):
-            meshes = "meshes that show no rate: the value is that of the finest"
-        elif len(self.sizes) == 2:
-            meshes = f"two meshes, with the known order {rate:g} of their family"
-        else:
-            meshes = f"three meshes, with the rate {rate:.2g} that they show"
+        meshes = f"{'two' if len(self.sizes) == 2 else 'three'} meshes of a family of known order"
         return (
             f"{'approach' if self.by_force else 'force'} at mesh size zero, at the largest force: "
             f"{measured(value, error, unit)} ({self.label}), from {meshes}; "
@@ -190,6 +185,7 @@ def reference_record(
     *,
     force_order: float,
     area_order: float,
+    scatter: Array | float = 0.0,
 ) -> ReferenceRecord:
     """Gather the results of every mesh, and extrapolate them to mesh size zero.
 
@@ -199,6 +195,7 @@ def reference_record(
         unknowns: Degrees of freedom of the meshes.
         force_order: Known order of convergence of the force, and of the approach under a force.
         area_order: Known order of convergence of the contact area.
+        scatter: Relative scatter of forces on single meshes, shape (steps,).
     """
     found = np.array([step.meshes for step in steps], float).reshape(len(steps), len(sizes), 3)
     approach, force, area = found.transpose(2, 1, 0)
@@ -208,7 +205,7 @@ def reference_record(
         approach_mm=approach,
         force_N=force,
         contact_area_fraction=area,
-        approach=extrapolated(approach, sizes, force_order),
-        force=extrapolated(force, sizes, force_order),
+        approach=extrapolated(approach, sizes, force_order, scatter),
+        force=extrapolated(force, sizes, force_order, scatter),
         area=extrapolated(area, sizes, area_order),
     )

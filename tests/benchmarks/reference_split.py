@@ -36,7 +36,7 @@ from multiscale.bodies.face_terms import BlockTerms
 from multiscale.results.extrapolation import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
-SIDE, APPROACH, ORDER = 1.0, 8e-3, 3.0
+SIDE, APPROACH, ORDER = 1.0, 8e-3, 4.0
 COMM = MPI.COMM_WORLD
 SIDES = FreeSides(
     lengths=(SIDE, SIDE), poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25 * SIDE

@@ -61,7 +61,7 @@ def meshed(surface, scale, approaches, edges):
         block = UnilateralContactProblem(Block(mesh, MATERIAL), top.highest - top.mean_height)
         forces.append([block.solve(Control(approach=scale * a)).force / scale for a in approaches])
     sizes = np.array([characteristic_size(shape) for shape in shapes])
-    found = extrapolated(np.array(forces), sizes, 3.0)
+    found = extrapolated(np.array(forces), sizes, 4.0)
     return found.value, found.error
 
 

@@ -97,7 +97,7 @@ def families(surface, large):
     linear = suggested_fine(surface, top, edges=8.0)
     cells = (128, 128, 32) if large else (64, 64, 16)
     asked = {
-        "P2": (3.0, {}),
+        "P2": (4.0, {}),
         "P1": (2.0, {"element": "P1", "fine": linear}),
         "Q1": (2.0, {"mesh": "hexahedra", "cells": cells}),
     }

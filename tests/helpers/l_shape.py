@@ -131,7 +131,6 @@ class Reference:
             count=self.count,
             fine=radius / self.edges,
             tilt=tilt,
-            radius=radius,
         )
         return [SteppedShape(block=block, boxes=BOXES) for block in blocks]
 
@@ -152,4 +151,4 @@ class Reference:
 
     def extrapolated(self, forces):
         """Return forces (meshes, steps) at mesh size zero, with error bars."""
-        return extrapolated(forces, [shape.fine for shape in self.shapes], 3.0)
+        return extrapolated(forces, [shape.fine for shape in self.shapes], 4.0)

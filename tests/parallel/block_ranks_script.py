@@ -58,11 +58,11 @@ def run(case, mode):
 
 
 class Unmeshable(RefinedShape):
-    """A block that gmsh gives up on."""
+    """A block that cannot be meshed."""
 
     def meshed(self):
         """Raise instead of meshing."""
-        raise InputError("gmsh gave up", value=3, allowed="better luck")
+        raise InputError("meshing gave up", value=3, allowed="better luck")
 
 
 def fail_in_gmsh():

@@ -60,6 +60,8 @@ def sections(folder):
     sample["law"] = sample["law"] | {"seeds": [1, 2, 3]}
     load["load"] = {"approach": "6 um", "steps": 1, "tilt": [1e-3, 0]}
     yield "errors", {**sample, **load, "body": body, "output": measured}
+    curved = {**body, "mesh": f"{folder}/curved.msh", "element": "quadratic"}
+    yield "curved", {**sample, **load, "body": curved, "output": measured}
 
 
 def main(folder):

@@ -80,7 +80,7 @@ def meshed_force():
         block = Block(rough_block_mesh(shape, top, COMM)[0], MATERIAL)
         problem = UnilateralContactProblem(block, top.highest - top.mean_height)
         forces.append(problem.solve(Control(approach=APPROACH * FLAT)).force / FLAT)
-    found = extrapolated(np.array(forces)[:, None], [characteristic_size(s) for s in shapes], 3.0)
+    found = extrapolated(np.array(forces)[:, None], [characteristic_size(s) for s in shapes], 4.0)
     return float(found.value[0]), float(found.error[0])
 
 

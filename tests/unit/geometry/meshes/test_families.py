@@ -13,7 +13,7 @@ from geometry import (
     suggested_fine,
     synthesise,
 )
-from geometry.meshes.families import EDGES, contact_radius
+from geometry.meshes.families import EDGES, ContactMap, contact_radius
 
 ROUGH = synthesise(
     Spectrum(hurst=0.95, waves=(2, 10), rms_slope=0.215, seed=1),
@@ -40,10 +40,11 @@ def test_plane_apart_has_one_place():
 def test_sizes_of_tetrahedra_fall_together():
     shapes = family()
     sizes = np.array([characteristic_size(shape) for shape in shapes])
-    np.testing.assert_allclose(sizes[:-1] / sizes[1:], np.sqrt(2.0), rtol=1e-12)
+    np.testing.assert_allclose(sizes[:-1] / sizes[1:], 2.0**0.25, rtol=1e-12)
     assert sizes[-1] == suggested_fine(ROUGH, 8e-3) == contact_radius(ROUGH, 8e-3) / EDGES
     for values in ([s.coarse for s in shapes], [s.growth for s in shapes]):
-        np.testing.assert_allclose(np.array(values) / sizes, values[0] / sizes[0], rtol=1e-12)
+        squares = sizes**2  # sizes beside contacts fall with the square of those in them
+        np.testing.assert_allclose(np.array(values) / squares, values[0] / squares[0], rtol=1e-12)
     assert {shape.element for shape in shapes} == {"P2"}
 
 
@@ -51,6 +52,26 @@ def test_two_meshes_span_what_three_do():
     two, three = family(count=2), family(count=3)
     assert [shape.fine for shape in two] == pytest.approx([three[0].fine, three[2].fine])
     assert family(count=1)[0].fine == two[1].fine
+
+
+def test_contacts_found_decide_the_edges():
+    """Two discs of pressure: the larger has larger edges, the one that bears less even larger."""
+    x, y = (np.arange(128) + 0.5) / 128, (np.arange(128) + 0.5) / 128
+    wide = np.hypot(x[:, None] - 0.3, y - 0.5) < 0.2
+    narrow = np.hypot(x[:, None] - 0.8, y - 0.5) < 0.1
+    contact = ContactMap.of_pressures(ROUGH, 1.0 * wide + 4.0 * narrow)  # of equal force
+    left = contact.places[:, 0] < 0.6
+    assert contact.effective == pytest.approx(2.0, abs=0.01)
+    assert contact.radius[left] == pytest.approx(0.2, rel=0.04)  # a cell is 0.04 of it
+    assert contact.radius[~left] == pytest.approx(0.1, rel=0.05)
+    assert contact.typical == pytest.approx(0.15, rel=0.04)
+    (shape,) = family(contact=contact, count=1)
+    assert shape.fine == contact.typical / EDGES
+    np.testing.assert_allclose(shape.edges * EDGES, contact.radius, rtol=1e-12)
+    less = ContactMap.of_pressures(ROUGH, 1.0 * wide + 0.01 * narrow)
+    # a 400th of the force: edges 400^(1/6) = 2.7 times as long for half the radius
+    ratio = less.radius[~left].min() / less.radius[left].max()
+    assert ratio == pytest.approx(0.5 * 400.0 ** (1.0 / 6.0), rel=0.1)
 
 
 def test_stated_edges_are_kept():

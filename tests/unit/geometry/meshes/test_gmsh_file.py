@@ -157,7 +157,7 @@ def test_cells_of_second_order_with_straight_edges_lose_their_middles(tmp_path, 
     assert x.shape[1] == {"tetrahedra": 3, "hexahedra": 4}[kind]
 
 
-def test_cells_with_bent_edges_are_refused(tmp_path):
+def test_curved_cells_keep_the_nodes_between_their_corners(tmp_path):
     with gmsh_session("ball") as gmsh:
         gmsh.model.occ.addSphere(0, 0, 0, 1)
         gmsh.model.occ.synchronize()
@@ -165,8 +165,16 @@ def test_cells_with_bent_edges_are_refused(tmp_path):
         gmsh.option.setNumber("Mesh.ElementOrder", 2)
         gmsh.model.mesh.generate(3)
         gmsh.write(str(tmp_path / "ball.msh"))
-    with pytest.raises(InputError, match=r'with curved edges; .* element = "quadratic" gives'):
-        read_gmsh_file(tmp_path / "ball.msh")
+    mesh = read_gmsh_file(tmp_path / "ball.msh")
+    assert mesh.cells.shape[1] == 10
+    # dolfinx: nodes 4 … 9 lie between these corners
+    ends = mesh.cells[:, [(2, 3), (1, 3), (1, 2), (0, 3), (0, 2), (0, 1)]]
+    straight, place = mesh.points[ends].mean(axis=2), mesh.points[mesh.cells[:, 4:]]
+    on_ball = np.all(np.abs(np.linalg.norm(mesh.points[ends], axis=-1) - 1.0) < 1e-9, axis=2)
+    assert np.abs(np.linalg.norm(place, axis=2)[on_ball] - 1.0).max() < 1e-6
+    chord = np.linalg.norm(mesh.points[ends[..., 0]] - mesh.points[ends[..., 1]], axis=2)
+    assert np.all(np.linalg.norm(place - straight, axis=2) < 0.3 * chord)
+    assert mesh.facets.shape[1] == 3
 
 
 @pytest.mark.parametrize(

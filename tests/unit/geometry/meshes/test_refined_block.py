@@ -1,12 +1,11 @@
 """Tetrahedra that are small only where contact can occur."""
 
-import gmsh
 import numpy as np
 import pytest
 
 from geometry import InputError, Surface
 from geometry.meshes.families import depth_below_plane, places_in_reach
-from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refined_block import EdgeLengths, RefinedShape
 
 
 def shape(**changes):
@@ -20,73 +19,46 @@ def shape(**changes):
     return RefinedShape(**(content | changes))
 
 
-def edges_of(model):
+def edges_of(mesh):
     """Return midpoints and lengths of the edges of all tetrahedra."""
-    tags, coordinates, _ = model.mesh.getNodes()
-    place = dict(zip(tags, coordinates.reshape(-1, 3), strict=True))
-    _, nodes = model.mesh.getElementsByType(4)
-    corners = np.array([place[node] for node in nodes]).reshape(-1, 4, 3)
+    corners = mesh.points[mesh.cells]
     pairs = [(i, j) for i in range(4) for j in range(i)]
     ends = np.concatenate([corners[:, [i, j]] for i, j in pairs])
     return ends.mean(axis=1), np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
 
 
+def volumes(mesh):
+    corners = mesh.points[mesh.cells]
+    return np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
+
+
 def test_sizes_follow_the_distance():
-    with shape().meshed() as model:
-        middle, length = edges_of(model)
-        assert model.getPhysicalGroups() == [(3, 1)]
+    middle, length = edges_of(shape().meshed())
     distance = np.linalg.norm(middle - [0.3, 0.4, 0.0], axis=1)
-    near, far = length[distance < 0.03], length[distance > 0.6]
-    # gmsh keeps sizes on average, single edges within a factor
-    assert np.median(near) == pytest.approx(0.02, rel=0.35)
-    assert 0.08 < np.median(far) < 0.3
-    wanted = np.minimum(0.02 + 0.25 * np.maximum(distance - 0.04, 0.0), 0.2)
+    depth = -middle[:, 2]
+    wanted = np.minimum(0.02 + 0.25 * np.maximum(distance - 0.04, 0.0), 0.2 + 0.25 * depth)
+    assert np.all(length <= 1.75 * wanted * (1.0 + 1e-12))
+    # the lengths of bisected cells lie within a factor of 2^(1/3) of each other, and so on average
     assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
 
 
-@pytest.mark.parametrize(("element", "kind"), [("P1", 4), ("P2", 11)])
-def test_geometry_has_the_order_of_the_element(element, kind):
-    with shape(element=element).meshed() as model:
-        kinds, _, _ = model.mesh.getElements(3)
-    assert list(kinds) == [kind]  # gmsh's numbers of tetrahedra with 4 and 10 nodes
+def test_tetrahedra_fill_the_block():
+    mesh = shape(interface=(1.0, 0.5), height=0.7).meshed()
+    assert volumes(mesh).sum() == pytest.approx(0.35, rel=1e-12)
+    corners = mesh.points[mesh.facets]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = 0.5 * np.linalg.norm(across, axis=1).sum()
+    assert area == pytest.approx(2.0 * (0.5 + 0.7 + 0.35), rel=1e-12)
 
 
-def test_no_place_is_stepped_over():
-    """Large triangles all around: gmsh's frontal algorithm puts no node near the small ones."""
-    ticks = np.linspace(0.0, 1.0, 24)
-    lattice = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
-    near = lattice[np.linalg.norm(lattice - 0.5, axis=1) < 0.14]
-    places = np.vstack([near, [[0.5, 0.5]]])
-    small = shape(
-        interface=(1.0, 1.0), height=1.0, places=places, fine=0.05, coarse=0.29, growth=0.7
-    )
-    with small.meshed() as model:
-        _, nodes, _ = model.mesh.getNodes(2, -1, includeBoundary=True)
-    distance = np.linalg.norm(nodes.reshape(-1, 3) - [0.5, 0.5, 0.0], axis=1)
-    # triangles of this edge have 2/√3 nodes per square of it: 14.5 in the disc; 1 was missed
-    assert 10 <= np.count_nonzero(distance < 0.1) <= 20
-
-
-def test_meshes_are_the_same_on_every_run():
-    found = []
-    for _ in range(2):
-        with shape(fine=0.01).meshed() as model:
-            found.append(model.mesh.getNodes()[1])
-    np.testing.assert_array_equal(*found)
-
-
-def test_sizes_of_the_callers_session_do_not_count():
-    with shape().meshed() as model:
-        expected = len(model.mesh.getNodes()[0])
-    gmsh.initialize()
-    try:
-        gmsh.option.setNumber("Mesh.MeshSizeFactor", 3.0)
-        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.1)
-        with shape().meshed() as model:
-            assert len(model.mesh.getNodes()[0]) == expected
-        assert gmsh.option.getNumber("Mesh.MeshSizeFactor") == 3.0
-    finally:
-        gmsh.finalize()
+def test_places_may_have_edges_of_their_own():
+    two = np.array([[0.2, 0.4], [0.8, 0.4]])
+    sizes = EdgeLengths(shape(places=two, relative=np.array([1.0, 3.0])))
+    at_places = sizes(np.column_stack([two, np.zeros(2)])) / 1.75
+    np.testing.assert_allclose(at_places, [0.02, 0.06], rtol=1e-12)
+    middle, length = edges_of(shape(places=two, relative=np.array([1.0, 3.0])).meshed())
+    near = [length[np.linalg.norm(middle[:, :2] - place, axis=1) < 0.05] for place in two]
+    assert np.median(near[1]) > 2.0 * np.median(near[0])
 
 
 def test_places_are_where_the_plane_can_come():
@@ -122,6 +94,8 @@ def test_depth_is_counted_from_the_tilted_plane():
         ({"places": np.array([[0.3, 0.4], [0.3, 0.9]])}, "lies outside the interface"),
         ({"places": np.array([[np.nan, 0.4]])}, "lies outside the interface"),
         ({"interface": (1.0, -1.0)}, "interface"),
+        ({"relative": np.ones(2)}, "relative edge lengths do not fit the places"),
+        ({"relative": np.zeros(1)}, "relative edge lengths do not fit the places"),
     ],
 )
 def test_impossible_shapes_are_refused(changes, text):
@@ -131,7 +105,6 @@ def test_impossible_shapes_are_refused(changes, text):
 
 @pytest.mark.parametrize("size", [2.0**-40, 2.0**30])
 def test_blocks_of_any_size_have_the_same_mesh(size):
-    """The CAD kernel takes what is shorter than 1e-7 for nothing."""
     other = shape(
         interface=(size, 0.8 * size),
         height=0.5 * size,
@@ -139,26 +112,42 @@ def test_blocks_of_any_size_have_the_same_mesh(size):
         fine=0.02 * size,
         coarse=0.2 * size,
     )
-    with shape().meshed() as model:
-        expected = model.mesh.getNodes()[1]
-    with other.meshed() as model:
-        np.testing.assert_array_equal(model.mesh.getNodes()[1], expected)
-    assert other.unit == size * shape().unit
+    expected, found = shape().meshed(), other.meshed()
+    np.testing.assert_array_equal(found.cells, expected.cells)
+    np.testing.assert_allclose(found.points, size * expected.points, rtol=1e-12)
 
 
-def test_what_is_in_the_last_digits_does_not_change_the_mesh():
-    """Summits are found to 1e-9 of a length; a triangle flipped moves the force by 1e-4."""
-    random = np.random.default_rng(3)
-    places = random.uniform(0.1, 0.7, (60, 2))
-    found = []
-    for size, error in ((1.0, 0.0), (1e3, 0.0), (1.0, 1e-9), (1.0, 1e-9)):
-        near = {
-            "interface": (size, 0.8 * size),
-            "height": 0.5 * size,
-            "places": size * (places + error * random.standard_normal(places.shape)),
-            "fine": 0.02 * size,
-            "coarse": 0.2 * size,
-        }
-        with shape(**near).meshed() as model:
-            found.append(model.mesh.getNodes()[1])
-    assert all(np.array_equal(found[0], other) for other in found[1:])
+def test_gmsh_meshes_the_block_with_the_same_edge_lengths():
+    two = np.array([[0.3, 0.4], [0.8, 0.2]])
+    block = shape(places=two, relative=np.array([1.0, 3.0]), mesher="gmsh")
+    mesh = block.meshed()
+    assert volumes(mesh).sum() == pytest.approx(0.4, rel=1e-9)  # gmsh places nodes to 1e-11
+    middle, length = edges_of(mesh)
+    wanted = EdgeLengths(block)(middle) / 1.75
+    # gmsh's own lengths scatter about those asked for
+    assert np.median(length / wanted) == pytest.approx(1.0, abs=0.3)
+    for place, edge in zip(two, (0.02, 0.06), strict=True):
+        near = np.linalg.norm(middle - [*place, 0.0], axis=1) < 2.0 * edge
+        assert np.median(length[near] / wanted[near]) == pytest.approx(1.0, abs=0.4)
+        assert np.median(length[near]) < 1.5 * edge
+
+
+def test_blocks_of_one_shape_have_one_mesh_by_gmsh():
+    small, large = (
+        shape(
+            interface=(1.0 * size, 0.8 * size),
+            height=0.5 * size,
+            places=np.array([[0.3, 0.4]]) * size,
+            fine=0.05 * size,
+            coarse=0.2 * size,
+            mesher="gmsh",
+        ).meshed()
+        for size in (1e-6, 1e3)  # gmsh takes lengths below 1e-7 for nothing
+    )
+    np.testing.assert_array_equal(small.cells, large.cells)
+    np.testing.assert_allclose(1e9 * small.points, large.points, rtol=0.0, atol=1e-9)
+
+
+def test_unknown_meshers_are_refused():
+    with pytest.raises(InputError, match=r"'netgen': unknown mesher \(allowed: bisection, gmsh"):
+        shape(mesher="netgen")

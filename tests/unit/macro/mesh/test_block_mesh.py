@@ -33,17 +33,17 @@ def test_faces_are_marked_and_complete(element):
 
 
 class Unmeshable(RefinedShape):
-    """A block that gmsh gives up on."""
+    """A block that cannot be meshed."""
 
     def meshed(self):
-        raise InputError("gmsh gave up")
+        raise InputError("meshing gave up")
 
 
-def test_error_of_gmsh_is_passed_on():
+def test_error_of_meshing_is_passed_on():
     shape = Unmeshable(
         interface=(1.0, 1.0), height=1.0, places=np.array([[0.5, 0.5]]), fine=0.5, coarse=0.5
     )
-    with pytest.raises(InputError, match="gmsh gave up"):
+    with pytest.raises(InputError, match="meshing gave up"):
         block_mesh(shape, MPI.COMM_SELF)
 
 

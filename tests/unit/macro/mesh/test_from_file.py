@@ -143,8 +143,8 @@ def test_xdmf_that_does_not_fit_is_refused(tmp_path):
     (tmp_path / "moved.h5").write_text("no numbers")
     with pytest.raises(InputError, match="dolfinx cannot read it"):
         read_mesh(path, COMM)
-    path.write_text(path.read_text().replace('"Tetrahedron"', '"Tetrahedron_10"'))
-    with pytest.raises(InputError, match=r"'tetrahedron_10': .* first-order tetrahedra"):
+    path.write_text(path.read_text().replace('"Tetrahedron"', '"Tetrahedron_20"'))
+    with pytest.raises(InputError, match=r"'tetrahedron_20': .* straight hexahedra"):
         read_mesh(path, COMM)
     square = dmesh.create_unit_square(COMM, 1, 1)
     with io.XDMFFile(COMM, str(tmp_path / "flat.xdmf"), "w") as file:

@@ -46,10 +46,10 @@ def test_quality_is_that_of_the_cells():
 @pytest.mark.parametrize(("element", "slack"), [("P1", 0.1), ("P2", 0.02)])
 def test_quality_of_tetrahedra_is_the_jacobian(element, slack):
     """Below the valley a depth dz becomes 1 − 3 · 0.1 (1 + z)² of it."""
-    _, quality = rough_block_mesh(refined(element, coarse=0.08, fine=0.08), wave(0.1), COMM)
+    _, quality = rough_block_mesh(refined(element, coarse=0.04, fine=0.04), wave(0.1), COMM)
     # gradients across a linear cell are averages, those of a quadratic one nearly exact
     assert quality.thinnest == pytest.approx(0.7, abs=slack)
-    assert quality.steepest == pytest.approx(0.1 * 2.0 * np.pi, rel=0.02)
+    assert quality.steepest == pytest.approx(0.1 * 2.0 * np.pi, rel=0.03)  # means over edges
 
 
 @pytest.mark.parametrize("element", ["P1", "P2"])
