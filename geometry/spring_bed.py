@@ -28,7 +28,7 @@ FEWEST, MOST = 10, 30
 _FLOOR = 0.03
 """Share of the largest pressure below which errors count relative to it, not to the pressure."""
 _SAMPLES = 600
-_COARSER, _FINER = 1.25, 0.5
+_COARSER, _FINER = 1.05, 0.5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,7 +99,8 @@ def springs_of(
     Between two closures springs are spread evenly, so that the stiffness is a line there. A group
     of stiffness k and width h acts as one spring with one slider, which changes the shear stress
     of partial slip by μ k h/8 at most. Where the stiffness of a law falls, as that of patches whose
-    neighbours take load over, springs stay as stiff as before, and all are scaled to the pressure.
+    neighbours take load over, the springs bear the largest convex pressure below that of the law,
+    and are scaled to it: their stiffness is the nearest one that does not fall.
 
     Args:
         pressure: The law's pressure at closures [MPa].
@@ -113,15 +114,20 @@ def springs_of(
     share = np.linspace(0.0, 1.0, _SAMPLES + 1) if last > first else np.zeros(1)
     closure = first + (last - first) * share**2  # laws start as a power of the closure
     p = np.asarray(pressure(closure), float)
-    slope = np.maximum.accumulate(np.maximum(np.asarray(stiffness(closure), float), 0.0))
+    steps = np.diff(closure)
+    weights = np.concatenate([steps[:1], steps[:-1] + steps[1:], steps[-1:]]) if len(steps) else 1.0
+    stiff = np.asarray(stiffness(closure), float)
+    slope = np.maximum(never_falling(stiff, weights), 0.0)
+    less = stiff - slope
+    borne = p - np.concatenate([[0.0], np.cumsum(0.5 * (less[1:] + less[:-1]) * steps)])
     allowed = np.maximum(p, _FLOOR * p.max())
-    nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+    nodes, reached = _nodes(closure, borne, slope, allowed, tolerance)
     while len(nodes) > MOST + 1:
         tolerance *= _COARSER
-        nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+        nodes, reached = _nodes(closure, borne, slope, allowed, tolerance)
     while len(nodes) < FEWEST + 1 and reached > 1e-9 and len(closure) > 1:
         tolerance *= _FINER
-        nodes, reached = _nodes(closure, p, slope, allowed, tolerance)
+        nodes, reached = _nodes(closure, borne, slope, allowed, tolerance)
     at, steep = closure[nodes], slope[nodes]
     group = np.diff(steep) > 0.0
     jumps = steep[:1] > 0.0
@@ -133,6 +139,30 @@ def springs_of(
     )
     missed = np.abs(bed.pressure(closure) - p) / np.where(allowed > 0.0, allowed, 1.0)
     return replace(bed, missed=float(missed.max()))
+
+
+def never_falling(values: Array, weights: Array | float) -> Array:
+    """Return the values nearest to given ones that do not fall (isotonic regression).
+
+    Of the derivative of a function they are the derivative of its greatest convex minorant.
+
+    Args:
+        values: Shape (n,).
+        weights: Their weights in the sum of squares, positive, shape (n,).
+
+    Source:
+        Barlow, Bartholomew, Bremner & Brunk, Statistical Inference under Order Restrictions (1972),
+        ch. 1: adjacent values that fall are pooled.
+    """
+    pools: list[tuple[float, float, int]] = []  # mean, weight, number of values
+    for value, weight in zip(values, np.broadcast_to(weights, values.shape), strict=True):
+        mean, whole, count = float(value), float(weight), 1
+        while pools and pools[-1][0] > mean:
+            other, more, others = pools.pop()
+            mean = (mean * whole + other * more) / (whole + more)
+            whole, count = whole + more, count + others
+        pools.append((mean, whole, count))
+    return np.repeat([mean for mean, _, _ in pools], [count for _, _, count in pools])
 
 
 def _nodes(

@@ -9,9 +9,6 @@ Errors of elements are set in proportion to the change of the force from linear 
 The factors were set before they were tried, on bodies drawn at random, against meshes refined twice
 (docs/accuracy.md).
 
-A half-space on the other side moves under the whole face by what a uniform pressure on a square of
-as large an area moves it by; to first order the force falls by the stiffness times that.
-
 The cells and the finite slopes of samples are judged as those of any contact problem, by
 `multiscale.measured_errors`, at the mean closure of every region. The scatter among samples gives
 the error of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's t.
@@ -47,7 +44,7 @@ from support.collective import shared
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
 
-CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "counter-body"
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
 """The causes, in their order."""
 MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
@@ -75,8 +72,6 @@ class LawErrorProbe:
         laws: The laws of the regions.
         samples: Their samples.
         probe_of: Returns what measures the errors of one sample.
-        left_out: Mean displacement of a half-space on the other side under the whole face, which
-            laws leave out [mm].
         comm: MPI communicator; None for this process alone.
     """
 
@@ -87,7 +82,6 @@ class LawErrorProbe:
     laws: Sequence[PatchLaw]
     samples: Sequence[RegionSamples]
     probe_of: Callable[[RegionSamples, Surface], ErrorProbe]
-    left_out: float = 0.0
     comm: Any = None
 
     @cached_property
@@ -106,7 +100,7 @@ class LawErrorProbe:
         Note:
             Collective.
         """
-        causes = causes_of(self.samples, half_space=self.left_out > 0.0)
+        causes = causes_of(self.samples)
         if not self.state.force:
             return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
         response = self.problem.approach_response()
@@ -131,7 +125,6 @@ class LawErrorProbe:
             "quadrature": quadrature,
             "laws": changed(by_region(interpolation_errors) * (pressure > 0.0)),
             "samples": changed(factors[patch] * scatter),
-            "counter-body": response.stiffness * self.left_out,
         }
         forces = response.sampling.patch_sums(pressure)
         weighted = response.sampling.patch_sums(pressure * closure)
@@ -247,16 +240,14 @@ class LawErrorProbe:
         return np.divide(sums[:2], sums[2], out=np.zeros_like(sums[:2]), where=sums[2] > 0.0)
 
 
-def causes_of(samples: Sequence[RegionSamples], *, half_space: bool = False) -> list[str]:
+def causes_of(samples: Sequence[RegionSamples]) -> list[str]:
     """Return the causes of errors that are measured.
 
     Args:
         samples: Those of every region; single ones tell no error of their mean.
-        half_space: Whether a half-space on the other side deforms under the whole face, too.
     """
     several = any(len(region.surfaces) > 1 for region in samples)
-    told = {"samples": several, "counter-body": half_space}
-    return [cause for cause in CAUSES if told.get(cause, True)]
+    return [cause for cause in CAUSES if several or cause != "samples"]
 
 
 def _raised(bodies: Iterable[BodyFacts | None]) -> list[tuple[BodyFacts, int]]:

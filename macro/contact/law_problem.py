@@ -26,6 +26,7 @@ from macro.contact.frictional_forces import FrictionalForces, SliderMemory, cont
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
+from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.options import UNSYMMETRIC
@@ -39,6 +40,9 @@ Indices = NDArray[np.intp]
 
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
+
+_RESPONSE = 1e-6
+"""Relative difference of a half-space's displacements in the response."""
 
 _STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
@@ -96,6 +100,8 @@ class LawContactProblem:
             mesh, such as of a crowned face [mm]; None: none.
         friction: Friction of the face, whose sliders move on with every load step that converges;
             None: none. Tangents are unsymmetric with it, and GMRES solves for them.
+        opposite: (1 − ν²) / E of a half-space on the other side, which is displaced under the whole
+            face [1/MPa]; 0: a rigid plane.
 
     Raises:
         InputError: When there is not one law per patch, or no such mode.
@@ -112,6 +118,7 @@ class LawContactProblem:
         *,
         crown: Callable[[Array, Array], Array] | None = None,
         friction: Friction | None = None,
+        opposite: float = 0.0,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -120,6 +127,10 @@ class LawContactProblem:
         self._face, self._sampling = face, face.sampling(mode)
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
+        self._flat_gap = self._undeformed_gap
+        self._opposite = (
+            OppositeHalfSpace(sampling, face.patches.lengths, opposite) if opposite else None
+        )
         self._preload: Array | None = None
         self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
         self.equilibrium = Equilibrium(body, self.forces)
@@ -150,10 +161,19 @@ class LawContactProblem:
             NotConverged: When Newton's method fails, or nothing can hold the plane; the earlier
                 solutions stay what they were, so that a smaller step can be tried.
         """
-        equilibrium = self.equilibrium
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
+        if self._opposite is None or control.force == 0.0:
+            self.forces.gap = self._flat_gap
+            return self._solved(control)
+        contact = _Pressed(self, control)
+        self._opposite.follow(contact, f"the half-space at {control}")
+        return contact.state
+
+    def _solved(self, control: Control) -> FaceContactState:
+        """Find the equilibrium in the gap as it is; see `solve`."""
+        equilibrium = self.equilibrium
         self.forces.prescribe(control, self._plane)
         started = 0 if len(self.basis) else self._start()
         solution = equilibrium.body.stiffness.createVecRight()
@@ -301,15 +321,27 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve.
+            Collective; one linear solve, or some against a half-space.
         """
-        forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
+        forces, sampling, opposite = self.forces, self._sampling, self._opposite
         forces.prescribe(self.same_approach(), self._plane)
         stiffness = forces.stiffness(self._closure)
         forces.linearise(stiffness)
         self._preconditioner.update()
+        way = np.ones_like(sampling.weight)
+        change = self._closed_in(way)
+        if opposite is not None:
+            contact = _Pressed(self, self.forces.control)
+            moved = opposite.followed(opposite.under(change), contact, _RESPONSE)
+            change = self._closed_in(way - opposite.at_samples(moved))
+        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
+        return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
+
+    def _closed_in(self, way: Array) -> Array:
+        """Return the change of pressures where samples close in, shapes (n,), to first order."""
+        forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        risen = forces.pressure_change(sampling.weight)
+        risen = forces.pressure_change(sampling.weight * way)
         sampling.values.array[:] = risen
         sampling.operator.mult(sampling.values, load)
         solver = self.newton.snes.ksp
@@ -319,8 +351,7 @@ class LawContactProblem:
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
         compat.collect_garbage(load.comm)
-        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
-        return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
+        return np.asarray(change)
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""
@@ -330,6 +361,7 @@ class LawContactProblem:
             moved = body.stiffness.createVecRight()
             moved.array[:] = self._preload
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
+            self._flat_gap = self.forces.gap
             if isinstance(self.forces, FrictionalForces):
                 self.forces.preload = self.forces.along(moved)
 
@@ -389,6 +421,46 @@ class LawContactProblem:
         sampling, largest = self._sampling, np.zeros(self._sampling.count)
         np.maximum.at(largest, sampling.patch, function(sampling.patch, self._closure))
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
+
+
+class _Pressed:
+    """A load step of a problem beside a half-space, see `opposite_half_space.Contact`."""
+
+    def __init__(self, problem: LawContactProblem, control: Control) -> None:
+        self._problem, self._control, self._memory = problem, control, problem.memory
+        self._found: list[FaceContactState] = []
+
+    def pressed(self, moved: Array) -> Array:
+        """Solve the load step anew, from what friction left behind before it."""
+        problem = self._problem
+        problem.memory = self._memory
+        problem.forces.gap = problem._flat_gap + moved
+        self._found.append(problem._solved(self._control))
+        return self._found[-1].sample_pressure
+
+    def closed_in(self, way: Array) -> Array:
+        """Return the change of pressures where samples close in."""
+        return self._problem._closed_in(way)
+
+    def alone(self, way: Array, softer: float = 0.0) -> Array:
+        """Return that on a rigid body, or on a local compliance."""
+        forces, weight = self._problem.forces, self._problem._sampling.weight
+        stiffness = forces.normal_slope * weight
+        stiffness = stiffness / (1.0 + softer * stiffness)
+        border = forces.border(stiffness)
+        change = stiffness * way
+        if border.shape[1]:
+            change -= border @ forces.levers.summed(border.T @ (weight * way))
+        return np.asarray(change)
+
+    @property
+    def state(self) -> FaceContactState:
+        """The latest state, with the iterations of all."""
+        return replace(
+            self._found[-1],
+            iterations=sum(one.iterations for one in self._found),
+            linear_iterations=sum(one.linear_iterations for one in self._found),
+        )
 
 
 class ContactPreconditioner:

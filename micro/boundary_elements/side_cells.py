@@ -21,13 +21,17 @@ from scipy.sparse import csr_array, hstack
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from support.arrays import Array, Indices
-from support.cores import in_threads
+from support.cores import blocks, in_threads
 
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
 
 _LINES = 2**20
 """Numbers that the waves between rows of cells hold at most at a time."""
+_MANY = 2**16
+"""Cells that gain by threads."""
+_BLOCK = 2**17
+"""Cells that a thread takes at a time: what it makes of them then stays in its cache."""
 _SWAPPED = [1, 0, 2]
 """Of σ_xx, σ_yy, σ_xy, those normal to the sides across y, along them and in shear."""
 _SHEAR = np.array([-1j, 1j])
@@ -92,7 +96,12 @@ class _SidePair:
     def loaded(self, fields: Array) -> Waves:
         """Return the waves of loads at the nodes by f fields on cells, shape (waves, f a, 2)."""
         count, rows, cells = fields.shape
-        lines = self.loads @ fields.transpose(1, 0, 2).reshape(rows, count * cells)
+        return self.waves_of(self.loads @ fields.transpose(1, 0, 2).reshape(rows, count * cells))
+
+    def waves_of(self, lines: Array) -> Waves:
+        """Return the waves of lines of loads at the nodes by f fields, shape (2 a, f cells)."""
+        cells = len(self.place)
+        count = lines.shape[1] // cells
         placed = np.zeros((len(lines) * count, self.place[-1] + 1))
         placed[:, self.place] = lines.reshape(-1, cells)
         waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
@@ -101,11 +110,15 @@ class _SidePair:
 
     def on_cells(self, waves: Waves, count: int) -> Array:
         """Return f fields of means over the cells by values' waves, shape (f, rows, cells)."""
+        means = self.means @ self.lines_of(waves, count)
+        return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
+
+    def lines_of(self, waves: Waves, count: int) -> Array:
+        """Return lines of values at the nodes by f fields' waves, shape (2 a, f cells)."""
         parts = waves.reshape(len(self.kernels), count, -1, 2).transpose(3, 2, 1, 0)
         by_side = parts.reshape(-1, len(self.kernels))
         lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
-        means = self.means @ lines.reshape(self.means.shape[1], -1)
-        return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
+        return lines.reshape(self.means.shape[1], -1)
 
     def between(self, row: Indices, cell: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
@@ -123,9 +136,9 @@ class _SidePair:
             matrix[some] = lines[apart, row[some][:, None] - first, row]
         return matrix
 
-    def displacement(self, pressure: Array) -> Array:
-        """Return displacements of the cells by pressures on them, shape (rows, cells)."""
-        return self.on_cells(_multiplied(self.kernels, self.loaded(pressure[None])), 1)[0]
+    def displaced(self, lines: Array) -> Array:
+        """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
+        return self.lines_of(_multiplied(self.kernels, self.waves_of(lines)), 1)
 
     def stresses(self, pressure: Array) -> Array:
         """Return stresses normal to the sides, along them and in shear, (3, rows, cells)."""
@@ -175,7 +188,7 @@ def _of_both(
     across_x: Callable[[], Array], across_y: Callable[[], Array], cells: int
 ) -> tuple[Array, Array]:
     """Return what the sides across x and those across y do, of many cells at the same time."""
-    if cells < 2**16:  # which gain nothing by a thread of their own
+    if cells < _MANY:  # which gain nothing by a thread of their own
         return across_x(), across_y()
     one, other = in_threads(lambda work: work(), [across_x, across_y])
     return one, other
@@ -206,12 +219,29 @@ class SideCells:
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
-        one, other = _of_both(
-            lambda: self.across_x.displacement(pressure),
-            lambda: self.across_y.displacement(pressure.T),
-            pressure.size,
+        rows, columns = pressure.shape
+        across_x, across_y = self.across_x, self.across_y
+        loads_x, loads_y = (
+            np.empty((pair.loads.shape[0], count))
+            for pair, count in ((across_x, columns), (across_y, rows))
         )
-        return np.asarray(one + other.T)
+        moved = np.empty(pressure.shape)
+
+        def load_x(here: slice) -> None:
+            loads_x[:, here] = across_x.loads @ np.ascontiguousarray(pressure[:, here])
+
+        def load_y(here: slice) -> None:
+            loads_y[:, here] = across_y.loads @ np.ascontiguousarray(pressure[here].T)
+
+        def move(here: slice) -> None:
+            by_y = across_y.means @ np.ascontiguousarray(lines_y[:, here])
+            np.add(across_x.means[here] @ lines_x, by_y.T, out=moved[here])
+
+        in_threads(load_x, blocks(columns, _BLOCK // rows))
+        in_threads(load_y, parts := blocks(rows, _BLOCK // columns))
+        lines_x, lines_y = across_x.displaced(loads_x), across_y.displaced(loads_y)
+        in_threads(move, parts)
+        return moved
 
     def between(self, row: Indices, column: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, (n, n) [mm]."""

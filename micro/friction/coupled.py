@@ -81,4 +81,4 @@ def press_coupled(
             iterations=products,
             remedy="take smaller load steps, or set friction.coupled = false",
         )
-    return state, shear
+    return replace(state, iterations=products - shear.products), shear

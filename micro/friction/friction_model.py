@@ -12,7 +12,7 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -23,7 +23,7 @@ from micro.boundary_elements.half_space_grid import Cells
 from micro.boundary_elements.traction_modes import TractionModes, TractionsOnCells
 from micro.complementarity.rigid_motions import Box
 from micro.complementarity.solver import box_around
-from micro.friction.goodman import CrossCompliance, NeglectedCoupling, variation
+from micro.friction.goodman import CrossCompliance
 from micro.friction.stick_slip import FreeTractions, solve_tractions
 from micro.friction.tangential_grid import BodyGrid, TangentialGrid, tangential_grid
 from micro.friction.traction_problem import TractionProblem
@@ -136,59 +136,6 @@ class FrictionModel:
                     value = float(np.vdot(rate, ahead + left)) * self._unit
                     return value, grid.products - used
         return np.nan, grid.products - used
-
-    def neglected(self, state: ShearState) -> NeglectedCoupling:
-        """Return what Goodman's assumption leaves out at a state.
-
-        Its effect on the shear force is that on a first loading under the pressures of the state:
-        the plane presses without shear force, then shifts at once as far as in the state.
-
-        Raises:
-            NotConverged: When the tractions of that are not found.
-        """
-        beta, closed = self.materials.dundurs_beta, state.closed
-        cross = self.cross((closed.shape[0], closed.shape[1]))
-        if cross is None or self.coupled or not closed.any():
-            return NeglectedCoupling(beta)
-        sideways = cross.sideways(state.bound / self.coefficient)[:, closed]
-        forces = (
-            self._first_loading(state, np.zeros_like(sideways)),
-            (self._first_loading(state, sideways)),
-        )
-        return NeglectedCoupling(
-            beta,
-            float(np.hypot(*variation(sideways)).max()),
-            float(variation(cross.across(state.traction)[closed]).max()),
-            float(np.hypot(*forces[0])),
-            float(np.hypot(*(forces[1] - forces[0]))),
-        )
-
-    def _first_loading(self, state: ShearState, sideways: Array) -> Array:
-        """Return the shear force of a first loading to a shift where the surface has moved.
-
-        Args:
-            state: The shear that has the shift, and the bound of the tractions.
-            sideways: How far the cells in contact are displaced beforehand, shape (2, n) [mm].
-
-        Returns:
-            Shape (2,) [N].
-        """
-        box = self.box(state.closed)
-        cells, bound = _cells_in(state.closed, box), state.bound[state.closed] / self._modulus
-        pressed = TractionProblem(
-            grid=self.grid(box),
-            cells=cells,
-            bound=bound,
-            shift=-sideways,
-            force=np.zeros(2),
-            tolerance=self.tolerance,
-        )
-        with blas_threads(1):
-            before = solve_tractions(pressed, np.zeros_like(sideways))
-            moved = np.array(state.shift) + before.motion
-            sheared = replace(pressed, shift=moved[:, None] - sideways - before.slip, force=None)
-            after = solve_tractions(sheared, before.traction)
-        return np.asarray(after.traction.sum(axis=1)) * self._unit
 
     def energy(self, state: ShearState) -> float:
         """Return the elastic energy ½ ∫ q·u dA of the tractions [N mm]."""

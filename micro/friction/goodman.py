@@ -6,15 +6,13 @@ sideways. With Dundurs' β the difference is
     u = −(β/(π E*)) ∫ p d/ρ² dA,    u_z = (β/(π E*)) ∫ q·d/ρ² dA,
 
 d from the load to the point. Neglecting both separates the normal contact from shear (Goodman
-1962). They are evaluated at a solution without them, to know their size; or both problems are
-solved in turn until they agree (`micro.friction.coupled`). A finite body adds a term to both.
+1962). Otherwise both problems are solved in turn until they agree (`micro.friction.coupled`). A
+finite body adds a term to both.
 
 Theory: docs/theory.md, section 15.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from scipy import fft
@@ -23,26 +21,6 @@ from geometry.materials import MaterialPair
 from micro.boundary_elements.traction_modes import TractionsOnCells
 from support.arrays import Array
 from support.cores import cores
-
-
-class NeglectedCoupling(NamedTuple):
-    """What Goodman's assumption leaves out at a load step.
-
-    Attributes:
-        beta: Dundurs' β.
-        sideways: Largest difference of displacements along the surface by the pressures, from their
-            mean over the contact [mm].
-        across: Largest difference of displacements across the surface by the tractions, from their
-            mean over the contact [mm].
-        force: Shear force at the shift of the load step, had it been reached at once [N].
-        force_change: Change of that force where the pressures pull the surface sideways first [N].
-    """
-
-    beta: float
-    sideways: float = 0.0
-    across: float = 0.0
-    force: float = 0.0
-    force_change: float = 0.0
 
 
 class CrossCompliance:
@@ -92,11 +70,6 @@ class CrossCompliance:
     def _convolved(self, kernel: Array, field: Array) -> Array:
         loaded = fft.rfft2(field, s=self._shape, workers=cores())
         return np.asarray(fft.irfft2(kernel * loaded, s=self._shape, workers=cores())[self._shown])
-
-
-def variation(values: Array) -> Array:
-    """Return the sizes of differences from the mean along the last axis."""
-    return np.asarray(np.abs(values - values.mean(axis=-1, keepdims=True)))
 
 
 def _waves(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:

@@ -32,12 +32,12 @@ START: Mapping[str, Any] = {
     "surface": {},
     "block": {"young_modulus": "210 GPa", "poisson_ratio": 0.3, "sides": "free"},
     "patches": {"grid": [4, 4]},
-    "micro": {"model": "half-space"},
+    "micro": {"model": "half-space", "hardness": "2.5 GPa"},
     "coupling": {"kind": "concurrent"},
     "load": {"steps": 8},
     "output": {"check": "last"},
 }
-"""What a new scene says unless its user says otherwise: steel, and contacts cell by cell."""
+"""What a new scene says unless its user says otherwise: steel of 255 HV, contacts cell by cell."""
 
 SYNTHESISED: Mapping[str, Any] = {
     "spectrum": {"hurst": 0.8, "waves": [4, 32], "rms_slope": 0.1, "seed": 1},
@@ -48,7 +48,7 @@ SYNTHESISED: Mapping[str, Any] = {
 
 UNUSED: Mapping[str, Any] = {
     "surface": {"filter": {"short": "8 um"}},
-    "micro": {"hardness": "2 GPa"},
+    "micro": {"hardness": "2.5 GPa"},
     "load": {"tilt": "free"},
     "output": {"contact": "all", "fields": "last"},
     "conductance": {"conductivity": ["50 W/m/K"]},
@@ -111,7 +111,9 @@ def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:
             "touch."
         )
     if choice.young_modulus is None:
-        remarks.append("The block is of steel: write your constants in the section block.")
+        remarks.append(
+            "The block is of steel of 255 HV: write your constants in the sections block and micro."
+        )
     about = (
         f"Made by patchlaw init. To run it: patchlaw run {path}; on a key: patchlaw help KEY. What "
         "is not used stands as a comment: remove the sign # before its key."
@@ -129,6 +131,8 @@ def _given(choice: argparse.Namespace) -> dict[str, Any]:
     if choice.surface is not None:
         source = {"file": str(choice.surface), "detrend": "plane"}
     data: dict[str, Any] = {**START, "surface": source}
+    if choice.young_modulus is not None:  # which hardness goes with it is not known
+        data["micro"] = {"model": "half-space"}
     for word, key in _KEYS.items():
         value = getattr(choice, word)
         if isinstance(value, str):

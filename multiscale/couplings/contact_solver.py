@@ -17,7 +17,6 @@ from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel, Stiffness
 from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel
-from micro.friction.goodman import NeglectedCoupling
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, load_steps
@@ -128,17 +127,6 @@ class ContactSolver(StepSolver):
             return Stiffness(value if np.isfinite(value) else None, used)
 
         return on_root_alone(self._comm, stiffness)
-
-    def neglected_coupling(self) -> NeglectedCoupling | None:
-        """Return what Goodman's assumption leaves out at the latest load step."""
-
-        def neglected() -> NeglectedCoupling | None:
-            state = self._solved().shear
-            if self._friction is None or state is None:
-                return None
-            return self._friction.neglected(state)
-
-        return on_root_alone(self._comm, neglected)
 
     @property
     def past(self) -> Any:

@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -32,6 +32,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
 from multiscale.scene.scene import Scene
+from multiscale.shear_errors import shear_errors, with_shear_errors
 from support.arrays import Array
 from support.collective import on_root_alone
 
@@ -161,6 +162,14 @@ class MicroCoupling(PressedSurface):
         known = None if self.has_laws else self.solver.latest
         start = None if known is None else known.guess
         return checked(step, self.error_probe(), self.load_history, self.comm, start=start)
+
+    def shear_checked(self, step: LoadStep, past: Sequence[LoadStep]) -> LoadStep:
+        """Return a load step of contacts on cells with the errors of its shear; collective."""
+        probe, friction, history = self.error_probe(), self.friction_model, self.load_history
+        assert friction is not None
+        measured = partial(shear_errors, probe, friction, [*past, step], history)
+        by_shift = history.shear_key == "shear"
+        return with_shear_errors(step, on_root_alone(self.comm, measured), by_shift=by_shift)
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
         """Return the gaps under the load of a step on half as many cells a side."""

@@ -47,15 +47,11 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, with_errors
-from multiscale.readable import Caution, Observer, number, percent, quantity
+from multiscale.readable import Observer, number, quantity
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LoadedFace
-
-
-_SEEN = 0.01
-"""Displacement that laws leave out, relative to the approach, from which a run warns of it."""
 
 
 @dataclass(kw_only=True, eq=False)
@@ -198,7 +194,7 @@ class RepresentativeCoupling(LawCoupling):
         """Say how the run will know its error."""
         if self.unmeasured():
             return super().error_statement()
-        return self.measured_at(causes_of(self.samples, half_space=self.both_elastic))
+        return self.measured_at(causes_of(self.samples))
 
     # --- errors
 
@@ -215,7 +211,6 @@ class RepresentativeCoupling(LawCoupling):
             laws=solver.table.laws,
             samples=self.samples,
             probe_of=self._probe_of,
-            left_out=self._left_out(step.mean_pressure_MPa) if self.both_elastic else 0.0,
             comm=self.comm,
         )
         by_force = problem.forces.control.force is not None
@@ -270,7 +265,9 @@ class RepresentativeCoupling(LawCoupling):
             comm=self.comm,
             observe=observe,
         )
-        return before if before is not None and made.rows == before.rows else made
+        # in full contact the last rows alone go on
+        ended = before is not None and not made.largest_pressure > before.largest_pressure
+        return before if before is not None and ended else made
 
     @property
     def periodic_models(self) -> list[list[HalfSpaceModel]]:
@@ -341,7 +338,15 @@ class RepresentativeCoupling(LawCoupling):
         from macro import LawContactProblem
 
         laws, crown, friction = table.together(), self._crown(), self.law_friction
-        return LawContactProblem(face, laws, mode="pointwise", crown=crown, friction=friction)
+        second = self.materials.second if self.both_elastic else None
+        return LawContactProblem(
+            face,
+            laws,
+            mode="pointwise",
+            crown=crown,
+            friction=friction,
+            opposite=0.0 if second is None else second.surface_compliance,
+        )
 
     def _longer(self, table: LawTable) -> LawTable | None:
         """Return the laws extended; None where they end as far as possible."""
@@ -375,16 +380,6 @@ class RepresentativeCoupling(LawCoupling):
             yield from self.table.notes(self.table_tolerance)
         yield from super().notes(steps)
         yield from self._extensions
-        if steps and self.both_elastic:
-            step = max(steps, key=lambda one: one.force_N)
-            moved, approach = self._left_out(step.mean_pressure_MPa), abs(step.approach_mm)
-            share = f", {percent(moved / approach)} of its approach" if approach else ""
-            text = (
-                "the counter-body, a half-space, is elastic on the scale of the sample alone: "
-                f"under the whole face it would add about {quantity(moved, 'mm', 2)} at load step "
-                f"{step.step}{share}"
-            )
-            yield Caution(f"{text}; give it a mesh") if moved > _SEEN * approach else text
 
     @property
     def areas(self) -> Array:
@@ -423,22 +418,3 @@ class RepresentativeCoupling(LawCoupling):
                     f"the heights of {region.name} do not continue periodically: their sample is "
                     "four mirror images, twice as long and wide"
                 )
-        if self.both_elastic and self.load_history.quantity == "force":
-            moved = self._left_out(self.load_history.largest / self.body.area)
-            yield (
-                "the compliance of the counter-body, a half-space, counts on the scale of the "
-                f"sample alone; under the whole face it would add about {1e3 * moved:.3g} µm: give "
-                "it a mesh where that matters"
-            )
-
-    def _left_out(self, pressure: float) -> float:
-        """Return the mean displacement of a half-space under a face, which laws leave out [mm].
-
-        It is that of a square of the face's area under a uniform pressure (Love 1929).
-
-        Args:
-            pressure: Mean pressure on the face [MPa].
-        """
-        second = self.materials.second
-        compliance = 0.0 if second is None else second.surface_compliance
-        return 0.946 * pressure * math.sqrt(self.body.area) * compliance

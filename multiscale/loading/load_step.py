@@ -69,6 +69,8 @@ class LoadStep(Displayed):
         body_state: Position among the states of the bodies' loads, see `geometry.Control`.
         errors: Causes of the error, and how much each may change the force at this approach [N];
             empty where they were not measured.
+        shear_errors: Likewise of the shear: of the shear force at this shift [N], or of the shift
+            under this shear force [mm].
     """
 
     step: int = column("Number of the load step, from 1", heading="step", default=0)
@@ -158,7 +160,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     shear_force_x_N: float | None = column(
         "Shear force on the plane along x", "N",
-        heading="shear force x", table="more", in_report="shear force along x",
+        heading="shear force x", table="more", error="shear_force_error_N",
+        in_report="shear force along x",
     )  # fmt: skip
     shear_force_y_N: float | None = column(
         "Shear force on the plane along y", "N",
@@ -166,7 +169,8 @@ class LoadStep(Displayed):
     )  # fmt: skip
     shear_x_mm: float | None = column(
         "Shift of the plane along x from where it first touched", "mm",
-        heading="shift x", table="more", in_report="shift along x",
+        heading="shift x", table="more", error="shear_error_mm",
+        in_report="shift along x",
     )  # fmt: skip
     shear_y_mm: float | None = column(
         "Shift of the plane along y from where it first touched", "mm",
@@ -184,6 +188,10 @@ class LoadStep(Displayed):
         "Energy lost to friction", "mJ",
         heading="lost to friction", table="more", in_report="lost to friction",
     )  # fmt: skip
+    shear_force_error_N: float | None = column(
+        "Error of the shear force; 0 where it is prescribed", "N"
+    )
+    shear_error_mm: float | None = column("Error of the shift; 0 where it is prescribed", "mm")
     stage: int | None = column(
         "Number of the stage, where the load history has stages", heading="stage", table="more"
     )
@@ -197,6 +205,7 @@ class LoadStep(Displayed):
     zero_mm: float = 0.0
     body_state: float = 0.0
     errors: tuple[tuple[str, float], ...] = ()
+    shear_errors: tuple[tuple[str, float], ...] = ()
 
     def displayed(self) -> tuple[str, Table]:
         """Return approach and force in a line, and a table of all numbers that are known."""

@@ -12,7 +12,6 @@ from typing import Any
 
 from geometry import Control, NotConverged, PatchGrid
 from geometry.contact_state import ContactState
-from micro.friction.goodman import NeglectedCoupling
 from micro.model import Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -67,10 +66,6 @@ class StepSolver(ABC):
         The shift changes on in the direction of its last change; cells that slip go on slipping.
         """
         return Stiffness(None, 0)
-
-    def neglected_coupling(self) -> NeglectedCoupling | None:
-        """Return what friction leaves out at the latest load step; None where that is unknown."""
-        return None
 
     def state(self) -> Any:
         """Return what the next load step starts from; it does not depend on the number of ranks.

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from micro.friction.goodman import NeglectedCoupling
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
-from multiscale.observers.step_observers import StepObserver
+from multiscale.observers.step_observers import ErrorCheck, StepObserver
 from multiscale.readable import Caution, Detail, number, percent, quantity
 from multiscale.results.history import History
+from multiscale.shear_errors import shear_error_notes
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""
@@ -31,19 +31,17 @@ class FrictionObserver(StepObserver):
         coupling: What finds the load steps, with friction.
     """
 
+    _coupling: Any
+
     def __init__(self, coupling: Coupling) -> None:
         super().__init__(coupling)
         self._finds_stiffness = coupling.scene.output.contact != "none"
-        self._neglected: NeglectedCoupling | None = None
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its tangential stiffness."""
-        solver = self._coupling.solver
-        if last:
-            self._neglected = solver.neglected_coupling()
         if not self._finds_stiffness:
             return step
-        found = solver.tangential_stiffness()
+        found = self._coupling.solver.tangential_stiffness()
         return replace(
             step,
             tangential_stiffness_N_per_mm=found.value,
@@ -54,8 +52,11 @@ class FrictionObserver(StepObserver):
         """Yield what the last loop lost, and what friction leaves out."""
         if loop := last_loop(steps):
             yield loop
+        if self._coupling.scene.rubs_on_mesh:
+            yield from self._law_notes()
+            return
         yield from self._coupling_notes()
-        yield from self._body_notes()
+        yield from shear_error_notes(steps, by_shift=self._by_shift)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
@@ -63,41 +64,31 @@ class FrictionObserver(StepObserver):
         if contact is not None and contact.slipping is not None:
             yield "shear", "shear.shear_figure", (history, contact)
 
-    def _coupling_notes(self) -> Iterator[str]:
-        if self._neglected is None:
-            return
-        found, friction = self._neglected, self._coupling.scene.friction
-        if friction is not None and friction.coupled:
-            yield "friction: pressures and tractions were solved in turn at every load step"
-            return
-        if not (found.beta or found.sideways):
-            yield "friction: two like bodies, whose pressures and tractions do not see each other"
-            return
-        change = found.force_change / found.force if found.force else 0.0
-        text = (
-            "friction after Goodman: of two unlike bodies (Dundurs' β = "
-            f"{number(found.beta, 3)}) it leaves out that pressures pull the surface sideways, by "
-            f"up to {quantity(found.sideways, 'mm', 2)} against the mean of the contact, and that "
-            f"tractions lift it, by up to {quantity(found.across, 'mm', 2)}. Pulled sideways "
-            f"first, a first loading to the last shift has a shear force of "
-            f"{quantity(found.force, 'N', 3)} that differs by {percent(change, 2)}"
-        )
-        yield Caution(text) if change > _MUCH else text
+    @property
+    def _by_shift(self) -> bool:
+        return self._coupling.load_history.shear_key == "shear"
 
-    def _body_notes(self) -> Iterator[str]:
-        """Yield what the shift leaves out of the body below the contact."""
-        coupling = self._coupling
-        if coupling.scene.rubs_on_mesh:
-            yield from self._law_notes()
-            return
-        if not coupling.has_body:
-            return
-        model = getattr(coupling, "friction_model", None)
-        if model is not None and model.body is None:
+    def _coupling_notes(self) -> Iterator[str]:
+        """Yield what cells leave out of shear: the body, and what pressures and tractions do."""
+        coupling, friction = self._coupling, self._coupling.scene.friction
+        beta, model = coupling.materials.dundurs_beta, coupling.friction_model
+        whole = not coupling.has_body or model.body is not None
+        if not whole:
             yield (
                 "shift and tangential stiffness are those of the contact on a half-space; the "
                 "body's own shear comes on top"
             )
+        if friction.coupled:
+            yield "friction: pressures and tractions were solved in turn at every load step"
+        elif beta or (coupling.has_body and whole):
+            yield (
+                f"friction after Goodman: that pressures pull the surface sideways and tractions "
+                f"lift it (Dundurs' β = {number(beta, 3)}"
+                f"{', and a finite body' * coupling.has_body}) is left out; "
+                "friction.coupled = true takes it into account"
+            )
+        else:
+            yield "friction: two like bodies, whose pressures and tractions do not see each other"
 
     def _law_notes(self) -> Iterator[str]:
         """Yield how close the springs of laws are, and what they leave out."""
@@ -125,6 +116,23 @@ class FrictionObserver(StepObserver):
                 f"surface sideways (Dundurs' β = {number(beta, 3)}) is left out, and not measured; "
                 "what pressures on the whole face do is part of the mesh"
             )
+
+
+class ShearErrorCheck(ErrorCheck):
+    """Adds measured errors of the shear to load steps, as the scene's ``output.check`` says."""
+
+    _coupling: Any
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+        """Return the load step with the errors of its shear, where they are to be measured."""
+        if not self._asked(last=last) or step.shear_force_x_N is None:
+            return step
+        with self._coupling.clock.phase("check"):
+            return self._coupling.shear_checked(step, past)
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield nothing: the errors are among the notes on friction."""
+        return iter(())
 
 
 def last_loop(steps: Sequence[LoadStep]) -> str:

@@ -194,9 +194,7 @@ class ErrorCheck(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""
-        check = self._coupling.scene.output.check
-        asked = check == "all" or (check == "last" and last)
-        if not asked or not self._coupling.checks_steps:
+        if not self._asked(last=last):
             return step
         if self._plastic_past(step, past):
             self._failures[_AFTER_UNLOADING] = None
@@ -207,6 +205,11 @@ class ErrorCheck(StepObserver):
             except NotConverged as error:
                 self._failures[f"errors of load step {step.step} not measured: {error}"] = None
                 return step
+
+    def _asked(self, *, last: bool) -> bool:
+        """Tell whether errors are to be measured at a load step."""
+        check = self._coupling.scene.output.check
+        return (check == "all" or (check == "last" and last)) and self._coupling.checks_steps
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
@@ -303,8 +306,14 @@ def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
     """
     if coupling.scene.output.contact != "none":
         yield StiffnessObserver(coupling)
-    for place in _places(coupling):
-        module, _, name = place.partition(".")
-        yield getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    yield from (_loaded(place, coupling) for place in _places(coupling))
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
+    if coupling.scene.friction is not None and not coupling.has_laws:
+        yield _loaded("friction.ShearErrorCheck", coupling)
+
+
+def _loaded(place: str, coupling: Coupling) -> StepObserver:
+    module, _, name = place.partition(".")
+    made: StepObserver = getattr(import_module(f"multiscale.observers.{module}"), name)(coupling)
+    return made

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
 
@@ -153,21 +154,30 @@ def _said(value: Any) -> str:
 def _named_files(value: Any, place: str) -> Iterator[tuple[str, str | None]]:
     """Yield dotted keys below a value of a scene that name files, with what they name."""
     if is_dataclass(value):
-        hints = get_type_hints(type(value), include_extras=True)
-        for one in fields(value):
-            if not (key := key_of(one)):
-                continue
-            if names_a_file(hints[one.name]):
-                named = getattr(value, one.name)
+        section: Any = type(value)
+        for name, key, names in _keys_of(section):
+            if names:
+                named = getattr(value, name)
                 several = enumerate(named) if isinstance(named, tuple) else [("", named)]
                 yield from (
-                    (f"{place}{key}.{number}".rstrip("."), name) for number, name in several
+                    (f"{place}{key}.{number}".rstrip("."), file) for number, file in several
                 )
             else:
-                yield from _named_files(getattr(value, one.name), f"{place}{key}.")
+                yield from _named_files(getattr(value, name), f"{place}{key}.")
     elif isinstance(value, tuple):
         for number, one in enumerate(value):
             yield from _named_files(one, f"{place}{number}.")
+
+
+@cache
+def _keys_of(section: Any) -> list[tuple[str, str, bool]]:
+    """Return the attributes of a section's type that are keys: names, keys, if they name files."""
+    hints = get_type_hints(section, include_extras=True)
+    return [
+        (one.name, key, names_a_file(hints[one.name]))
+        for one in fields(section)
+        if (key := key_of(one))
+    ]
 
 
 def names_a_file(kind: Any) -> bool:

@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from math import ceil
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -106,7 +107,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--all", action="store_true", help="the paper's scene, too")
     text, whole = README.read_text(encoding="utf-8"), parser.parse_args().all
-    text = re.sub(r"After \d+ s it has", f"After {first_command():.0f} s it has", text)
+    text = re.sub(r"After \d+ s it has", f"After {ceil(first_command())} s it has", text)
     if whole:
         compare_again()
         text = with_rows(text)

@@ -61,7 +61,7 @@ FLOORS = {
         "inputs",
         "bodies",
         "law_solvers measured_errors",
-        "law_errors",
+        "law_errors shear_errors",
         "couplings",
         "auto observers",
         "setup",

@@ -55,6 +55,8 @@ def sections(folder):
     measured = QUIET | {"check": "last"}
     above["element"] = "quadratic"
     yield "pair", {**sample, **load, "body": body, "counter_body": above, "output": measured}
+    half_space = {"counter_body": CONSTANTS}
+    yield "half-space", {**sample, **load, **half_space, "body": body, "output": measured}
     sample["law"] = sample["law"] | {"seeds": [1, 2, 3]}
     load["load"] = {"approach": "6 um", "steps": 1, "tilt": [1e-3, 0]}
     yield "errors", {**sample, **load, "body": body, "output": measured}

@@ -82,9 +82,10 @@ PATHS = {
     "turn": [(1.0, 0.0, 0.0), (1.0, 0.25, 0.0), (1.0, 0.5, 0.0),
              *((1.0, 0.5, y) for y in np.linspace(0.05, 0.6, 10))],
 }  # fmt: skip
-# Springs are chosen to 0.2 % of the bound; at a turn cells at the same depth follow in directions
-# that differ a little. With Poisson's ratio spots are stiffer across or along their longer sides.
-TOLERANCES = {"loop": (0.0025, 0.012), "falling load": (0.0025, 0.012), "turn": (0.005, 0.012)}
+# 27 to 30 springs are within 0.4 % of the bound, as they state; at a turn cells at the same depth
+# follow in directions that differ a little. With Poisson's ratio spots are stiffer across or along
+# their longer sides.
+TOLERANCES = {"loop": (0.004, 0.0135), "falling load": (0.004, 0.012), "turn": (0.005, 0.012)}
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.0, 0.3])

@@ -10,6 +10,7 @@ from scipy.stats import norm
 
 from geometry import BlockShape
 from geometry.rigid_plane import Control
+from macro import LawContactProblem
 from multiscale import Run, Scene, law_errors, run
 from multiscale.law_errors import interpolation_errors, mean_error
 from multiscale.readable import quantity
@@ -200,21 +201,24 @@ def test_every_stage_is_measured_with_the_loads_of_its_bodies(mesh):
     assert [step.force_error_N == 0.0 for step in steps] == [True, True, False]
 
 
-def test_a_half_space_on_the_other_side_is_an_error_on_the_scale_of_the_face(mesh):
-    """Love's mean displacement of a square under a uniform pressure, times the stiffness."""
+def test_a_half_space_on_the_other_side_is_displaced_under_the_whole_face(mesh):
+    """By Love's mean displacement of a square under a uniform pressure, which this one nearly is.
+
+    Its equilibrium takes 3 % off, as pressures are larger where the half-space is displaced less.
+    """
     counter = {"young_modulus": 9300.0, "poisson_ratio": 0.31}
     law, load = {"kind": "representative"}, {"force": "3.7 N", "steps": 1}
-    whole = Run(scene(mesh, law=law, load=load, counter_body=counter, accuracy=0.2))
+    whole = Run(scene(mesh, law=law, load=load, counter_body=counter))
     (step,) = whole.load_steps()
-    press, d = whole.coupling.solver.press, 1e-6
-    near = [press(Control(approach=step.approach_mm + s * d)).force_N for s in (-1, 1)]
+    solver = whole.coupling.solver
+    rigid = LawContactProblem(solver.face, solver.table.together(), mode="pointwise")
     moved = 0.946 * 3.7 / (1.1 * 0.9) ** 0.5 * (1.0 - 0.31**2) / 9300.0
-    expected = moved * (near[1] - near[0]) / (2 * d)
-    errors = dict(step.errors)
-    assert errors["counter-body"] == pytest.approx(expected, rel=1e-4)  # a difference's
-    assert errors["counter-body"] == max(errors.values())
-    assert "most of it by counter-body" in whole.history().notes[0]
-    assert "counter-body" in whole.coupling.error_statement()
+    apart = step.approach_mm - rigid.solve(Control(force=3.7)).approach
+    assert apart == pytest.approx(moved, rel=0.06)
+    assert "counter-body" not in dict(step.errors)
+    response = solver.solved[0].approach_response().stiffness
+    near = [solver.press(Control(approach=step.approach_mm + s * 1e-6)).force_N for s in (-1, 1)]
+    assert response == pytest.approx((near[1] - near[0]) / 2e-6, rel=1e-3)  # of a difference
     whole.close()
 
 

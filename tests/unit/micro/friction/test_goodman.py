@@ -5,8 +5,6 @@ import pytest
 from scipy.integrate import dblquad
 
 from geometry.materials import Material, MaterialPair
-from geometry.shear_state import ShearControl
-from micro.friction.friction_model import FrictionModel
 from micro.friction.goodman import CrossCompliance
 
 GRID, SPACING = (8, 6), (0.13, 0.21)
@@ -65,19 +63,3 @@ def test_a_periodic_wave_of_pressure():
     assert np.abs(moved[0, :, 0]) == pytest.approx(size * np.abs(np.sin(k * x)), abs=1e-12)
     assert not moved[1].any()
     assert moved[0, 1, 0] < 0.0  # towards the crest at 0
-
-
-def test_a_model_measures_it_and_like_bodies_have_none():
-    x, y = (np.arange(n) - n / 2 + 0.5 for n in (24, 24))
-    pressure = np.sqrt(np.maximum(1.0 - (x[:, None] ** 2 + y**2) / 64.0, 0.0))
-    found = {}
-    for name, pair in {"rigid": RIGID, "like": MaterialPair(first=SOFT, second=SOFT)}.items():
-        model = FrictionModel(materials=pair, coefficient=0.2, spacing=(0.1, 0.1))
-        state = model.advance(None, pressure, ShearControl(shift=(1e-4, 0.0)))
-        found[name] = model.neglected(state)
-    assert found["like"] == (0.0, 0.0, 0.0, 0.0, 0.0)
-    rigid = found["rigid"]
-    assert rigid.sideways > 0.0
-    assert rigid.across > 0.0
-    # pressures pull radially: the tractions by that cancel in the force, up to what then slips
-    assert 0.0 < rigid.force_change < 0.5 * rigid.force

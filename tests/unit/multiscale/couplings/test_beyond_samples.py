@@ -74,3 +74,14 @@ def test_what_no_law_bears_is_refused_with_a_remedy_that_helps():
     )
     with pytest.raises(NotConverged, match=r"LAW_RANGE.*almost the hardness.*take a smaller load"):
         run(soft)
+
+
+def test_laws_in_full_contact_go_on():
+    """Their rows stay as many: beyond full contact one straight line goes on."""
+    scene = Scene.from_dict(SCENE).with_({"law.largest_pressure": "1 GPa", "law.seeds": [1]})
+    coupling = Run(scene).coupling
+    table = coupling.make_laws()
+    (law,) = table.laws
+    assert law.rows.closure[-1] > law.initial_separation  # full contact is behind it
+    (longer,) = coupling._make_table(None, before=table).laws
+    assert longer.rows.pressure[-1] == pytest.approx(2.0 * law.rows.pressure[-1], rel=1e-3)

@@ -222,7 +222,7 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, s
     # the table that all look at has six columns, a page's width; the others are folded
     visible, _, folded = report.partition("<details>")
     first = visible[visible.index("<h2>Configurations</h2>") :]
-    assert first[: first.index("</tr>")].count("<th>") == 6
+    assert first[: first.index("</tr>")].count("<th") == 6
     assert "set-up" in folded and "set-up" not in visible
 
     def none_again(one, comm, seconds):

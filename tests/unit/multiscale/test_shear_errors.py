@@ -1,0 +1,95 @@
+"""Errors of the shear that a run measures: what they contain, when they are there, if they hold."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from helpers.pressed_cells import pressed_cells
+
+from multiscale import run
+from multiscale.shear_errors import turning_points
+
+SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
+SHEAR = {"shear": [[1e-3, 0.0], [-6e-4, 3e-4]], "shear_steps": 3}
+
+
+@cache
+def ran(kind="analytic", cells=32, check="last", load="force", by_force=False, coupled=False):
+    loads = {"force": {"force": 6.0}, "approach": {"approach": 5e-3}}[load] | {"steps": 2}
+    shear = {"shear_force": [[0.9, 0.2]], "shear_steps": 2} if by_force else SHEAR
+    return run(
+        pressed_cells(
+            kind, loads | shear,
+            surface={"spectrum": SPECTRUM, "grid": [cells, cells], "lengths": [1.0, 1.0]},
+            friction={"coefficient": 0.3, "coupled": coupled},
+            output={"check": check, "figures": False, "report": False},
+        )
+    )  # fmt: skip
+
+
+def response(step, *, by_force=False):
+    if by_force:
+        return np.array([step.shear_x_mm, step.shear_y_mm])
+    return np.array([step.shear_force_x_N, step.shear_force_y_N])
+
+
+@pytest.mark.parametrize("kind", ["analytic", "concurrent"])
+@pytest.mark.parametrize("by_force", [False, True])
+def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by_force):
+    step = ran(kind, by_force=by_force).steps[-1]
+    parts = dict(step.shear_errors)
+    body = ["body"] if kind == "concurrent" else []
+    assert list(parts) == ["grid", *body, "coupling"]
+    columns = step.shear_force_error_N, step.shear_error_mm
+    assert columns == ((0.0, pytest.approx(sum(parts.values()))) if by_force else
+                       (pytest.approx(sum(parts.values())), 0.0))  # fmt: skip
+    own = response(step, by_force=by_force)
+    finer = ran(kind, 96, "none", by_force=by_force).steps[-1]
+    off = np.hypot(*(response(finer, by_force=by_force) - own))
+    assert off <= 1.5 * (parts["grid"] + parts.get("body", 0.0))
+    # measured on half as many cells, through the turning points alone
+    other = ran(kind, 32, "none", by_force=by_force, coupled=True).steps[-1]
+    apart = np.hypot(*(response(other, by_force=by_force) - own))
+    assert 0.5 * parts["coupling"] <= 1.5 * apart
+    assert apart <= 1.5 * parts["coupling"]
+
+
+def test_notes_say_them():
+    notes = " ".join(ran().notes)
+    assert "measured at load step 8: at its shift the shear force is within" in notes
+    assert ", coupling " in notes
+    notes = " ".join(ran(by_force=True).notes)
+    assert "measured at load step 4: under its shear force the shift is within" in notes
+
+
+def test_coupled_runs_have_no_error_by_the_coupling():
+    assert [cause for cause, _ in ran(coupled=True).steps[-1].shear_errors] == ["grid"]
+
+
+def test_under_an_approach_the_normal_force_errs_too():
+    step = ran(load="approach").steps[-1]
+    others = sum(error for cause, error in step.errors if cause != "grid")
+    share = np.hypot(*response(step)) * others / step.force_N
+    assert dict(step.shear_errors)["normal force"] == pytest.approx(share, rel=1e-9)
+
+
+def test_unless_asked_for_and_on_few_cells_there_are_none():
+    step = ran(check="none").steps[-1]
+    assert step.shear_force_error_N is None
+    assert step.shear_errors == ()
+    few = ran(cells=12).steps[-1]
+    assert few.shear_errors == (("grid", np.inf),)
+    assert few.shear_force_error_N is None
+    assert "the shear force has no stated error: grid not measured" in " ".join(ran(cells=12).notes)
+    every = ran(check="all").steps
+    assert all(step.shear_errors for step in every)
+
+
+def test_paths_are_gone_through_their_turning_points():
+    steps = ran(check="none").steps
+    assert [step.step for step in turning_points(steps, by_shift=True)] == [2, 5, 8]
+    # a load that changes under shear needs every step, and one that has fallen its largest
+    eased = [replace(step, force_N=6.0 - 0.1 * step.step, approach_mm=step.step) for step in steps]
+    assert [step.step for step in turning_points(eased[1:], by_shift=True)] == [2, 3, 4, 5, 6, 7, 8]
+    assert turning_points(steps[:1], by_shift=True) == list(steps[:1])
