@@ -21,7 +21,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt, label
 
 from geometry.meshes.block import BlockShape
-from geometry.meshes.refined_block import RefinedShape
+from geometry.meshes.refined_block import Mesher, RefinedShape
 from geometry.rigid_plane import RigidPlane
 from geometry.surface import Surface
 from support.arrays import Array
@@ -165,6 +165,7 @@ def reference_shapes(
     grading: float = 8.0,
     element: str | None = None,
     contact: ContactMap | None = None,
+    mesher: Mesher = "bisection",
 ) -> tuple[Shape, ...]:
     """Return blocks to mesh, coarse to fine, all of whose sizes fall together.
 
@@ -184,6 +185,7 @@ def reference_shapes(
         grading: Height of the bottom layer of hexahedra relative to the top layer.
         element: ``P1`` or ``P2`` (default) tetrahedra; ``Q1`` (default) or ``Q2`` hexahedra.
         contact: Where contact is expected; by default where the surface interferes with the plane.
+        mesher: What makes the tetrahedra.
 
     Raises:
         InputError: When a value is out of its range, hexahedra come without their number, or they
@@ -217,6 +219,7 @@ def reference_shapes(
             growth=factor * _GROWTH / most,
             element=element,
             relative=known.radius / known.typical,
+            mesher=mesher,
         )
 
     return tuple(map(member, factors))

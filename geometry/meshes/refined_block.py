@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -20,6 +21,8 @@ _LONGEST = 1.75
 _AT_HOLLOWS = 0.2
 """Edge length at re-entrant edges over that around them. With 1 instead, the compliance of an L
 1.5 mm high in cells of 0.1 mm is too small by 0.1 %."""
+
+Mesher: TypeAlias = Literal["bisection", "gmsh"]
 
 _CLASS = 1.15
 """Ratio of edge lengths at places that are told apart."""
@@ -38,6 +41,7 @@ class RefinedShape:
         growth: Increase of the edge length per distance.
         element: ``P1``, or ``P2``, whose edges have a node in their middle and can be curved.
         relative: Edge length at every place over `fine`, shape (n,); 1 where not given.
+        mesher: What makes the tetrahedra: ``"bisection"`` of a lattice, or ``"gmsh"``.
 
     Raises:
         InputError: When a value is out of its range.
@@ -51,12 +55,15 @@ class RefinedShape:
     growth: float = 0.25
     element: str = "P1"
     relative: Array | None = None
+    mesher: Mesher = "bisection"
     margin: float = field(default=0.0, init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "interface", positive_lengths(self.interface, "the interface"))
         if self.element not in ("P1", "P2"):
             raise InputError("this element is unknown", value=self.element, allowed="P1, P2")
+        if self.mesher not in (known := get_args(Mesher)):
+            raise InputError("unknown mesher", value=self.mesher, allowed=", ".join(known))
         if not 0.0 < self.fine <= self.coarse < math.inf:
             raise InputError(
                 "the edge lengths are out of range",
@@ -83,6 +90,13 @@ class RefinedShape:
         relative = np.ones(len(self.places)) if self.relative is None else self.relative
         return np.minimum(self.fine * relative, self.coarse)
 
+    def edge_classes(self) -> list[tuple[float, Array]]:
+        """Return edge lengths that are told apart [mm], each with its places, shape (n, 2) [mm]."""
+        edges = self.edges
+        classes = np.rint(np.log(edges / self.fine) / math.log(_CLASS)).astype(int)
+        alike = [classes == one for one in np.unique(classes)]
+        return [(float(edges[these].mean()), self.places[these]) for these in alike]
+
     def _check_places(self) -> None:
         places = np.asarray(self.places, float)
         object.__setattr__(self, "places", places)
@@ -107,10 +121,16 @@ class RefinedShape:
             )
 
     def meshed(self) -> Tetrahedra:
-        """Mesh the flat block: cubes in 24 tetrahedra each, bisected to the edge lengths asked.
+        """Mesh the flat block: by gmsh, or cubes in 24 tetrahedra each, bisected until they fit.
 
-        All outer facets are marked, with the tag 0.
+        Raises:
+            NotInstalled: When gmsh is asked for and is not installed.
         """
+        if self.mesher == "gmsh":
+            from geometry.meshes.gmsh_block import block_by_gmsh  # bisection works without gmsh
+
+            sizes = {"coarse": self.coarse, "growth": self.growth}
+            return block_by_gmsh(self.interface, self.height, self.edge_classes(), **sizes)
         sides = (*self.interface, self.height)
         longest = 0.5 * min(sides)
         x, y, z = (max(1, round(side / longest)) for side in sides)
@@ -149,11 +169,9 @@ class EdgeLengths:
 
     def __init__(self, shape: RefinedShape, hollows: Array | None = None) -> None:
         self._shape = shape
-        classes = np.rint(np.log(shape.edges / shape.fine) / math.log(_CLASS)).astype(int)
-        places = np.column_stack([shape.places, np.zeros(len(classes))])
         self._near = [
-            (float(shape.edges[classes == one].mean()), cKDTree(places[classes == one]))
-            for one in np.unique(classes)
+            (edge, cKDTree(np.column_stack([places, np.zeros(len(places))])))
+            for edge, places in shape.edge_classes()
         ]
         hollows = np.empty((0, 2, 3)) if hollows is None else hollows
         start, end = hollows[:, :1], hollows[:, 1:]

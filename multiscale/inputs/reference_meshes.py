@@ -117,7 +117,8 @@ class ReferenceMeshes:
             kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
             where, unknowns = "edges", [f"{count}" for count in self.unknowns]
         else:  # unknowns are an estimate, which is worth two digits
-            kind = f"tetrahedra ({finest.element}), small only where contact can occur"
+            by = " by gmsh" * (finest.mesher == "gmsh")
+            kind = f"tetrahedra ({finest.element}){by}, small only where contact can occur"
             where = "edges there"
             unknowns = [f"about {int(float(f'{count:.2g}'))}" for count in self.unknowns]
         count = {1: "one mesh", 2: "two meshes", 3: "three meshes"}[len(self.shapes)]
@@ -189,6 +190,7 @@ def reference_meshes(
             grading=1.0 if scene.block is None else scene.block.grading,
             element=element,
             contact=contact,
+            mesher=reference.mesher,
         )
     sizes = np.array([characteristic_size(shape) for shape in shapes])
     return ReferenceMeshes(
@@ -276,6 +278,13 @@ def _check_body(scene: Scene) -> None:
     """Refuse keys of the body that do not go with a reference."""
     block = scene.block
     if block is None:
+        if scene.reference.mesher == "gmsh":
+            raise InputError(
+                "does not go with [body], whose mesh of the file is bisected",
+                key="reference.mesher",
+                value="gmsh",
+                allowed="bisection",
+            )
         if scene.reference.hexahedral:
             raise InputError(
                 "does not go with [body], whose meshes of a reference are of tetrahedra",
@@ -313,7 +322,8 @@ def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
     # a linear mesh has an eighth of the nodes of quadratic displacements
     on_mesh = body is not None and body.on_mesh
     own = body.unknowns * 8.0 ** (shape.degree - body.degree) if body and on_mesh else 0.0
-    return round(_BISECTED * 3.0 * nodes * _cubes(shape) + own)
+    more = _BISECTED if shape.mesher == "bisection" else 1.0
+    return round(more * 3.0 * nodes * _cubes(shape) + own)
 
 
 def _cubes(shape: RefinedShape) -> float:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field
 
+from geometry.meshes.refined_block import Mesher
 from geometry.spectrum import LARGEST_SEED
 from multiscale.scene.bodies import Cells
 from multiscale.scene.surface import NAMES_A_FILE, Auto, Problem, RegionSection
@@ -171,6 +172,8 @@ class ReferenceSection:
             when not given.
         cells: Hexahedra of the finest mesh along x, y and z; their element and grading are those of
             the block.
+        mesher: What makes tetrahedra of a block: ``bisection`` of a lattice, or ``gmsh``, which
+            gives a second family of meshes to compare with. Bodies from files are bisected.
     """
 
     method: Literal["active-set", "augmented-lagrangian"] = "active-set"
@@ -178,6 +181,7 @@ class ReferenceSection:
     meshes: Annotated[int, Limits(ge=1, le=3)] = 2
     fine: PositiveLength | None = None
     cells: Cells | None = None
+    mesher: Mesher = "bisection"
 
     def __post_init__(self) -> None:
         if self.mesh == "hexahedra" and self.cells is None:
@@ -191,6 +195,11 @@ class ReferenceSection:
         if self.fine is not None and self.cells is not None:
             raise InputError(
                 f"fine = {self.fine:g} mm, of tetrahedra, does not go with cells, of hexahedra",
+                allowed="one of them",
+            )
+        if self.mesher == "gmsh" and self.cells is not None:
+            raise InputError(
+                "mesher = 'gmsh', of tetrahedra, does not go with cells, of hexahedra",
                 allowed="one of them",
             )
 

@@ -13,8 +13,8 @@ from types import SimpleNamespace
 import numpy as np
 
 from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
+from geometry.meshes.gmsh_session import gmsh_session
 from geometry.rigid_plane import Control
-from helpers.gmsh_session import gmsh_session
 from macro import (
     LawContactProblem,
     LoadedFace,

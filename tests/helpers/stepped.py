@@ -1,13 +1,15 @@
 """A block that stands on boxes, such as an L, small cells at its top: meshed flat, and rough."""
 
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import gmsh
 import numpy as np
 from dolfinx import mesh as dmesh
+from scipy.spatial import cKDTree
 
 from geometry import RefinedShape
-from helpers.gmsh_session import generate, gmsh_session, in_unit, mesh_from_gmsh, size_near
+from geometry.meshes.gmsh_session import gmsh_session
 from macro import TaggedMesh
 from macro.mesh.block import move_onto
 from support.collective import on_root
@@ -58,7 +60,7 @@ class SteppedShape:
     def meshed(self):
         """Mesh the body in gmsh for as long as the context lasts."""
         shape = in_unit(self.block, self.unit)
-        with gmsh_session("a stepped block") as gmsh:
+        with gmsh_session("a stepped block"):
             add_box = gmsh.model.occ.addBox
             block = add_box(0.0, 0.0, -shape.height, *shape.interface, shape.height)
             boxes = np.asarray(self.boxes) / self.unit
@@ -70,7 +72,7 @@ class SteppedShape:
             fields, least = gmsh.model.mesh.field, _AT_SEAMS * shape.coarse
             sizes = [
                 size_near("PointsList", points, shape.fine, shape),
-                size_near("CurvesList", _seams(gmsh, shape), least, shape),
+                size_near("CurvesList", _seams(shape), least, shape),
             ]
             smallest = fields.add("Min")
             fields.setNumbers(smallest, "FieldsList", sizes)
@@ -79,7 +81,7 @@ class SteppedShape:
             yield gmsh.model
 
 
-def _seams(gmsh, shape):
+def _seams(shape):
     """Return the curves at the bottom of a block along which boxes are joined to it."""
     slack, seams = 1e-6 * shape.height, []
     width, depth = shape.interface
@@ -119,3 +121,64 @@ def rough_stepped_mesh(shape, planes, surface, comm):
     """Mesh a block on boxes and move its nodes onto the roughness; see `move_onto`."""
     flat = stepped_mesh(shape, planes, comm)
     return flat, move_onto(flat.mesh, surface, shape.block.height)
+
+
+def mesh_from_gmsh(model, comm):
+    """Distribute the gmsh model of rank 0; collective."""
+    try:
+        from dolfinx.io import gmsh as reader
+    except ImportError:
+        from dolfinx.io import gmshio as reader
+    data = reader.model_to_mesh(model, comm, 0, gdim=3)
+    return data.mesh if hasattr(data, "mesh") else data[0]
+
+
+def in_unit(shape, unit):
+    """Return a refined block in a unit of length; gmsh takes lengths below 1e-7 for nothing."""
+    sizes = {name: getattr(shape, name) / unit for name in ("height", "fine", "coarse")}
+    places = np.clip(shape.places / unit, 0.0, np.divide(shape.interface, unit))
+    interface = tuple(np.divide(shape.interface, unit))
+    return replace(shape, interface=interface, places=places, **sizes)
+
+
+def generate(shape):
+    """Mesh by the frontal algorithm, and again by Delaunay's if it has missed a place.
+
+    The frontal algorithm makes better triangles, but evaluates sizes only at its own nodes and can
+    step over a small region between large edges.
+    """
+    gmsh.model.mesh.generate(2)
+    _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
+    nodes = np.reshape(nodes, (-1, 3))
+    top = nodes[np.abs(nodes[:, 2]) < 1e-9 * shape.height, :2]
+    if np.any(cKDTree(top).query(shape.places)[0] > shape.fine):
+        gmsh.model.mesh.clear()
+        gmsh.option.setNumber("Mesh.Algorithm", 5)  # Delaunay's
+        gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.generate(3)
+    gmsh.model.mesh.setOrder(shape.degree)
+
+
+def size_near(kind, tags, least, shape):
+    """Return gmsh's field of an edge length that grows linearly with the distance from something.
+
+    Args:
+        kind: Name of gmsh's list of what it grows from.
+        tags: The list.
+        least: The edge length there, in the model's unit.
+        shape: The block in that unit.
+    """
+    fields = gmsh.model.mesh.field
+    near = fields.add("Distance")
+    fields.setNumbers(near, kind, tags)
+    size = fields.add("Threshold")
+    values = {
+        "DistMin": 2.0 * least,
+        "DistMax": 2.0 * least + (shape.coarse - least) / shape.growth,
+        "SizeMin": least,
+        "SizeMax": shape.coarse,
+        "InField": near,
+    }
+    for option, value in values.items():
+        fields.setNumber(size, option, value)
+    return size

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from dolfinx import fem
 from dolfinx import mesh as dmesh
-from helpers.gmsh_session import gmsh_session
 from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, marked
 from mpi4py import MPI
 
 from geometry import Control
+from geometry.meshes.gmsh_session import gmsh_session
 from macro import ContactProblem, Interface, compat, write_mesh
 from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face, surface_area

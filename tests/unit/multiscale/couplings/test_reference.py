@@ -295,6 +295,17 @@ def test_plan_of_hexahedra():
     assert "refine reference.cells" in warnings
 
 
+@pytest.mark.long
+def test_meshes_of_gmsh_agree_within_both_error_bars():
+    """Two families of meshes, which have only the active set and the solver in common."""
+    one, other = (
+        run(scene(f"reference.mesher={mesher}", cells="load.steps=1")).reference.force
+        for mesher in ("bisection", "gmsh")
+    )
+    assert abs(one.value - other.value) <= one.error + other.error
+    assert one.error + other.error < 0.02 * one.value
+
+
 REFUSED = {
     "margin": (["block.margin='1 mm'"], "block.margin = 1.0: does not go with coupling.kind"),
     "no cells": (["reference.mesh=tetrahedra"], "cells does not go with mesh = 'tetrahedra'"),
@@ -310,6 +321,11 @@ REFUSED = {
         ["reference.fine='1 um'"],
         "fine = 0.001 mm, of tetrahedra, does not go with cells, of hexahedra",
     ),
+    "mesher of cells": (
+        ["reference.mesher=gmsh"],
+        "mesher = 'gmsh', of tetrahedra, does not go with cells, of hexahedra",
+    ),
+    "mesher": (["reference.mesher=netgen"], "must be 'bisection' or 'gmsh'"),
     "compliance": (["coupling.compliance=decomposed"], "compliance = 'decomposed' does not go wi"),
     "newton": (["coupling.newton=full"], "newton = 'full' does not go with kind = 'reference'"),
     "love": (["coupling.love=centre"], "love = 'centre' does not go with kind = 'reference'"),
