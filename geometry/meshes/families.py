@@ -36,6 +36,9 @@ EDGES = 3.0
 _GROWTH = 1.05
 """Increase of the edge length per distance, times the edges along the radius of a contact."""
 
+_BESIDE = 1.5
+"""Edges at summits that were not in contact, relative to those of a contact as wide."""
+
 _SHARE = 1.0 / 6.0
 """Power of a contact's force by which its edges are more: cells then lessen the error of the whole
 force most, as every contact costs n³ of them and errs by 1/n³ of its force."""
@@ -85,6 +88,44 @@ class ContactMap:
             radius=(radius * (usual / force) ** _SHARE)[of_cell],
             typical=float(force @ radius / force.sum()),
             effective=float(force.sum()) / usual,
+        )
+
+    def with_islands(
+        self, surface: Surface, approach: float, tilt: tuple[float, float] = (0.0, 0.0)
+    ) -> ContactMap:
+        """Return the map with summits that interfere with the plane but were not in contact.
+
+        Half a cell of the grid at the border of the surface decides whether they are: of eight
+        surfaces of Set 1 and 2 two had such a summit there that bore 0.5 and 2 % of the load.
+
+        Args:
+            surface: The surface.
+            approach: Approach at its middle [mm].
+            tilt: Slopes of the approach along x and y.
+        """
+        x, y = (
+            np.linspace(0.0, length, count + 1)
+            for length, count in zip(surface.lengths, surface.grid, strict=True)
+        )
+        inside = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt) > 0.0
+        island, count = label(inside, structure=np.ones((3, 3)))
+        known = np.zeros(count + 1, dtype=bool)
+        known[0] = True
+        cell = np.floor(self.places / surface.spacing).astype(int)
+        for step in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            known[island[tuple(np.minimum(cell + step, surface.grid).T)]] = True
+        i, j = np.nonzero(~known[island])
+        if not len(i):
+            return self
+        depth = distance_transform_edt(inside, sampling=surface.spacing)[i, j]
+        size = np.bincount(island[i, j], depth, count + 1) / np.maximum(
+            np.bincount(island[i, j], minlength=count + 1), 1
+        )
+        radius = np.maximum(3.0 / math.sqrt(2.0) * size[island[i, j]], max(surface.spacing))
+        return replace(
+            self,
+            places=np.concatenate([self.places, np.column_stack([x[i], y[j]])]),
+            radius=np.concatenate([self.radius, _BESIDE * np.minimum(radius, self.typical)]),
         )
 
     @classmethod

@@ -302,16 +302,20 @@ def _divided(nodes: Array) -> tuple[Array, NDArray[np.intp], _CurvedParts | None
     """
     if nodes.shape[1] < 5:
         return *facet_triangles(nodes), None
-    unit = _lattice_triangles({6: 3, 9: 4}[nodes.shape[1]])
-    values, _ = facet_basis(nodes.shape[1], unit.reshape(-1, 2))
-    triangles = np.einsum("km,nmi->nki", values, nodes).reshape(-1, 3, 2)
-    facet = np.repeat(np.arange(len(nodes)), len(unit))
-    return triangles, facet, _CurvedParts(triangles, np.tile(unit, (len(nodes), 1, 1)))
+    corners, bent, found = {6: 3, 9: 4}[nodes.shape[1]], _is_bent(nodes), []
+    for parts, chosen in ((1, np.flatnonzero(~bent)), (_PARTS, np.flatnonzero(bent))):
+        unit = _lattice_triangles(corners, parts)
+        values, _ = facet_basis(nodes.shape[1], unit.reshape(-1, 2))
+        triangles = np.einsum("km,nmi->nki", values, nodes[chosen]).reshape(-1, 3, 2)
+        owner = np.repeat(chosen, len(unit))
+        found.append((triangles, owner, np.tile(unit, (len(chosen), 1, 1))))
+    triangles, facet, local = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return triangles, facet, _CurvedParts(triangles, local)
 
 
-def _lattice_triangles(count: int) -> Array:
-    """Return the parts of the unit triangle (3) or square (4), shape (parts, 3, 2)."""
-    found, n = [], _PARTS
+def _lattice_triangles(count: int, n: int) -> Array:
+    """Return n² parts of the unit triangle (3), or 2 n² of the square (4), shape (parts, 3, 2)."""
+    found = []
     for i in range(n):
         for j in range(n):
             a, b, c, d = (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1)

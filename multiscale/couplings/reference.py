@@ -244,9 +244,10 @@ class ReferenceCoupling(PressedSurface):
         state = model.press(Control(approach=plane.approach, tilt=plane.tilt))
         if state.pressures is None or not state.contacts:
             return ContactMap.of_interference(self.surface, plane.approach, tilt=plane.tilt)
-        return ContactMap.of_pressures(
+        found = ContactMap.of_pressures(
             model.surface, np.reshape(state.pressures, model.surface.grid)
         )
+        return found.with_islands(self.surface, plane.approach, plane.tilt)
 
     @property
     def rough_meshes(self) -> ReferenceMeshes:

@@ -74,6 +74,22 @@ def test_contacts_found_decide_the_edges():
     assert ratio == pytest.approx(0.5 * 400.0 ** (1.0 / 6.0), rel=0.1)
 
 
+def test_summits_that_interfere_but_do_not_touch_are_resolved_too():
+    x = (np.arange(64) + 0.5) / 64
+    wide = -((x[:, None] - 0.5) ** 2 + (x - 0.5) ** 2)
+    low = -4.0 * ((x[:, None] - 0.5) ** 2 + x**2) - 3e-3  # at the border of the surface
+    both = Surface(heights=np.maximum(wide, low), lengths=(1.0, 1.0))
+    touching = wide > -4e-3
+    contact = ContactMap.of_pressures(both, 1.0 * touching)
+    known = contact.with_islands(both, 8e-3)
+    added = known.places[len(contact.places) :]
+    assert len(added) and np.all(np.hypot(added[:, 0] - 0.5, added[:, 1]) < 0.05)
+    assert added[:, 1].min() == 0.0
+    np.testing.assert_array_equal(known.places[: len(contact.places)], contact.places)
+    assert known.radius[len(contact.places) :].max() < 1.5 * contact.typical
+    assert contact.with_islands(both, 2e-3) is contact
+
+
 def test_stated_edges_are_kept():
     shapes = family(fine=0.02, count=2, element="P1", height=0.5)
     assert [shape.fine for shape in shapes] == [0.04, 0.02]
