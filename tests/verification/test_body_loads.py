@@ -246,14 +246,6 @@ def test_steps_that_change_the_force_by_too_much_are_halved_in_stages(folder):
     assert found[-1] == pytest.approx(plain.steps[-1].force_N, rel=1e-8)
 
 
-def test_what_a_half_space_would_add_under_the_whole_face_is_said(folder):
-    whole = done({"force": "3 N", "steps": 1}, body=body(folder), counter_body=MATERIAL)
-    (note,) = (note for note in whole.history().notes if "half-space" in note)
-    moved = 0.946 * 3.0 * (1.0 - NU**2) / E  # Love's mean displacement of a square, 3 MPa
-    assert f"about {round(1e6 * moved, -1):.0f} nm at load step 1, " in note
-    assert type(note).__name__ == "Caution"
-
-
 PATCHES = {
     "surface": {**SAMPLE, "lengths": [1, 1]},
     "patches": {"grid": [2, 2]},
