@@ -85,6 +85,13 @@ class RefinedShape:
         return int(self.element[1])
 
     @property
+    def cubes(self) -> tuple[int, int, int]:
+        """Numbers of cubes along x, y and z, about half as wide as the block, that are bisected."""
+        sides = (*self.interface, self.height)
+        x, y, z = (max(1, round(2.0 * side / min(sides))) for side in sides)
+        return x, y, z
+
+    @property
     def edges(self) -> Array:
         """Edge lengths at the places, shape (n,) [mm]."""
         relative = np.ones(len(self.places)) if self.relative is None else self.relative
@@ -131,9 +138,7 @@ class RefinedShape:
 
             sizes = {"coarse": self.coarse, "growth": self.growth}
             return block_by_gmsh(self.interface, self.height, self.edge_classes(), **sizes)
-        sides = (*self.interface, self.height)
-        longest = 0.5 * min(sides)
-        x, y, z = (max(1, round(side / longest)) for side in sides)
+        sides, (x, y, z) = (*self.interface, self.height), self.cubes
         starts = (0.0, 0.0, -self.height)
         ticks = [
             Segment(start=start, end=start + side, cells=count).ticks

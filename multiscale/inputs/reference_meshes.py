@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -322,8 +323,10 @@ def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:
     # a linear mesh has an eighth of the nodes of quadratic displacements
     on_mesh = body is not None and body.on_mesh
     own = body.unknowns * 8.0 ** (shape.degree - body.degree) if body and on_mesh else 0.0
-    more = _BISECTED if shape.mesher == "bisection" else 1.0
-    return round(more * 3.0 * nodes * _cubes(shape) + own)
+    if shape.mesher == "gmsh":
+        return round(3.0 * nodes * _cubes(shape))
+    least = 0.0 if on_mesh else {1: 5.0, 2: 34.0}[shape.degree] * math.prod(shape.cubes)
+    return round(3.0 * max(_BISECTED * nodes * _cubes(shape), least) + own)
 
 
 def _cubes(shape: RefinedShape) -> float:

@@ -167,7 +167,7 @@ def test_errors_that_runs_state():
 
 
 def test_errors_of_discretisation():
-    for figures in ("4.8, 2.2, 0.75{} 0.35 %", "0.4, 0.14{} 0.02 %", "7.3, 3.3{} 0.9 %"):
+    for figures in ("4.8, 2.2, 0.75{} 0.35 %", "0.5, 0.2, 0.1{} −0.1 %", "6.5, 2.2{} 0.6 %"):
         says("accuracy", figures.format(" and"))
         says("force_differs", figures.format(","))
     says("limits", "4 edges along the contact radius they are 12 % too stiff")

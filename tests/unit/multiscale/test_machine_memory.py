@@ -157,7 +157,7 @@ def test_a_plan_says_what_nodes_a_run_needs():
         make_setup(scene(*words), nodes=replace(of(1, memory=30.0), extensible=True))
 
 
-def test_the_reference_is_shared_but_for_gmsh():
+def test_the_reference_is_shared_but_for_its_meshing():
     hexahedra = ("coupling.kind=reference", "reference.cells=[400, 400, 100]", "reference.meshes=1")
     with pytest.raises(InputError, match=r"the reference needs about .* such nodes would do"):
         make_setup(scene(*hexahedra), nodes=of(1))
@@ -170,7 +170,7 @@ def test_the_reference_is_shared_but_for_gmsh():
     least = setup.rough_meshes.gathered
     assert 0.0 < least < 0.2 * setup.rough_meshes.bytes
     many = ClusterNodes(ranks=(1,) * 1000, memory=0.9 * least)
-    text = r"gmsh on rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
+    text = r"rank 0, which meshes the reference, needs about .*1000 nodes of .* GB; or few"
     with pytest.raises(InputError, match=text):
         make_setup(scene(*tetrahedra), nodes=many)
 

@@ -62,7 +62,8 @@ def test_packages_that_fail_to_load_are_told_by_name(broken, monkeypatch, how):
 def test_gmsh_that_fails_to_load_is_told_by_name(broken, command, tmp_path):
     out = tmp_path / "out"
     done = command(broken("gmsh", "oserror"), "run", PAPER, "--out", str(out), "--set",
-                   "coupling.kind=reference", "surface.grid=[24, 24]", "load.steps=1")  # fmt: skip
+                   "coupling.kind=reference", "reference.mesher=gmsh", "surface.grid=[24, 24]",
+                   "load.steps=1")  # fmt: skip
     assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("patchlaw: gmsh cannot be imported (libGLU.so.1: cannot open")
     assert "bodies of finite elements need it: take dolfinx, petsc4py" in done.stderr

@@ -32,7 +32,7 @@ def test_a_map_is_prepared_as_the_scene_says(tmp_path):
     rest = {"block": block, "patches": {"grid": [2, 2]}, "load": {"approach": "1 um"}}
     surface = make_setup(Scene.from_dict({"surface": section, **rest})).surface
     assert surface.grid == (16, 20) and surface.lengths == (pytest.approx(0.8), 1.0)
-    for done in ("taken in um", "cropped to 800 × 1000 µm", "its plane removed", "below 100 µm"):
+    for done in ("taken in µm", "cropped to 800 × 1000 µm", "its plane removed", "below 100 µm"):
         assert done in surface.source
     with pytest.raises(InputError, match=r"surface.filter.short = 0.01: the short cut-off"):
         changed = {**section, "filter": {"short": "10 um"}}
