@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 SCRIPT = Path(__file__).with_name("body_ranks_script.py")
@@ -20,5 +21,6 @@ def test_compliance_in_modes_is_the_same_on_any_ranks(waiting_ranks, monkeypatch
         results[ranks] = found["values"]
         assert len(list((tmp_path / str(ranks)).iterdir())) == 1
         assert results[ranks]["kept, first"] == results[ranks]["kept, again"]
-    # whole families are solved by one rank each: to the last bit
-    assert results[1] == results[3]
+    # whole families are solved by one rank each; products of few columns depend on its threads
+    for name, values in results[1].items():
+        np.testing.assert_allclose(results[3][name], values, rtol=1e-13, atol=1e-15, err_msg=name)

@@ -49,7 +49,8 @@ def forces(seed, scale, edges):
 def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
     force = on_block(rough(seed)).press(Control(approach=APPROACH)).force
     found, sizes = forces(seed, FLAT, 2.0)
-    estimate = extrapolated(found[:, None], sizes, 4.0)
+    # 4 %/n³ with n = 2 edges along a radius, as every run has it
+    estimate = extrapolated(found[:, None], sizes, 4.0, scatter=0.04 / 2.0**3)
     value, bar = float(estimate.value[0]), float(estimate.error[0])
     # measured +0.0, −0.5 and +0.3 %, of bars of 0.6 to 0.9 %; with 3 edges along a contact's radius
     # +0.0, −0.1 and −0.0 % of 0.3 %
