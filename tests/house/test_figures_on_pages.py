@@ -52,7 +52,7 @@ def test_configurations_of_the_papers_scene():
     time = {one["name"]: rounded(float(one["seconds"])) for one in found}
     error = {one["name"]: percent(float(one["error_force_max"])) for one in found}
     coarse, fine = (f"concurrent, half-space {n} × {n}" for n in (64, 128))
-    paper = "the scene as it is: isolated, 4 × 4 patches, circular"
+    paper = "the scene as it is: isolated, 4 × 4 patches, circular, 40 × 40 × 25 elements"
     mesh, small = "reference, 1 mesh, 10.4 µm", "concurrent, half-space 128 × 128, small slopes"
     assert FRONT_PAGE["with_rows"](TEXTS["README"]) == TEXTS["README"]
     says("README", "of 1.9 million, 2 ranks | 3 h | 28 s | – |")
