@@ -88,20 +88,20 @@ for one, name, colour, history in zip(
 profile.set(xlabel="x [µm]", ylabel="height over z₁₀ [µm]", title="through the highest summit")
 force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
 force.legend()
-for quantity, label in (
-    ("contact_area_fraction", "contact area"),
-    ("stiffness_MPa_per_mm", "stiffness"),
-    ("approach_mm", "approach"),
-    ("peak_pressure_MPa", "peak pressure"),
+for quantity, label, place in (
+    ("contact_area_fraction", "contact area", (0.4, 0.86)),
+    ("stiffness_MPa_per_mm", "stiffness", (0.4, 0.57)),
+    ("approach_mm", "approach", (0.1, 0.35)),
+    ("peak_pressure_MPa", "peak pressure", (0.35, 0.08)),
 ):
     found = both.of(quantity)
     known = np.where(np.isfinite(found.error), found.error, 0.0)
-    ratios.errorbar(both.loads, found.ratio, known, marker="o", ms=3.0, capsize=2.0, label=label)
+    (line, *_) = ratios.errorbar(both.loads, found.ratio, known, marker="o", ms=3.0, capsize=2.0)
+    ratios.text(*place, label, color=line.get_color(), transform=ratios.transAxes)
 ratios.axhline(1.0, color="0.7", lw=0.8)
-ratios.set(xlabel="mean pressure [MPa]", ylabel="worn over new", yscale="log", ylim=(0.15, 40.0))
+ratios.set(xlabel="mean pressure [MPa]", ylabel="worn over new", yscale="log", ylim=(0.15, 12.0))
 ratios.set(yticks=[0.2, 0.5, 1, 2, 5, 10], yticklabels=["0.2", "0.5", "1", "2", "5", "10"])
 ratios.minorticks_off()
-ratios.legend(ncols=2, loc="upper center", columnspacing=0.8, handlelength=0.8, fontsize=7)
 figure.savefig(choice.out / "worn.png")
 
 # %% [markdown]
