@@ -10,13 +10,14 @@ Theory: docs/theory.md, section 6.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import PatchGrid
 from geometry.legendre_modes import mode_means, mode_values
+from micro.boundary_elements.grid_compliance import CellGrid
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
 from support.errors import InputError
@@ -37,6 +38,8 @@ class BodyModes:
         InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
             not symmetric.
     """
+
+    lifts: ClassVar[bool] = True
 
     lengths: tuple[float, float]
     matrix: Array
@@ -76,6 +79,10 @@ class BodyModes:
             for at, length in zip((x, y), self.lengths, strict=True)
         )
         return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
+
+    def on_cells(self, cells: CellGrid, modulus: float) -> ModesOnCells:
+        """Return the compliance of equal cells of pressure, see `on`."""
+        return self.on(*cells.borders, modulus=modulus)
 
     def patch_compliance(self, patches: PatchGrid) -> Array:
         """Return the mean over patch i by unit pressure on patch j, shape (N, N) [mm/MPa].

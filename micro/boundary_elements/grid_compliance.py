@@ -3,7 +3,7 @@
     half-space  +  free sides  +  finite body  (+ finite slopes, which act on the whole surface).
 
 `Compliance` holds the terms of one body and makes them for any grid. `GridCompliance` is their sum
-on one grid. A new term needs the two methods of `ComplianceTerm` and a line in `Compliance`.
+on one grid. Neither knows which terms there are: a term is what has the members of `BodyTerm`.
 
 Theory: docs/theory.md, section 3.
 """
@@ -13,17 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from micro.boundary_elements.body_modes import BodyModes, ModesOnCells
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.finite_slopes import FiniteSlopes
-from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid, many
+from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
-from micro.boundary_elements.side_cells import side_cells
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
 
@@ -60,6 +57,48 @@ class ComplianceTerm(Protocol):
     def among(self, rows: Indices, columns: Indices, /) -> Self:
         """Return the same for some of these rows and columns, by ascending indices."""
         ...
+
+
+class CellGrid(NamedTuple):
+    """Equal cells of a rectangle of the surface.
+
+    Attributes:
+        counts: Numbers of cells (nx, ny).
+        spacing: Sides of a cell [mm].
+        corner: Corner of the first cell on the surface [mm].
+        coarse: Whether these are no cells of the surface but coarser ones, on which solutions start
+            and only have to be quick.
+    """
+
+    counts: tuple[int, int]
+    spacing: Pair
+    corner: Pair = (0.0, 0.0)
+    coarse: bool = False
+
+    @property
+    def borders(self) -> tuple[Array, Array]:
+        """Borders of the cells along x and along y, shapes (nx + 1,) and (ny + 1,) [mm]."""
+        x, y = (
+            start + step * np.arange(n + 1)
+            for start, step, n in zip(self.corner, self.spacing, self.counts, strict=True)
+        )
+        return x, y
+
+
+class BodyTerm(Protocol):
+    """A part of a body's compliance beside the half-space, for any cells of its surface."""
+
+    @property
+    def lifts(self) -> bool:
+        """Whether pressures may lift cells, so that these touch beyond all that a body overlaps."""
+
+    def on_cells(self, cells: CellGrid, modulus: float) -> ComplianceTerm | None:
+        """Return the term on some cells; None where it is left out.
+
+        Args:
+            cells: The cells.
+            modulus: Unit of the pressures [MPa].
+        """
 
 
 class GridCompliance:
@@ -153,22 +192,20 @@ class Compliance:
     Args:
         periodic: Whether pressures continue periodically.
         modulus: Contact modulus E* of the model [MPa].
-        sides: Free sides, if there are any.
-        body: What a finite body adds to the half-space and its sides, if it is finite.
+        terms: What else than the half-space is compliant.
         slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
             grids has to take them into account (`micro.complementarity.slope_iteration`).
     """
 
     periodic: bool
     modulus: float = 1.0
-    sides: FreeSides | None = None
-    body: BodyModes | None = None
+    terms: Sequence[BodyTerm] = ()
     slopes: tuple[FiniteSlopes, ...] = ()
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "body_on", "_matrices", "_last"}
+        caches = {"half_space", "_terms_on", "_matrices", "_last"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -180,12 +217,28 @@ class Compliance:
             grid: Numbers of cells (nx, ny).
             spacing: Sides of a cell [mm].
             corner: Corner of the first cell on the surface [mm].
-            coarse: Whether these are no cells of the surface but coarser ones. Free sides are left
-                out where these are few, which solutions start from quickly, or do not fill the
-                surface.
+            coarse: Whether these are no cells of the surface but coarser ones, where terms may be
+                left out.
         """
-        terms = self._terms_on((grid[0], grid[1]), spacing, corner, coarse)
-        return GridCompliance(self.half_space((grid[0], grid[1]), spacing), terms)
+        cells = CellGrid((grid[0], grid[1]), spacing, corner, coarse)
+        terms = [on_cells for _, on_cells in self._terms_on(cells)]
+        return GridCompliance(self.half_space(cells.counts, spacing), terms)
+
+    @property
+    def lifts(self) -> bool:
+        """Whether pressures may lift cells; those on a half-space alone never do."""
+        return any(term.lifts for term in self.terms)
+
+    def lifted(self, pressure: Array, spacing: Pair) -> Array:
+        """Return the displacements of all cells by those terms alone that may lift cells [mm].
+
+        Args:
+            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            spacing: Sides of a cell [mm].
+        """
+        cells = CellGrid((pressure.shape[0], pressure.shape[1]), spacing)
+        lifting = (on_cells for term, on_cells in self._terms_on(cells) if term.lifts)
+        return sum((one.displacement(pressure) for one in lifting), np.zeros(pressure.shape))
 
     def matrix_on(self, cells: Indices, grid: Grid, spacing: Pair) -> ComplianceMatrix:
         """Return the compliance of few cells of the surface as a matrix; the last few are cached.
@@ -207,37 +260,13 @@ class Compliance:
         return {}
 
     @cached_property
-    def _terms_on(self) -> Callable[[tuple[int, int], Pair, Pair, bool], list[ComplianceTerm]]:
-        """Function from cells to the terms beside the half-space on them, cached; see `on_grid`."""
+    def _terms_on(self) -> Callable[[CellGrid], list[tuple[BodyTerm, ComplianceTerm]]]:
+        """Function from cells to the terms beside the half-space, and these on them; cached."""
         return lru_cache(maxsize=_MOST_GRIDS)(self._make_terms)
 
-    def _make_terms(
-        self, grid: tuple[int, int], spacing: Pair, corner: Pair, coarse: bool
-    ) -> list[ComplianceTerm]:
-        terms: list[ComplianceTerm] = []
-        if self.sides is not None and (not coarse or many(grid)):
-            rows, columns = (
-                round(start / step) + np.arange(n)
-                for start, step, n in zip(corner, spacing, grid, strict=True)
-            )
-            if not coarse or _fill(self.sides.lengths, spacing, (rows[-1], columns[-1])):
-                terms.append(side_cells(self.sides, spacing).among(rows, columns))
-        if self.body is not None:
-            terms.append(self.body_on((grid[0], grid[1]), spacing, corner))
-        return terms
-
-    @cached_property
-    def body_on(self) -> Callable[..., ModesOnCells]:
-        """Function from cells to what the finite body adds on them, cached; see `on_grid`."""
-        return lru_cache(maxsize=_MOST_GRIDS)(self._make_body)
-
-    def _make_body(self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0)) -> ModesOnCells:
-        assert self.body is not None
-        x, y = (
-            start + step * np.arange(n + 1)
-            for start, step, n in zip(corner, spacing, grid, strict=True)
-        )
-        return self.body.on(x, y, modulus=self.modulus)
+    def _make_terms(self, cells: CellGrid) -> list[tuple[BodyTerm, ComplianceTerm]]:
+        made = ((term, term.on_cells(cells, self.modulus)) for term in self.terms)
+        return [(term, on_cells) for term, on_cells in made if on_cells is not None]
 
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:
@@ -278,10 +307,3 @@ class Compliance:
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""
         return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))
-
-
-def _fill(lengths: Pair, spacing: Pair, last: tuple[int, int]) -> bool:
-    """Return whether cells fill a rectangle, of which one by its indices is to be part."""
-    counts = np.divide(lengths, spacing)
-    whole = np.round(counts)
-    return bool(np.allclose(counts, whole, rtol=1e-9) and np.all(np.less(last, whole)))

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from scipy import fft
 from scipy.sparse import csr_array, hstack
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
+from micro.boundary_elements.grid_compliance import CellGrid
+from micro.boundary_elements.half_space_grid import many
 from support.arrays import Array, Indices
 from support.cores import blocks, in_threads
 
@@ -250,6 +252,44 @@ class SideCells:
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""
         return SideCells(self.across_x.among(rows, columns), self.across_y.among(columns, rows))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SideTerm:
+    """Free sides as a term of the compliance of any cells between them.
+
+    Args:
+        sides: The free sides.
+    """
+
+    lifts: ClassVar[bool] = False
+
+    sides: FreeSides
+
+    def on_cells(self, cells: CellGrid, modulus: float) -> SideCells | None:
+        """Return what the sides add on some cells.
+
+        Of coarser cells than those of the surface, none where they are few, which solutions start
+        from quickly, or where they do not fill the rectangle between the sides.
+
+        Args:
+            cells: The cells.
+            modulus: Unit of the pressures [MPa]; the contact modulus.
+        """
+        rows, columns = (
+            round(start / step) + np.arange(n)
+            for start, step, n in zip(cells.corner, cells.spacing, cells.counts, strict=True)
+        )
+        last = rows[-1], columns[-1]
+        if cells.coarse and not (many(cells.counts) and self._filled(cells.spacing, last)):
+            return None
+        return side_cells(self.sides, cells.spacing).among(rows, columns)
+
+    def _filled(self, spacing: tuple[float, float], last: tuple[int, int]) -> bool:
+        """Return whether cells fill the rectangle, of which one by its indices is to be part."""
+        counts = np.divide(self.sides.lengths, spacing)
+        whole = np.round(counts)
+        return bool(np.allclose(counts, whole, rtol=1e-9) and np.all(np.less(last, whole)))
 
 
 class SideStresses:

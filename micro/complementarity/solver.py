@@ -150,7 +150,7 @@ def on_place(problem: CellProblem, place: Place) -> CellProblem:
 def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:
     """Solve on some cells, and on more while cells outside are lifted into contact."""
     solution = _solve_on(problem, place, start)
-    while problem.compliance.body is not None and not _is_whole(place, problem.interference):
+    while problem.compliance.lifts and not _is_whole(place, problem.interference):
         nearer = problem.interference + problem.motions.displacement(solution.motion)
         larger = _lifted(problem, place, nearer, solution.pressure)
         if not larger.any():
@@ -166,12 +166,12 @@ def _lifted(problem: CellProblem, place: Place, interference: Array, pressure: A
     """Return which cells outside a place penetrate the rigid body.
 
     The half-space only lowers cells. All displacements are therefore evaluated only where those by
-    the finite body alone do not clear every cell outside.
+    what may lift cells, such as a finite body, do not clear every cell outside.
     """
     outside = np.ones(interference.shape, bool)
     outside[place] = False
-    body = problem.compliance.body_on(pressure.shape, problem.spacing).displacement(pressure)
-    if not np.any(outside & (body < interference)):
+    moved = problem.compliance.lifted(pressure, problem.spacing)
+    if not np.any(outside & (moved < interference)):
         return np.zeros(interference.shape, bool)
     return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
 

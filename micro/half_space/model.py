@@ -19,7 +19,8 @@ from geometry.rigid_plane import RigidPlane, motion_units
 from micro.boundary_elements.body_modes import BodyModes
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
-from micro.boundary_elements.grid_compliance import Compliance
+from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
+from micro.boundary_elements.side_cells import SideTerm
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
@@ -313,12 +314,10 @@ class HalfSpaceModel:
     @cached_property
     def compliance(self) -> Compliance:
         """The elastic body."""
+        terms: list[BodyTerm] = [] if self.sides is None else [SideTerm(self.sides)]
+        terms += [] if self.body is None else [self.body]
         return Compliance(
-            periodic=self.periodic,
-            modulus=self.contact_modulus,
-            sides=self.sides,
-            body=self.body,
-            slopes=self.slopes,
+            periodic=self.periodic, modulus=self.contact_modulus, terms=terms, slopes=self.slopes
         )
 
     def _solved(

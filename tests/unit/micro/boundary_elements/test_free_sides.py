@@ -17,7 +17,7 @@ from micro import (
 )
 from micro.boundary_elements.grid_compliance import Compliance
 from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.side_cells import side_cells
+from micro.boundary_elements.side_cells import SideTerm, side_cells
 from support.errors import InputError
 
 SIDES = FreeSides(lengths=(1.0, 1.5), poisson_ratio=0.2, decay_length=0.25)
@@ -74,7 +74,7 @@ def test_cells_and_rectangles_tell_the_same(cells):
 
 
 def test_grids_know_their_sides_where_they_lie():
-    grids, alone = (Compliance(periodic=False, sides=sides) for sides in (SIDES, None))
+    grids, alone = (Compliance(periodic=False, terms=terms) for terms in ([SideTerm(SIDES)], []))
     box, corner = (slice(0, 8), slice(20, 30)), (0.0, 20 * SPACING[1])
     p = np.abs(random(5, (8, 10)))
     beside = grids.on_grid(p.shape, SPACING, corner).displacement(p)

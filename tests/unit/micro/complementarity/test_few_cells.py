@@ -11,6 +11,7 @@ from micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import Compliance
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.side_cells import SideTerm
 from micro.complementarity import solver
 
 E_STAR, LENGTHS, GRID = 4092.0, (1.0, 0.8), (24, 20)
@@ -51,13 +52,13 @@ def few(monkeypatch):
 
 @pytest.mark.parametrize(
     "terms",
-    [{}, {"sides": SIDES}, {"sides": CORNER}, {"body": body()}, {"sides": SIDES, "body": body(1)}],
+    [[], [SideTerm(SIDES)], [SideTerm(CORNER)], [body()], [SideTerm(SIDES), body(1)]],
     ids=["half-space", "sides", "two sides", "body", "all"],
 )
 def test_matrix_is_that_of_the_products(terms):
     dice = np.random.default_rng(3)
     cells = np.sort(dice.choice(np.prod(GRID), 60, replace=False))
-    compliance = Compliance(periodic=False, modulus=E_STAR, **terms)
+    compliance = Compliance(periodic=False, modulus=E_STAR, terms=terms)
     whole = matrix_of(compliance.on_grid(GRID, SPACING), GRID)
     part = compliance.matrix_on(cells, GRID, SPACING)
     pressure = dice.random((60, 1))
