@@ -111,8 +111,9 @@ class ActiveSet:
             carrying = p > 0.0
             closed = np.where(carrying, here, 0.0)
             apart, open_gaps = float(closed.max()), here - closed
-            if problem.hardness < np.inf:
-                closed[problem.yielding(p)] = 0.0  # yielding cells may have negative gaps
+            if problem.bound.is_finite:
+                yielding = problem.bound.on((rows, slice(None))).reached(p)
+                closed[yielding] = 0.0  # yielding cells may have negative gaps
             inside = max(apart, -float(closed.min()))
             return float(nearer.max()), float(np.abs(nearer).max()), inside, -float(open_gaps.min())
 
@@ -137,7 +138,7 @@ class ActiveSet:
         are apart. If no approach parts them, cells of both kinds are to change places.
         """
         carrying = pressure > 0.0
-        fixed = not self.problem.motions.turns and self.problem.hardness < np.inf
+        fixed = not self.problem.motions.turns and self.problem.bound.is_finite
         if not fixed or not np.array_equal(carrying, self.problem.yielding(pressure)):
             return self.problem.motions.closing(self._weights(pressure), self.gap)
         least = float(self.gap[carrying].max())
@@ -147,7 +148,7 @@ class ActiveSet:
     def _weights(self, pressure: Array) -> Array:
         """Return weights of the cells whose gaps give the motions; those that yield have none."""
         weights = pressure
-        if self.problem.hardness < np.inf:
+        if self.problem.bound.is_finite:
             elastic = np.where(self.problem.yielding(pressure), 0.0, pressure)
             weights = elastic if elastic.any() else pressure
         if self._constrained.size:
@@ -212,13 +213,14 @@ class ActiveSet:
         """
         problem, moved = self.problem, old.copy()
         wanted = moved.ravel()[cells] + change
-        moved.ravel()[cells] = np.clip(wanted, 0.0, problem.hardness)
+        upper = problem.bound.of(cells)
+        moved.ravel()[cells] = np.clip(wanted, 0.0, upper)
         admissible = problem.admissible(moved.copy(), self._yielding)
-        if admissible is not None or problem.hardness == np.inf or not problem.motions.count:
+        if admissible is not None or not problem.bound.is_finite or not problem.motions.count:
             return admissible
         # so many cells leave that the others cannot bear the load: those nearest to carrying stay
         moved.ravel()[cells] = 0.0
-        shifted = problem.motions.shifted_to_load(wanted, problem.hardness, float(moved.sum()))
+        shifted = problem.motions.shifted_to_load(wanted, upper, float(moved.sum()))
         if shifted is None:
             return None
         moved.ravel()[cells] = shifted
@@ -232,27 +234,29 @@ class ActiveSet:
         stay at a bound without a gap determine the tilt of a body that lies on two contacts in line
         with its middle.
         """
-        cells, old, hardness = self._carrying(), self.pressure, self.problem.hardness
+        cells, old, bounds = self._carrying(), self.pressure, self.problem.bound
         new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
         for _ in range(len(cells)):
             contact = self._among(cells)
             change = contact.close(gap, stop=stop, limit=_MOST_ITERATIONS)
-            bound = (pressure <= 0.0) | self.problem.yielding(pressure)
+            upper = bounds.of(cells)
+            bound = (pressure <= 0.0) | (pressure >= upper)
             change[bound & (np.abs(change) <= _NOISE * old.max())] = 0.0
-            first, part = self.problem.first_at_bounds(pressure, change)
+            first, part = self.problem.first_at_bounds(cells, pressure, change)
             if part > 0.0:
-                pressure = np.clip(pressure + part * change, 0.0, hardness)
+                pressure = np.clip(pressure + part * change, 0.0, upper)
                 displaced = self.problem.grid.apply_compliance(contact.cells, change)
                 gap = gap + part * displaced
             if part == 1.0:
                 break
-            new.ravel()[cells[first]] = np.where(change[first] > 0.0, hardness, 0.0)
+            left_at = np.where(change[first] > 0.0, bounds.of(cells[first]), 0.0)
+            new.ravel()[cells[first]] = left_at
             left = np.ones(len(cells), bool)
             left[first] = False
             cells, pressure, gap = cells[left], pressure[left], gap[left]
         new.ravel()[cells] = pressure
-        self._constrained = cells[(pressure <= 0.0) | self.problem.yielding(pressure)]
+        self._constrained = cells[(pressure <= 0.0) | (pressure >= bounds.of(cells))]
         admissible = self.problem.admissible(new, self._yielding)
         self._accept(old if admissible is None else admissible)
 
@@ -269,7 +273,7 @@ class ActiveSet:
     def _touching(self) -> Flags:
         """Return the cells to find pressures of; those that yield are not among them."""
         touching = (self.pressure > 0.0) | (self.gap < 0.0)
-        if self.problem.hardness < np.inf:
+        if self.problem.bound.is_finite:
             self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
             touching &= ~self._yielding
         touching.ravel()[self._constrained] = True

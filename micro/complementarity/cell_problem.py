@@ -6,7 +6,7 @@ zero, and ℓ_i, how much nearer motion i brings the body, the gap is
 
     g = C p − d − Σ_i q_i ℓ_i,
 
-and the pressures, bounded by the hardness H where one is given, satisfy
+and the pressures, bounded by the hardness H of the cells where one is given, satisfy
 
     p = 0 where g > 0,    g = 0 where 0 < p < H,    p = H where g < 0,    Σ p ℓ_i = f_i.
 
@@ -29,7 +29,8 @@ import numpy as np
 
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import Compliance, GridCompliance
-from micro.complementarity.rigid_motions import Box, Motions, coarsened
+from micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
+from micro.complementarity.rigid_motions import Motions
 from support.arrays import Array, Flags, Indices
 
 
@@ -66,8 +67,8 @@ class CellProblem:
             they are apart, shape (nx, ny) [mm].
         motions: Free rigid motions of the body, if there are any, with their loads.
         tolerance: Largest residual of a solution.
-        hardness: Largest pressure H / E*; infinite where contacts are elastic. Pressures of a
-            solution that are at the bound equal it exactly.
+        bound: Largest pressures H / E*. Pressures of a solution that are at the bound equal it
+            exactly.
         lowered: What finite slopes have taken off the interference [mm].
         corner: Corner of the first cell on the surface [mm].
         coarse: Whether these are no cells of the surface but coarser ones, where free sides may be
@@ -81,7 +82,7 @@ class CellProblem:
     interference: Array
     motions: Motions
     tolerance: float
-    hardness: float = np.inf
+    bound: PressureBound = ELASTIC
     lowered: Array | float = 0.0
     corner: tuple[float, float] = (0.0, 0.0)
     coarse: bool = False
@@ -107,7 +108,7 @@ class CellProblem:
 
     def yielding(self, pressure: Array) -> Flags:
         """Return which pressures / E*, within the bounds, are the hardness."""
-        return np.asarray(pressure >= self.hardness)
+        return self.bound.reached(pressure)
 
     def on(self, box: Box) -> CellProblem:
         """Return the problem of a box of these cells, those of a surface, which carries all loads.
@@ -117,7 +118,13 @@ class CellProblem:
         """
         x, y = (part.start * step for part, step in zip(box, self.spacing, strict=True))
         interference = np.ascontiguousarray(self.interference[box])
-        return replace(self, interference=interference, motions=self.motions.on(box), corner=(x, y))
+        return replace(
+            self,
+            interference=interference,
+            motions=self.motions.on(box),
+            bound=self.bound.on(box),
+            corner=(x, y),
+        )
 
     def among(self, cells: Indices) -> CellProblem:
         """Return the problem of a few of these cells, those of a surface, which carry all loads.
@@ -129,6 +136,7 @@ class CellProblem:
             self,
             interference=self.interference.ravel()[cells][:, None],
             motions=self.motions.among(cells),
+            bound=self.bound.among(cells),
             matrix=self.compliance.matrix_on(cells, self.interference.shape, self.spacing),
         )
 
@@ -143,6 +151,7 @@ class CellProblem:
             self,
             interference=coarsened(self.interference, factors),
             motions=self.motions.coarsened(factors),
+            bound=self.bound.coarsened(factors),
             spacing=(self.spacing[0] * factors[0], self.spacing[1] * factors[1]),
             tolerance=tolerance,
             coarse=True,
@@ -160,23 +169,26 @@ class CellProblem:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.motions.count:
-            return np.minimum(pressure, self.hardness, out=pressure)
+            return np.minimum(pressure, self.bound.value, out=pressure)
         scaled = None
         if fixed is not None:
-            scaled = self.motions.scaled_to_loads(pressure, self.hardness, fixed)
-        return self.motions.scaled_to_loads(pressure, self.hardness) if scaled is None else scaled
+            scaled = self.motions.scaled_to_loads(pressure, self.bound, fixed)
+        return self.motions.scaled_to_loads(pressure, self.bound) if scaled is None else scaled
 
-    def first_at_bounds(self, pressure: Array, change: Array) -> tuple[Indices, float]:
+    def first_at_bounds(
+        self, cells: Indices, pressure: Array, change: Array
+    ) -> tuple[Indices, float]:
         """Return the cells that meet their bounds first along a change, and its share up to there.
 
         Cells that the change would drive out of a bound which they are at already come first, with
         a share of 0: the half of them that it changes most.
 
         Args:
-            pressure: Pressures / E* of some cells, within the bounds, shape (n,).
+            cells: Flat indices of some cells, shape (n,).
+            pressure: Their pressures / E*, within the bounds, shape (n,).
             change: Their change, shape (n,).
         """
-        distance = np.where(change < 0.0, pressure, self.hardness - pressure)
+        distance = np.where(change < 0.0, pressure, self.bound.of(cells) - pressure)
         size = np.abs(change)
         stuck = np.flatnonzero((distance <= 0.0) & (size > 0.0))
         if stuck.size:

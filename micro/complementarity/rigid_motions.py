@@ -20,10 +20,8 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
 from support.arrays import Array, Flags, Indices
-
-Box = tuple[slice, slice]
-"""Rows and columns of a rectangle of cells."""
 
 _MOST_STEPS, _MOST_HALVINGS = 100, 8
 _LONGEST = 1.5
@@ -31,7 +29,7 @@ _LONGEST = 1.5
 _FARTHEST = 60.0
 """Largest exponent; loads that need more cannot be met by pressures on these cells."""
 _AT_BOUND = 1e-13
-"""Pressures below the hardness by no more than this share of it count as lying on it."""
+"""Pressures below their bound by no more than this share of it count as lying on it."""
 _DECREASE = 0.9
 """Slope along a step, relative to that before it, that a step may have where it went beyond the
 lowest point of the convex function."""
@@ -128,21 +126,21 @@ class Motions:
         )
 
     def scaled_to_loads(
-        self, pressure: Array, hardness: float = np.inf, fixed: Flags | None = None
+        self, pressure: Array, bound: PressureBound = ELASTIC, fixed: Flags | None = None
     ) -> Array | None:
-        """Return pressures p exp(Σ μ_i ℓ_i), at most the hardness, that meet the loads.
+        """Return pressures p exp(Σ μ_i ℓ_i), within their bound, that meet the loads.
 
         The multipliers μ minimise a convex function, which Newton's method does.
 
         Args:
             pressure: Pressures / E* ≥ 0, shape (nx, ny); may be overwritten by the result.
-            hardness: Largest pressure / E*.
+            bound: Largest pressures / E*; none when not given.
             fixed: Cells whose pressures stay as they are, shape (nx, ny).
 
         Returns:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
-        if not self.turns and hardness == np.inf:
+        if not self.turns and not bound.is_finite:
             total = float(pressure.sum())
             if total > 0.0:
                 pressure *= self.loads[0] / total
@@ -156,41 +154,42 @@ class Motions:
         if not cells.size and loads.any():
             return None
         longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
-        start = np.minimum(pressure.ravel()[cells], hardness)
-        values = _Scaled(start, self.modes_of(cells), loads, hardness).solution(longest, acting)
+        upper = bound.of(cells)
+        start = np.minimum(pressure.ravel()[cells], upper)
+        values = _Scaled(start, self.modes_of(cells), loads, upper).solution(longest, acting)
         if values is None:
             return None
         scaled = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
         scaled.ravel()[cells] = values
         return scaled
 
-    def shifted_to_load(self, wanted: Array, hardness: float, acting: float) -> Array | None:
+    def shifted_to_load(self, wanted: Array, upper: Array | float, acting: float) -> Array | None:
         """Return the pressures nearest to given ones, between 0 and H, that meet the only load.
 
-        They are p_i = min(max(p_i⁰ + μ, 0), H), and their sum is linear in μ between the values
+        They are p_i = min(max(p_i⁰ + μ, 0), H_i), and their sum is linear in μ between the values
         of it at which a cell meets a bound.
 
         Args:
             wanted: Pressures / E* of some cells, of either sign, shape (n,).
-            hardness: Largest pressure / E*, finite.
+            upper: Their largest pressures / E*, finite; a number, or shape (n,).
             acting: Sum of the pressures of all other cells.
 
         Returns:
             The pressures; None where motions turn or these cells cannot meet the load.
         """
         load = float(self.loads[0]) - acting
-        if self.turns or not 0.0 <= load <= wanted.size * hardness:
+        if self.turns or not 0.0 <= load <= float(np.sum(np.broadcast_to(upper, wanted.shape))):
             return None
-        shifts = np.concatenate((-wanted, hardness - wanted))
+        shifts = np.concatenate((-wanted, upper - wanted))
         order = np.argsort(shifts, kind="stable")
         moving = np.cumsum(np.repeat((1.0, -1.0), wanted.size)[order])  # cells between the bounds
         sums = np.append(0.0, np.cumsum(moving[:-1] * np.diff(shifts[order])))
         shift = float(np.interp(load, sums, shifts[order]))
-        return np.clip(wanted + shift, 0.0, hardness)
+        return np.clip(wanted + shift, 0.0, upper)
 
 
 class _Scaled(NamedTuple):
-    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), H) that meet loads f.
+    """Pressures p_i = min(p_i⁰ exp(μ · ℓ_i), H_i) that meet loads f.
 
     They minimise Σ ψ_i − f · μ, where ψ_i is the integral of p_i in μ · ℓ_i.
     """
@@ -198,7 +197,7 @@ class _Scaled(NamedTuple):
     start: Array
     modes: Array
     loads: Array
-    hardness: float
+    upper: Array | float
 
     def solution(self, longest: Array, acting: float) -> Array | None:
         """Return the pressures; None where there are none.
@@ -215,7 +214,7 @@ class _Scaled(NamedTuple):
             if error <= _ROUNDING:
                 return values
             # cells at the bound do not resist, unless they are to leave it
-            moved = self._step(exponents, off, np.where(values < self.hardness, values, 0.0))
+            moved = self._step(exponents, off, np.where(values < self.upper, values, 0.0))
             moved = self._step(exponents, off, values) if moved is None else moved
             if moved is None or np.abs(moved).max() > _FARTHEST:
                 break
@@ -225,7 +224,7 @@ class _Scaled(NamedTuple):
     def at(self, exponents: Array) -> Array:
         """Return the pressures for multipliers μ."""
         pressure = self.start * np.exp(exponents @ self.modes)
-        return np.where(pressure < (1.0 - _AT_BOUND) * self.hardness, pressure, self.hardness)
+        return np.where(pressure < (1.0 - _AT_BOUND) * self.upper, pressure, self.upper)
 
     def _step(self, exponents: Array, off: Array, weights: Array) -> Array | None:
         """Return the multipliers after a Newton step, shortened where it goes too far."""
@@ -241,11 +240,3 @@ class _Scaled(NamedTuple):
                 return exponents + step
             step = 0.5 * step
         return None
-
-
-def coarsened(field: Array, factors: Sequence[int]) -> Array:
-    """Average blocks of cells; an incomplete last block is filled with its last cells."""
-    missing = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
-    full = np.pad(field, missing, mode="edge")
-    rows, columns = (n // factor for n, factor in zip(full.shape, factors, strict=True))
-    return np.asarray(full.reshape(rows, factors[0], columns, factors[1]).mean(axis=(1, 3)))

@@ -15,14 +15,13 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from micro.complementarity.active_set import solve
+from micro.complementarity.cell_fields import Box, box_around, refined
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.rigid_motions import Box
 from support.arrays import Array, Flags
 from support.errors import NotConverged
 
@@ -92,10 +91,10 @@ def _solve_under_force(problem: CellProblem, start: ContactPressures | None) -> 
 
 def _bearing(problem: CellProblem) -> float:
     """Return an interference that enough cells exceed to bear the force at their hardness [mm]."""
-    if problem.hardness == np.inf:
+    if not problem.bound.is_finite:
         return np.inf
     most = problem.interference.size
-    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.hardness) + 1
+    needed = int(_MARGIN * float(problem.motions.loads[0]) / problem.bound.least) + 1
     last = most - min(needed, most)
     highest = float(np.partition(problem.interference, last, axis=None)[last])
     return float(np.nextafter(highest, -np.inf))
@@ -222,11 +221,6 @@ def _even_pressure(problem: CellProblem) -> Array:
     return np.full(problem.interference.shape, total / problem.interference.size)
 
 
-def refined(field: Array, factors: Sequence[int]) -> Array:
-    """Return the value of every coarse cell on each of the finer cells that it covers."""
-    return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
-
-
 def _whole(field: Array | Flags) -> Box:
     """Return the box of all cells."""
     return slice(0, field.shape[0]), slice(0, field.shape[1])
@@ -235,26 +229,3 @@ def _whole(field: Array | Flags) -> Box:
 def _is_whole(place: Place, field: Array) -> bool:
     """Return whether a place is the box of all cells."""
     return isinstance(place[0], slice) and place == _whole(field)
-
-
-def box_around(cells: Flags) -> Box:
-    """Return a box around some cells, at least one.
-
-    Its sides are rounded up to 2^k or 3 · 2^(k−1) cells, as far as the grid has them. Few sizes
-    then occur along a load path, and their kernels and work arrays are used again.
-
-    Args:
-        cells: Which cells, shape (nx, ny).
-    """
-    rows, columns = (np.logical_or.reduce(cells, axis=axis) for axis in (1, 0))
-    return _span(rows), _span(columns)
-
-
-def _span(used: Flags) -> slice:
-    first, last = (int(at) for at in np.flatnonzero(used)[[0, -1]])
-    count = last - first + 1
-    power = 1 << max(count - 1, 7).bit_length()
-    rounded = 3 * power // 4 if count <= 3 * power // 4 else power
-    size = min(rounded, used.size)
-    start = min(first, used.size - size)
-    return slice(start, start + size)

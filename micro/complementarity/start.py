@@ -64,7 +64,7 @@ def _unloaded_start(problem: CellProblem, pressure: Array) -> tuple[Array, Array
         admissible = clear.support
     twice_elastic = float(np.vdot(admissible, problem.grid.displacement(admissible)))
     factor = float(np.vdot(admissible, problem.interference)) / twice_elastic  # of the least energy
-    admissible = admissible * min(factor, problem.hardness / float(admissible.max()))
+    admissible = admissible * min(factor, problem.bound.scale_within(admissible))
     balanced = problem.admissible(admissible)
     return admissible if balanced is None else balanced, np.zeros(problem.motions.count)
 

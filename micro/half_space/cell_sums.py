@@ -21,7 +21,7 @@ def summed(
     depths: Array,
     *,
     periodic: bool,
-    hardness: float | None,
+    hardness: Array | float | None,
 ) -> ContactState:
     """Return a contact with all that follows from its plane and its fields.
 
@@ -32,7 +32,8 @@ def summed(
         depths: Mean depths of the patches below the height that the approach counts from, (N,)
             [mm].
         periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure [MPa]; None where contacts are elastic.
+        hardness: Largest pressure of the cells [MPa], shape (nx, ny) or a number; None
+            where contacts are elastic.
     """
     plane, patches, pressure = state.plane, state.patches, state.pressures
     moved, gap, yielding = state.displacement, state.gap, state.yielding
@@ -49,7 +50,9 @@ def summed(
         depth = anew if state.earlier_depth is None else state.earlier_depth + anew
         gap = gap + anew
         separation += means(depth)
-        work = hardness * float(depth.sum()) * cell
+        left = depth > 0.0
+        spent = np.multiply(hardness, depth, out=np.zeros_like(depth), where=left)
+        work = float(spent.sum()) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     borders = patches.borders_x, patches.borders_y
     along_x, along_y = map(overlaps, borders, surface.lengths, surface.grid)

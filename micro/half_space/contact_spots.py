@@ -22,7 +22,7 @@ def find_spots(
     spacing: tuple[float, float],
     *,
     periodic: bool,
-    hardness: float | None = None,
+    hardness: Array | float | None = None,
 ) -> tuple[Spots, Array]:
     """Find the contacts of a map of pressures, connected over the edges of its cells.
 
@@ -30,8 +30,9 @@ def find_spots(
         pressure: Pressures ≥ 0, shape (nx, ny) [MPa].
         spacing: Sides of a cell [mm].
         periodic: Whether contacts continue over the borders.
-        hardness: Largest pressure that contacts can bear [MPa]; none when not given. The load of a
-            cell needs p/H of its area at least, so that cells that yield are in contact whole.
+        hardness: Largest pressure that the cells can bear [MPa], shape (nx, ny) or a number; none
+            when not given. The load of a cell needs p/H of its area at least, so that cells that
+            yield are in contact whole.
 
     Returns:
         The spots, their areas corrected by the perimeter; and the part of every cell that is in

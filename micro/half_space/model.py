@@ -21,6 +21,7 @@ from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from micro.boundary_elements.side_cells import SideTerm
+from micro.complementarity.cell_fields import PressureBound
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
@@ -219,7 +220,7 @@ class HalfSpaceModel:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
         solved, plane = self._solved(control, start, depth, displaced)
-        yielding, pressure = solved.pressure >= self._bound, solved.pressure * modulus
+        yielding, pressure = self._bound.reached(solved.pressure), solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
         displacement = self._displacement(pressure, solved.by_slopes)
@@ -388,9 +389,10 @@ class HalfSpaceModel:
         return anew > max(_ROUNDING, 10.0 * self.tolerance) * largest
 
     @property
-    def _bound(self) -> float:
-        """Hardness over E*; infinite where contacts are elastic."""
-        return np.inf if self.hardness is None else self.hardness / self.contact_modulus
+    def _bound(self) -> PressureBound:
+        """Largest pressures over E*."""
+        hardness = np.inf if self.hardness is None else self.hardness
+        return PressureBound(hardness / self.contact_modulus)
 
     @property
     def _units(self) -> Array:
@@ -415,7 +417,7 @@ class HalfSpaceModel:
             interference=interference,
             motions=Motions.of_plane(x, y, free, loads / (modulus * cell)),
             tolerance=self.tolerance,
-            hardness=self._bound,
+            bound=self._bound,
         )
 
     def _first_touch(self, tilt: tuple[float, float], depth: Array | None) -> Control:

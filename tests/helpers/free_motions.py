@@ -3,6 +3,7 @@
 import numpy as np
 
 from micro.boundary_elements.grid_compliance import Compliance
+from micro.complementarity.cell_fields import PressureBound
 from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
@@ -36,7 +37,7 @@ def contact_problem(
         interference=interference,
         motions=still(interference.shape) if motions is None else motions,
         tolerance=tolerance,
-        hardness=hardness,
+        bound=PressureBound(hardness),
     )
 
 

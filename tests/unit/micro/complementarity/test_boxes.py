@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from micro.complementarity.solver import box_around
+from micro.complementarity.cell_fields import box_around
 
 
 @pytest.mark.parametrize(

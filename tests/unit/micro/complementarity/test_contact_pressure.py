@@ -8,8 +8,8 @@ from scipy.optimize import nnls
 from geometry import NotConverged
 from micro.boundary_elements.grid_compliance import Compliance
 from micro.complementarity.active_set import solve
-from micro.complementarity.rigid_motions import coarsened
-from micro.complementarity.solver import nested_start, refined
+from micro.complementarity.cell_fields import coarsened, refined
+from micro.complementarity.solver import nested_start
 
 CASES = {
     "square": ((8, 8), (1.0, 1.0)),

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from helpers.free_motions import approach, turning
 
+from micro.complementarity.cell_fields import PressureBound
+
 GRID = (9, 8)
 X, Y = np.linspace(-0.7, 0.7, 9), np.linspace(-0.6, 0.6, 8)
 DICE = np.random.default_rng(11)
@@ -54,7 +56,7 @@ def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
     even = turning(X, Y, 1.0).scaled_to_loads(np.where(pressure > 0.0, 1.0, 0.0))
     upper = 0.2
     motions = turning(X, Y, share * upper * even.sum() / even.max())
-    found = motions.scaled_to_loads(pressure, upper)
+    found = motions.scaled_to_loads(pressure, PressureBound(upper))
     assert found.max() <= upper
     assert loads(motions, found) == pytest.approx(motions.loads, abs=1e-12 * found.sum())
     assert np.array_equal(found > 0.0, pressure > 0.0)
@@ -62,9 +64,9 @@ def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
 
 def test_loads_beyond_reach_are_told(pressure):
     full = np.ones(GRID)
-    assert turning(X, Y, 72.001).scaled_to_loads(full, 1.0) is None
-    assert turning(X, Y, 71.999).scaled_to_loads(full, 1.0) is not None
-    assert approach(GRID, 72.001).scaled_to_loads(full, 1.0) is None
+    assert turning(X, Y, 72.001).scaled_to_loads(full, PressureBound(1.0)) is None
+    assert turning(X, Y, 71.999).scaled_to_loads(full, PressureBound(1.0)) is not None
+    assert approach(GRID, 72.001).scaled_to_loads(full, PressureBound(1.0)) is None
     one_side = np.where(X[:, None] > 0.0, pressure, 0.0)
     assert turning(X, Y, 1.0).scaled_to_loads(one_side) is None
     assert turning(X, Y, None).scaled_to_loads(one_side) is None

@@ -1,0 +1,103 @@
+"""Fields on the cells of a surface: boxes of cells, coarser cells, a bound that may be a field."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from support.arrays import Array, Flags, Indices
+
+Box = tuple[slice, slice]
+"""Rows and columns of a rectangle of cells."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PressureBound:
+    """The largest pressure that cells bear.
+
+    Args:
+        value: H / E*, of all cells or of each, shape (nx, ny); infinite where contacts are elastic.
+    """
+
+    value: Array | float = np.inf
+
+    @property
+    def is_finite(self) -> bool:
+        """Whether there is a bound, of any cell."""
+        return self.least < np.inf
+
+    @property
+    def least(self) -> float:
+        """The smallest bound of all cells."""
+        return float(np.min(self.value))
+
+    def of(self, cells: Indices) -> Array | float:
+        """Return the bound of some cells by their flat indices: a number, or shape (n,)."""
+        return self.value if np.ndim(self.value) == 0 else np.ravel(self.value)[cells]
+
+    def reached(self, pressure: Array) -> Flags:
+        """Return which pressures / E* of all cells, within the bounds, are the bound."""
+        return np.asarray(pressure >= self.value)
+
+    def scale_within(self, pressure: Array) -> float:
+        """Return the largest factor on pressures / E* ≥ 0 that the bounds allow, shape (nx, ny)."""
+        loaded = pressure > 0.0
+        factors = np.divide(self.value, pressure, out=np.full(pressure.shape, np.inf), where=loaded)
+        return float(factors.min())
+
+    def on(self, box: Box) -> PressureBound:
+        """Return the bound of a box of cells."""
+        return self if np.ndim(self.value) == 0 else PressureBound(np.asarray(self.value)[box])
+
+    def among(self, cells: Indices) -> PressureBound:
+        """Return the bound of some cells as a column of them."""
+        value = self.of(cells)
+        return self if np.ndim(value) == 0 else PressureBound(np.asarray(value)[:, None])
+
+    def coarsened(self, factors: Sequence[int]) -> PressureBound:
+        """Return the bound of blocks of cells; see `coarsened`."""
+        if np.ndim(self.value) == 0:
+            return self
+        return PressureBound(coarsened(np.asarray(self.value), factors))
+
+
+ELASTIC = PressureBound()
+"""No bound."""
+
+
+def coarsened(field: Array, factors: Sequence[int]) -> Array:
+    """Average blocks of cells; an incomplete last block is filled with its last cells."""
+    missing = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
+    full = np.pad(field, missing, mode="edge")
+    rows, columns = (n // factor for n, factor in zip(full.shape, factors, strict=True))
+    return np.asarray(full.reshape(rows, factors[0], columns, factors[1]).mean(axis=(1, 3)))
+
+
+def refined(field: Array, factors: Sequence[int]) -> Array:
+    """Return the value of every coarse cell on each of the finer cells that it covers."""
+    return np.repeat(np.repeat(field, factors[0], axis=0), factors[1], axis=1)
+
+
+def box_around(cells: Flags) -> Box:
+    """Return a box around some cells, at least one.
+
+    Its sides are rounded up to 2^k or 3 · 2^(k−1) cells, as far as the grid has them. Few sizes
+    then occur along a load path, and their kernels and work arrays are used again.
+
+    Args:
+        cells: Which cells, shape (nx, ny).
+    """
+    rows, columns = (np.logical_or.reduce(cells, axis=axis) for axis in (1, 0))
+    return _span(rows), _span(columns)
+
+
+def _span(used: Flags) -> slice:
+    first, last = (int(at) for at in np.flatnonzero(used)[[0, -1]])
+    count = last - first + 1
+    power = 1 << max(count - 1, 7).bit_length()
+    rounded = 3 * power // 4 if count <= 3 * power // 4 else power
+    size = min(rounded, used.size)
+    start = min(first, used.size - size)
+    return slice(start, start + size)
