@@ -16,11 +16,11 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from geometry import Control, InputError, PatchGrid, RigidPlane, Surface
+from geometry import Control, InputError, MaterialPair, PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
-from micro import HalfSpaceModel, MicroModel
+from micro import HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.couplings import describe
 from multiscale.couplings.cost import Work, cost_statement
@@ -70,6 +70,20 @@ class Source(NamedTuple):
     nodes: ClusterNodes
     like: Coupling | None = None
     cells: tuple[int, int] | None = None
+
+    def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
+        """Return the micro model that the scene states, on a half-space.
+
+        Args:
+            surface: The surface, or a sample of it.
+            materials: The materials on both sides.
+        """
+        micro, periodic = self.scene.micro, self.scene.surface.periodic
+        modulus = materials.contact_modulus
+        model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
+        if isinstance(model, HalfSpaceModel):
+            return replace(model, periodic=periodic, hardness=micro.hardness)
+        return model
 
 
 @dataclass(kw_only=True, eq=False)

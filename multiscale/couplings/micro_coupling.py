@@ -18,8 +18,8 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, Control, InputError, MaterialPair, PatchGrid, Surface
-from micro import AsperityModel, HalfSpaceModel, MicroModel, micro_model
+from geometry import Asperities, Control, InputError, PatchGrid, Surface
+from micro import AsperityModel, HalfSpaceModel, MicroModel
 from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe
@@ -31,7 +31,6 @@ from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
-from multiscale.scene.scene import Scene
 from multiscale.shear_errors import shear_errors, with_shear_errors
 from support.arrays import Array
 from support.collective import on_root_alone
@@ -51,7 +50,7 @@ class MicroCoupling(PressedSurface):
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         parts, scene = cls._parts(source), source.scene
         began, surface = time.perf_counter(), parts["surface"]
-        model = _stated_model(scene, surface, parts["materials"])
+        model = source.micro_model(surface, parts["materials"])
         if source.cells is not None and isinstance(model, HalfSpaceModel):
             model = model.resampled(source.cells)
         if not math.isfinite(model.first_touch):
@@ -360,12 +359,3 @@ class AnalyticCoupling(ConcurrentCoupling):
         return "analytic: the micro model alone on a half-space, no finite elements" + (
             counted if self.scene.surface.periodic else ""
         )
-
-
-def _stated_model(scene: Scene, surface: Surface, materials: MaterialPair) -> MicroModel:
-    """Return the micro model that a scene names, on a half-space."""
-    micro, modulus = scene.micro, materials.contact_modulus
-    model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
-    if isinstance(model, HalfSpaceModel):
-        return replace(model, periodic=scene.surface.periodic, hardness=micro.hardness)
-    return model

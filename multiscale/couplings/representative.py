@@ -87,8 +87,9 @@ class RepresentativeCoupling(LawCoupling):
         surfaces = tuple(one for region in samples for one in region.surfaces)
         history, plane = load_history_on(scene, surfaces, body.area), None
         check_load(scene, history, surfaces, body.area, body)
-        modulus, hardness = materials.contact_modulus, scene.micro.hardness
-        model = HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, hardness=hardness)
+        stated = source.micro_model(surface, materials)
+        assert isinstance(stated, HalfSpaceModel), "scenes of summits are refused"
+        model = replace(stated, periodic=True)
         if history.quantity != "force":
             mean = model.reference_height - surface.mean_height
             plane = RigidPlane.above(surface, min(history.largest, mean))
