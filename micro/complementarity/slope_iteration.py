@@ -110,53 +110,103 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by
             finite slopes do not agree with the pressures.
     """
-    compliance, interference = problem.compliance, problem.interference
-    tolerance = problem.tolerance
-    if not compliance.slopes:
+    if not problem.compliance.slopes:
         return solve_on_surface(problem, start)
-    mixing, displaced, first = AndersonMixing(), np.zeros(interference.shape), _FIRST
-    if start is not None and not problem.motions.count:
-        mixing = AndersonMixing(start.nearby)
-    if start is not None and start.pressure.any():
-        known = start.by_slopes
-        displaced = compliance.slope_displacement(start.pressure) if known is None else known
-        first = _FIRST**2
-    accuracy, iterations, left, ahead = max(tolerance, first), 0, np.inf, np.inf
-    last, least = (max(size, 10.0 * tolerance) for size in (_CONVERGED, _EXPECTED))
+    iteration, used = _SlopeIteration(problem, start), 0
     for _ in range(_MOST_SOLUTIONS):
+        solution = iteration.next_solution()
+        used += solution.iterations
+        residual = iteration.judged(solution)
+        if residual is not None:
+            by_slopes = iteration.displaced
+            return solution._replace(iterations=used, by_slopes=by_slopes, residual=residual)
+    raise NotConverged(
+        "the displacements by finite slopes",
+        reason=f"they still change by {iteration.change:.1e} of the displacement",
+        iterations=used,
+        remedy="set micro.finite_slopes = false, or smooth the surface",
+    )
+
+
+class _SlopeIteration:
+    """Contacts that are solved in turn with the displacements that finite slopes add.
+
+    Args:
+        problem: The contact problem.
+        start: What the first solution starts from.
+
+    Attributes:
+        displaced: What finite slopes add at the next solution, shape (nx, ny) [mm].
+        change: Last change of it over the largest interference; infinite where it is not known.
+    """
+
+    def __init__(self, problem: CellProblem, start: ContactPressures | None) -> None:
+        self._problem, self._start = problem, start
+        self._begin_without()
+        self.change, first = np.inf, _FIRST
+        if start is not None and not problem.motions.count:
+            self._mixing = AndersonMixing(start.nearby)
+        if start is not None and start.pressure.any():
+            known, compliance = start.by_slopes, problem.compliance
+            here = compliance.slope_displacement(start.pressure) if known is None else known
+            self.displaced, first = here, _FIRST**2
+        self._accuracy = max(problem.tolerance, first)
+
+    def _begin_without(self) -> None:
+        """Begin without the displacements by slopes."""
+        self._mixing, self._ahead = AndersonMixing(), np.inf
+        self.displaced = np.zeros(self._problem.interference.shape)
+
+    def next_solution(self) -> ContactPressures:
+        """Solve the contact with the displacements by slopes as they are, from the last one."""
         lowered = replace(
-            problem, interference=interference - displaced, lowered=displaced, tolerance=accuracy
+            self._problem,
+            interference=self._problem.interference - self.displaced,
+            lowered=self.displaced,
+            tolerance=self._accuracy,
         )
-        solution = start = solve_on_surface(lowered, start)
-        iterations += solution.iterations
-        found = solution._replace(iterations=iterations, by_slopes=displaced)
+        self._start = solve_on_surface(lowered, self._start)
+        return self._start
+
+    def judged(self, solution: ContactPressures) -> float | None:
+        """Return the residual of a solution that has converged; otherwise prepare the next one.
+
+        Args:
+            solution: The last solution.
+        """
+        problem, tolerance = self._problem, self._problem.tolerance
+        last, least = (max(size, 10.0 * tolerance) for size in (_CONVERGED, _EXPECTED))
         touching = solution.pressure > 0.0
         if not touching.any():
-            if not displaced.any():
-                return found
-            # slopes of a far larger load part the bodies: begin without them
-            mixing, displaced, ahead = AndersonMixing(), np.zeros(interference.shape), np.inf
-            continue
-        nearer = interference + problem.motions.displacement(solution.motion)
+            if not self.displaced.any():
+                return solution.residual
+            self._begin_without()  # slopes of a far larger load part the bodies
+            return None
+        nearer = problem.interference + problem.motions.displacement(solution.motion)
         largest = float(nearer[touching].max())
         # bodies without interference do not touch, and their pressures have an energy
         sound = largest > 0.0 and np.vdot(solution.pressure, nearer) > 0.0
-        exact = sound and accuracy <= tolerance
-        if exact and ahead <= least:
-            return found._replace(residual=max(solution.residual, ahead))
-        change = compliance.slope_displacement(solution.pressure) - displaced
-        before, left = left, np.inf
+        exact = sound and self._accuracy <= tolerance
+        if exact and self._ahead <= least:
+            return max(solution.residual, self._ahead)
+        change = problem.compliance.slope_displacement(solution.pressure) - self.displaced
+        before, self.change = self.change, np.inf
         if sound:
-            left = float(np.abs(change[touching]).max()) / largest
-        if exact and left <= last:
-            return found._replace(residual=max(solution.residual, left))
-        rate = min(1.0, _CAUTION * left / before) if 0.0 < before < np.inf else _AHEAD
-        ahead = rate * left + _BY_SLOPES * solution.residual
-        displaced = mixing.next(displaced, nearer - displaced, displaced + change, touching)
-        accuracy = max(tolerance, min(_FIRST, ahead, _PART * left)) if ahead > least else tolerance
-    raise NotConverged(
-        "the displacements by finite slopes",
-        reason=f"they still change by {left:.1e} of the displacement",
-        iterations=iterations,
-        remedy="set micro.finite_slopes = false, or smooth the surface",
-    )
+            self.change = float(np.abs(change[touching]).max()) / largest
+        if exact and self.change <= last:
+            return max(solution.residual, self.change)
+        self._ahead = self._expected_change(before) + _BY_SLOPES * solution.residual
+        displaced = self.displaced
+        self.displaced = self._mixing.next(
+            displaced, nearer - displaced, displaced + change, touching
+        )
+        self._accuracy = tolerance
+        if self._ahead > least:
+            self._accuracy = max(tolerance, min(_FIRST, self._ahead, _PART * self.change))
+        return None
+
+    def _expected_change(self, before: float) -> float:
+        """Return the change that is expected next, by the last one and that before it."""
+        known = 0.0 < before < np.inf
+        rate = min(1.0, _CAUTION * self.change / before) if known else _AHEAD
+        return rate * self.change
