@@ -1,7 +1,7 @@
 """Elastic bodies in dolfinx, in contact with a rigid plane or with each other.
 
 BlockShape → block_mesh → Block (with a Material) → LoadedFace (with a PatchGrid)
-→ LawContactProblem (with one ContactLaw per patch) → FaceContactState for every load step.
+→ LawContactProblem (with one ContactLaw per patch) → FaceEquilibrium for every load step.
 A file → read_mesh → TaggedMesh makes a MeshedBody of any shape, which takes the place of the Block;
 TaggedMesh → write_mesh → a file that ranks read in parts.
 

@@ -9,7 +9,7 @@ from macro.compliance.face_compliance import face_compliance as face_compliance
 from macro.compliance.face_tractions import face_tractions as face_tractions
 from macro.contact.contact_forces import ContactLaw as ContactLaw
 from macro.contact.contact_problem import ContactProblem as ContactProblem
-from macro.contact.face_contact_state import FaceContactState as FaceContactState
+from macro.contact.face_equilibrium import FaceEquilibrium as FaceEquilibrium
 from macro.contact.face_pair import FacePair as FacePair
 from macro.contact.interface import Interface as Interface
 from macro.contact.law_operator import LawOperator as LawOperator

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from geometry.materials import von_mises
 from macro import compat
-from macro.contact.face_contact_state import FaceContactState
+from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.loaded_face import LoadedFace, Outline
 from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
@@ -84,7 +84,7 @@ def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep])
 def write_rough_fields(
     path: Path | str,
     problem: UnilateralContactProblem,
-    steps: Iterable[tuple[int, FaceContactState]],
+    steps: Iterable[tuple[int, FaceEquilibrium]],
 ) -> None:
     """Write displacements [mm], stresses and contact pressures [MPa] of a rough block as XDMF.
 
@@ -164,7 +164,7 @@ def _facet_pressures(face: LoadedFace, pressure: Array) -> Any:
     return pressures
 
 
-def _vertex_pressures(problem: UnilateralContactProblem, state: FaceContactState) -> Any:
+def _vertex_pressures(problem: UnilateralContactProblem, state: FaceEquilibrium) -> Any:
     """Return contact pressures, linear between vertices, zero away from the top [MPa].
 
     Single nodes of elements of degree 2 have no useful pressures: a vertex of a triangle has no

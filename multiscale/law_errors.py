@@ -42,7 +42,7 @@ from support.arrays import Array
 from support.collective import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
+    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
 """The causes, in their order."""
@@ -77,7 +77,7 @@ class LawErrorProbe:
 
     problem: LawContactProblem
     face: LoadedFace | FacePair
-    state: FaceContactState
+    state: FaceEquilibrium
     problem_of: Callable[[Any], LawContactProblem]
     laws: Sequence[PatchLaw]
     samples: Sequence[RegionSamples]

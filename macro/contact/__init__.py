@@ -10,6 +10,6 @@
       └ PrimalDualActiveSet     at its nodes                                 `active_set`
       └ AugmentedLagrangian     at its quadrature points                     `augmented_lagrangian`
 
-Both problems with laws are solved by `newton`; all three give a `face_contact_state`.
+Both problems with laws are solved by `newton`; all three give a `face_equilibrium`.
 `face_nodes` reads results off a rough top.
 """

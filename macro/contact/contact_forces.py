@@ -16,7 +16,7 @@ from petsc4py import PETSc
 
 from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
 from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
-from macro.contact.face_contact_state import FaceContactState
+from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.loaded_face import ContactFace
 from macro.contact.sampling import Sampling, by_patch
 from support.collective import together
@@ -370,7 +370,7 @@ class ContactForces:
         """
         return self.levers.loads(self._sampling.weight * pressure)
 
-    def state(self, closure: Array, **known: Any) -> FaceContactState:
+    def state(self, closure: Array, **known: Any) -> FaceEquilibrium:
         """Return the contact under the plane as it is now.
 
         Args:
@@ -380,7 +380,7 @@ class ContactForces:
         pressure, areas = self.pressure(closure), self._face.areas
         (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
         (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
-        return FaceContactState(
+        return FaceEquilibrium(
             plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
             force=float(force),
             moment=np.array(moment),

@@ -17,7 +17,7 @@ from geometry.shear_state import ShearControl
 from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws, StickingFrom
-from macro.contact.face_contact_state import FaceShear
+from macro.contact.face_equilibrium import FaceShear
 from macro.contact.loaded_face import ContactFace, Mode
 from support.arrays import Array
 from support.collective import together

@@ -21,7 +21,7 @@ from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactTangent
-from macro.contact.face_contact_state import FaceContactState, FaceShear
+from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
 from macro.contact.frictional_forces import FrictionalForces, contact_forces
 from macro.contact.interface_parts import (
@@ -153,7 +153,7 @@ class Interface:
         self._load = sampling.operator.createVecLeft()
         self._masked = self._load.duplicate()
         self._free: PETSc.Vec | None = None
-        self._state: FaceContactState | None = None
+        self._state: FaceEquilibrium | None = None
 
     @property
     def comm(self) -> Any:
@@ -318,7 +318,7 @@ class Interface:
         product.pointwiseMult(product, self._free)
         y.axpy(1.0, product)
 
-    def evaluate(self, x: Any) -> FaceContactState:
+    def evaluate(self, x: Any) -> FaceEquilibrium:
         """Evaluate the contact at displacements; the properties then give its parts.
 
         Args:
@@ -408,7 +408,7 @@ class Interface:
         return self.rubs
 
     @property
-    def state(self) -> FaceContactState:
+    def state(self) -> FaceEquilibrium:
         """The contact at the latest `evaluate`.
 
         Raises:

@@ -20,7 +20,7 @@ from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactLaws
 from macro.contact.equations import Equilibrium
-from macro.contact.face_contact_state import FaceContactState, FaceShear
+from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_layer import FaceLayer
 from macro.contact.first_steps import FirstSteps
 from macro.contact.frictional_forces import FrictionalForces, SliderMemory, contact_forces
@@ -152,7 +152,7 @@ class LawContactProblem:
         self._plane: Array = np.zeros(3)
         self._closure: Array = np.zeros(len(self._sampling.weight))
 
-    def solve(self, control: Control) -> FaceContactState:
+    def solve(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium of one load step.
 
         A force and a moment of zero are met to `geometry.plane_equilibrium.TOLERANCE`. Without
@@ -175,7 +175,7 @@ class LawContactProblem:
         self._opposite.follow(contact, f"the half-space at {control}")
         return contact.state
 
-    def _solved(self, control: Control) -> FaceContactState:
+    def _solved(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium in the gap as it is; see `solve`."""
         equilibrium = self.equilibrium
         self.forces.prescribe(control, self._plane)
@@ -432,7 +432,7 @@ class _Pressed:
 
     def __init__(self, problem: LawContactProblem, control: Control) -> None:
         self._problem, self._control, self._memory = problem, control, problem.memory
-        self._found: list[FaceContactState] = []
+        self._found: list[FaceEquilibrium] = []
 
     def pressed(self, moved: Array) -> Array:
         """Solve the load step anew, from what friction left behind before it."""
@@ -458,7 +458,7 @@ class _Pressed:
         return np.asarray(change)
 
     @property
-    def state(self) -> FaceContactState:
+    def state(self) -> FaceEquilibrium:
         """The latest state, with the iterations of all."""
         return replace(
             self._found[-1],

@@ -14,7 +14,7 @@ from dolfinx import fem
 
 from geometry.meshes.block import BlockShape
 from macro.bodies import Block
-from macro.contact.face_contact_state import FaceContactState
+from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_pair import FacePair
 from macro.contact.law_problem import LawContactProblem
 from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
@@ -101,7 +101,7 @@ def face_on_half(face: ContactFace) -> LoadedFace | None:
 def start_from_elements(
     problem: LawContactProblem,
     face: ContactFace,
-    known: FaceContactState,
+    known: FaceEquilibrium,
     before: ContactFace,
     body_state: float = 0.0,
 ) -> None:

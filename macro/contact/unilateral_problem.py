@@ -16,7 +16,7 @@ from macro import compat
 from macro.bodies import Block
 from macro.contact.active_set import PrimalDualActiveSet
 from macro.contact.augmented_lagrangian import AugmentedLagrangian
-from macro.contact.face_contact_state import FaceContactState, NodalContact
+from macro.contact.face_equilibrium import FaceEquilibrium, NodalContact
 from macro.contact.face_nodes import TopNodes
 from macro.contact.rough_face import ContactSolution, Guess, PlaneOverNodes, RoughFace
 from support.errors import InputError
@@ -75,7 +75,7 @@ class UnilateralContactProblem:
         self._at_rest = Guess(*map(np.zeros, (3, self.body.owned_dofs, self.method.points)))
         self._last: list[tuple[Guess, float]] = []
 
-    def solve(self, control: Control) -> FaceContactState:
+    def solve(self, control: Control) -> FaceEquilibrium:
         """Find the contact of one load step, with an initial guess from the steps before.
 
         A force and a moment of zero are met to `macro.linear_solvers.constrained.TOLERANCE` of the
@@ -113,7 +113,7 @@ class UnilateralContactProblem:
         pairs = zip(last, before, strict=True)
         return Guess(*(new + share * (new - old) for new, old in pairs))
 
-    def _state(self, solution: ContactSolution) -> FaceContactState:
+    def _state(self, solution: ContactSolution) -> FaceEquilibrium:
         """Return the state of a solution; collective."""
         body, top, (plane, moved, _) = self.body, self.top, solution.end
         displacement = body.stiffness.createVecRight()
@@ -129,7 +129,7 @@ class UnilateralContactProblem:
         pressure, patch_force = top.pressure(nodal_force), top.patch_sums(solution.nodal_force)
         whole, volume, contact, nodes = body.comm.allreduce(weight.sum(axis=0))
         (approach, tx, ty), (xc, yc) = map(float, plane), map(float, self._plane.centre)
-        return FaceContactState(
+        return FaceEquilibrium(
             plane=RigidPlane(approach=approach, tilt=(tx, ty), centre=(xc, yc)),
             force=float(loads[0]),
             moment=loads[1:],
@@ -160,7 +160,7 @@ class UnilateralContactProblem:
         )
 
 
-def nodal_contact(problem: UnilateralContactProblem, state: FaceContactState) -> NodalContact:
+def nodal_contact(problem: UnilateralContactProblem, state: FaceEquilibrium) -> NodalContact:
     """Gather the contact of all nodes of the top, in the order of their places.
 
     Args:

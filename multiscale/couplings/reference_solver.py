@@ -17,7 +17,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceContactState, MeshQuality, UnilateralContactProblem
+    from macro import FaceEquilibrium, MeshQuality, UnilateralContactProblem
 
 
 class RoughMesh(NamedTuple):
@@ -47,7 +47,7 @@ class ReferenceSolver(StepSolver):
 
     def __init__(self, meshes: Sequence[RoughMesh], patches: PatchGrid) -> None:
         self.meshes, self._patches = meshes, patches
-        self._last: tuple[FaceContactState, ...] = ()
+        self._last: tuple[FaceEquilibrium, ...] = ()
 
     @property
     def finest(self) -> UnilateralContactProblem:
@@ -55,7 +55,7 @@ class ReferenceSolver(StepSolver):
         return self.meshes[-1].problem
 
     @property
-    def latest(self) -> FaceContactState | None:
+    def latest(self) -> FaceEquilibrium | None:
         """The finest block at the latest load step; None before the first."""
         return self._last[-1] if self._last else None
 
@@ -86,7 +86,7 @@ class ReferenceSolver(StepSolver):
             ),
         )
 
-    def detail(self, latest: FaceContactState) -> ContactState:
+    def detail(self, latest: FaceEquilibrium) -> ContactState:
         """Return the spots and fields of a contact.
 
         The area of a spot is that of its nodes times the area with its border in the facets over

@@ -21,7 +21,7 @@ from multiscale.loading.stepper import BeyondLaws
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceContactState, FacePair, LawContactProblem, LoadedFace
+    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
 
 
 class EmbeddedLaws(LawSolver):
@@ -46,7 +46,7 @@ class EmbeddedLaws(LawSolver):
         super().__init__(table)
         self.further_fields: Sequence[Callable[[LoadStep], Any]] = ()
         self.face = face
-        self._last: FaceContactState | None = None
+        self._last: FaceEquilibrium | None = None
         self._body_state = 0.0
         self._take(problem, table)
 
@@ -54,13 +54,13 @@ class EmbeddedLaws(LawSolver):
         self._problem, self.table, self._laws = problem, table, table.together()
 
     @property
-    def _known(self) -> FaceContactState:
+    def _known(self) -> FaceEquilibrium:
         if self._last is None:
             raise ValueError("no load step has been accepted yet")
         return self._last
 
     @property
-    def solved(self) -> tuple[LawContactProblem, FaceContactState]:
+    def solved(self) -> tuple[LawContactProblem, FaceEquilibrium]:
         """The body with the laws on its face, and the contact at the latest load step.
 
         Raises:
@@ -196,7 +196,7 @@ class EmbeddedLaws(LawSolver):
         self._last, self._body_state = self._problem.solve(control), body_state
         self.past = memory
 
-    def _step(self, control: Control, state: FaceContactState) -> LoadStep:
+    def _step(self, control: Control, state: FaceEquilibrium) -> LoadStep:
         """Return the load step, with area, contacts and separation of the laws."""
         laws = self._laws
 
@@ -228,7 +228,7 @@ class EmbeddedLaws(LawSolver):
             imbalance=(state.force - state.reaction) / state.force if state.force else 0.0,
         )
 
-    def _of_shear(self, state: FaceContactState, area_fraction: Array) -> dict[str, Any]:
+    def _of_shear(self, state: FaceEquilibrium, area_fraction: Array) -> dict[str, Any]:
         """Return the columns of the shear; none without friction.
 
         Args:
@@ -252,7 +252,7 @@ class EmbeddedLaws(LawSolver):
             "dissipated_mJ": shear.dissipated,
         }
 
-    def _of_contacts(self, state: FaceContactState) -> dict[str, Any]:
+    def _of_contacts(self, state: FaceEquilibrium) -> dict[str, Any]:
         """Return the numbers of contacts in the patches, and what else regions have.
 
         Where laws are those of samples, contacts are counted on the area of the samples, and the

@@ -1,4 +1,4 @@
-"""What is known of the contact on a face at one load step: one record for every way to solve it."""
+"""Equilibrium of a meshed body under contact at one load step, however it was solved."""
 
 from __future__ import annotations
 
@@ -62,10 +62,14 @@ def _no_numbers() -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class FaceContactState:
-    """The contact on a face under a rigid plane.
+class FaceEquilibrium:
+    """Equilibrium of a meshed body whose face is in contact with a rigid plane.
 
-    All but displacements, samples and nodes is the same on every rank.
+    It is not the contact itself. A `geometry.ContactState` holds the contact of a whole surface on
+    one process, with its spots and fields. Here the unknowns are displacements that are distributed
+    over ranks: displacements, samples of laws and nodes are those of this rank, and all else is the
+    same on every rank. Of meshed roughness, `macro.nodal_contact` gathers what a `ContactState` is
+    made of.
 
     Args:
         plane: The plane; its centre is the middle of the patches.
