@@ -10,8 +10,7 @@ from helpers.along import respond
 from helpers.hard_cases import KINDS, history, scene
 
 from geometry import Material, MaterialPair, PatchGrid, patch_means
-from micro import MODEL_NAMES
-from multiscale.couplings.micro_coupling import _stated_model
+from micro import MODEL_NAMES, micro_model
 from multiscale.inputs.surfaces import make_surface
 
 MATERIALS = MaterialPair(first=Material(young_modulus=4000.0, poisson_ratio=0.15))
@@ -47,7 +46,7 @@ def test_nothing_touches_before_first_touch(model, patches):
         surface = make_surface(given)
         grid = PatchGrid(grid=patches, lengths=surface.lengths)
         means = patch_means(surface, grid)
-        whole = _stated_model(given, surface, MATERIALS)
+        whole = micro_model(model, surface, contact_modulus=MATERIALS.contact_modulus)
         parts = [(whole, grid, means)]
         for index in range(grid.count):
             parts.append((*whole.of_patch(grid, index), means[index : index + 1]))
