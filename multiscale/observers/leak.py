@@ -1,4 +1,4 @@
-"""The leak at load steps, where a scene asks for it: through the gaps of all cells, or of patches.
+"""The leak at load steps, where a scene asks for it: through the gaps of all cells.
 
 The error of the grid is measured like that of the force: the contact and the flow through its gaps
 are solved again on half as many cells a side, under the same load. Channels close as cells become
@@ -8,11 +8,6 @@ On 12 surfaces with 8 and 16 cells along the shortest wave, under 6 loads each o
 area in contact, the error was no less than the true one on 93 and 92 % of 144 flows, no less than
 half of it on 97 and 98 %, and 1.6 to 2.9 times as large in the median
 (`tests/benchmarks/leak_error.py`).
-
-Under consistent laws every patch has one transmissivity, that of its own gaps between walls. The
-flow from patch to patch is that through the cells of a map. It lies beside that through the gaps of
-all cells, which `coupling.kind = "concurrent"` finds: paths that cross the borders of patches
-elsewhere than in the mean are not known.
 
 Theory: docs/theory.md, section 16.
 """
@@ -24,10 +19,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from geometry import NotConverged
-from micro.flow.gap_flow import cell_network
 from multiscale.couplings.coupling import Coupling
 from multiscale.gap_flows import flow_solver, solved_gap_flow
 from multiscale.loading.leak import WAYS, Leak
@@ -36,8 +28,6 @@ from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, measured, number, percent, quantity
 from support.arrays import Array
 from support.collective import on_root_alone
-from support.errors import InputError
-from support.network_flow import network_flow
 
 if TYPE_CHECKING:
     from multiscale.results.history import History
@@ -56,8 +46,6 @@ _REMEDIES = {
     "samples": "between samples it differs by {} (more law.seeds, or larger samples)",
 }
 """What is said of a leak that is not certain, by the cause of most of its error."""
-_LEAST_CELLS = 4
-"""Cells of a patch along a side, of which half are tried too."""
 
 
 class LeakObserver(StepObserver):
@@ -191,80 +179,6 @@ class GapLeakObserver(LeakObserver):
                 )
             )
         return tuple(leaks)
-
-
-class PatchLeakObserver(LeakObserver):
-    """Adds what leaks from patch to patch.
-
-    Args:
-        coupling: What finds the load steps, with consistent laws.
-
-    Raises:
-        InputError: When patches have too few cells.
-    """
-
-    causes = ("grid", "rows")
-
-    def __init__(self, coupling: Coupling) -> None:
-        super().__init__(coupling)
-        most = tuple(cells // _LEAST_CELLS for cells in coupling.surface.grid)
-        if any(count > limit for count, limit in zip(coupling.patches.grid, most, strict=True)):
-            raise InputError(
-                f"leaves patches fewer than {_LEAST_CELLS} cells a side, too few for a leak",
-                key="patches.grid",
-                value=list(coupling.patches.grid),
-                allowed=f"{most[0]} × {most[1]} at most",
-                file=coupling.scene.file,
-            )
-
-    def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
-        patches, leaks = self._coupling.patches, []
-        for way, total in zip(self._section.directions, self._totals(step, None), strict=True):
-            axis = "xy".index(way)
-            cubed = total * patches.lengths[axis] / patches.lengths[1 - axis]
-            factor = cubed / step.mean_separation_mm**3 if step.mean_separation_mm else None
-            rate = self._scale * total
-            leaks.append(Leak(way=way, rate=rate, transmissivity=cubed, flow_factor=factor))
-        return tuple(leaks)
-
-    def _varied(self, step: LoadStep, cause: str) -> Sequence[float]:
-        return [self._scale * total for total in self._totals(step, cause)]
-
-    def _totals(self, step: LoadStep, cause: str | None) -> list[float]:
-        """Return the flows along all ways, with a cause of their error varied [mm³]; collective."""
-        table = self._coupling.table
-        assert table is not None
-
-        def solve() -> list[float]:
-            flows = []
-            for law, closure in zip(table.laws, step.patches.closure_mm, strict=True):
-                known = law.transmissivity
-                assert known is not None
-                at = law.at(np.array([closure]), extend=True).separation
-                flows.append(known.at(at) if cause is None else known.varied(cause, at))
-            through = np.concatenate(flows)
-            return [self._total(through, "xy".index(way)) for way in self._section.directions]
-
-        return on_root_alone(self._coupling.comm, solve)
-
-    def _total(self, transmissivity: Array, axis: int) -> float:
-        """Return the flow through patches of T along x and y, shape (N, 2) [mm³]."""
-        patches = self._coupling.patches
-        own = [transmissivity[:, k].reshape(patches.grid) for k in (axis, 1 - axis)]
-        lengths = patches.lengths
-        if axis:
-            own, lengths = [one.T for one in own], lengths[::-1]
-        return network_flow(cell_network(own[0], lengths, across=own[1])).total
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield what a report says of the leak, and of patches in its place."""
-        yield from super().notes(steps)
-        if steps:
-            count = self._coupling.patches.count
-            yield (
-                f"the leak is that through {count} patches of one transmissivity each; "
-                "coupling.kind = 'concurrent' finds that through all gaps"
-            )
 
 
 def leak_text(leak: Leak) -> str:
