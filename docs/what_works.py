@@ -73,6 +73,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
         '`coupling.compliance = "finite-element"`': {"coupling.compliance": "finite-element"},
         "`law.seeds` (scatter of samples)": {"law.seeds": [1, 2]},
         "`law.crown`": {"law.crown": [100.0, "inf"]},
+        '`reference.mesher = "gmsh"`': {"reference.mesher": "gmsh"},
     },
     "Load": {
         "`load.force`": {"load.approach": None, "load.force": 1.0},
@@ -82,6 +83,11 @@ CHOICES: dict[str, dict[str, Changes]] = {
             "load.stage": [{"approach": 4e-3}, {"force": 1.0}],
         },
         "`[friction]`, `load.shear`": {"friction.coefficient": 0.3, "load.shear": [1e-3, 0.0]},
+        "`friction.coupled = true`": {
+            "friction.coefficient": 0.3,
+            "friction.coupled": True,
+            "load.shear": [1e-3, 0.0],
+        },
         "`load.tilt = [tx, ty]`": {"load.tilt": [1e-3, 0.0]},
         '`load.tilt = "free"`': {"load.tilt": "free"},
         "`load.approach = [up, down]`": {"load.approach": [8e-3, 2e-3]},

@@ -65,17 +65,18 @@ def duration(seconds: float) -> str:
     return f"{hours} h {minutes} min" if minutes else f"{hours} h"
 
 
-def number(value: float, digits: int = 4) -> str:
+def number(value: float, digits: int = 4, smallest: int = -6) -> str:
     """Return a number such as ``0.00012``, ``41000`` or, far from one, ``1.2·10⁻⁹``.
 
     Args:
         value: The number.
         digits: Significant digits; zeros at the end are left out.
+        smallest: Power of ten below which a number is written with one.
     """
     if not math.isfinite(value):
         return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    if value and not -6 <= int(power) < 10:
+    if value and not smallest <= int(power) < 10:
         return f"{float(mantissa):g}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
     text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
@@ -120,7 +121,7 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
         digits: Significant digits of a number without an error.
     """
     if not error or not math.isfinite(error):
-        return number(value, digits)
+        return number(value, digits, smallest=-4)
     power = math.floor(math.log10(max(abs(value), error)))
     if power < -4:
         shift = 10.0**-power

@@ -227,11 +227,13 @@ def _look(picture: bytes) -> str:
 
 
 def _parted(table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> Iterator[Any]:
-    """Yield parts of a table that fit a page, each with its first column."""
+    """Yield parts of a table that fit a page, about as wide, each with its first column."""
     headings, rows = table
-    for start in range(1, len(headings), _MOST_COLUMNS):
-        part = slice(start, start + _MOST_COLUMNS)
-        yield (headings[0], *headings[part]), [(row[0], *row[part]) for row in rows]
+    count = -(-(len(headings) - 1) // _MOST_COLUMNS)
+    for part in np.array_split(np.arange(1, len(headings)), max(count, 1)):
+        if part.size:
+            columns = slice(part[0], part[-1] + 1)
+            yield (headings[0], *headings[columns]), [(row[0], *row[columns]) for row in rows]
 
 
 @cache
