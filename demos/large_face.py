@@ -98,7 +98,7 @@ for force in FORCES:
 use_style()
 figure = new_figure(FULL_WIDTH, 3.0)
 left, right = figure.subplots(1, 2)
-LABELS = (ORANGE, (0.4, 0.4), "left"), (BLUE, (0.98, 0.95), "right")
+LABELS = (ORANGE, (0.38, 0.22), "left"), (BLUE, (0.98, 0.95), "right")
 for (waves, law), (colour, place, side) in zip(laws.items(), LABELS, strict=True):
     separation = 1e3 * (law.initial_separation - law.rows.closure)
     left.plot(separation, law.rows.pressure, color=colour)

@@ -16,6 +16,8 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from multiscale.couplings.dispatch import coupling_class, load_finite_elements
@@ -29,6 +31,8 @@ Changes = Mapping[str, Any]
 
 AS_SURFACE = "as the surface"
 """Value of a section that is a copy of ``[surface]``."""
+A_MAP = "a map.txt"
+"""A file of heights in the folder of the meshes."""
 
 COUPLINGS: dict[str, Changes] = {
     "`analytic`": {"coupling.kind": "analytic"},
@@ -72,8 +76,15 @@ CHOICES: dict[str, dict[str, Changes]] = {
         '`coupling.newton = "full"`': {"coupling.newton": "full"},
         '`coupling.compliance = "finite-element"`': {"coupling.compliance": "finite-element"},
         "`law.seeds` (scatter of samples)": {"law.seeds": [1, 2]},
+        "`law.samples` (further maps)": {
+            "surface.spectrum": None,
+            "surface.grid": None,
+            "surface.file": A_MAP,
+            "surface.height_unit": "mm",
+            "law.samples": [A_MAP],
+        },
         "`law.crown`": {"law.crown": [100.0, "inf"]},
-        '`reference.mesher = "gmsh"`': {"reference.mesher": "gmsh"},
+        '`reference.mesher = "gmsh"`': {"reference.cells": None, "reference.mesher": "gmsh"},
     },
     "Load": {
         "`load.force`": {"load.approach": None, "load.force": 1.0},
@@ -106,7 +117,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
 }
 """Rows: the choices by topic, each with the keys that make it; None takes a key away."""
 
-OF_LAWS, OF_BODIES = ("coupling.",), ("block.", "body.", "output.fields")
+STATED, OF_BODIES = ("coupling.", "reference."), ("block.", "body.", "output.fields")
 """Beginnings of keys that a plan states where they matter, and of those that matter with a body."""
 
 ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)"
@@ -114,8 +125,8 @@ ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)
 
 INTRO = """# What works with what
 
-Which choice goes with which coupling? `docs/what_works.py` wrote this page from what the code
-itself refuses: it sets up small scenes, each with one of the choices below.
+Which choice goes with which coupling? `docs/what_works.py` writes this page from what the code
+itself refuses.
 
 * ● works.
 * ○ is accepted and changes nothing.
@@ -162,6 +173,8 @@ class Planner:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
+        heights = 1e-2 * np.random.default_rng(1).standard_normal((4, 4))
+        np.savetxt(folder / A_MAP, np.kron(heights, np.ones((4, 4))))
         write_mesh(folder / "below.msh", 0.0, 1.0, contact_above=True)
         write_mesh(folder / "above.msh", 1.0, 2.0, contact_above=False)
 
@@ -206,6 +219,9 @@ class Planner:
             data = data.setdefault(section, {})
         if value is None:
             data.pop(name, None)
+        elif value in (A_MAP, [A_MAP]):
+            path = str(self._folder / A_MAP)
+            data[name] = path if value == A_MAP else [path]
         elif value == AS_SURFACE:
             data[name] = {**data["surface"]}
         elif value == "a mesh":
@@ -350,7 +366,7 @@ def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     """Tell whether a choice that is accepted changes nothing: a default, or not looked at."""
     if all(key.startswith(OF_BODIES) for key in changes):
         return not made.has_body
-    if all(key.startswith(OF_LAWS) for key in changes):
+    if all(key.startswith(STATED) for key in changes):
         return list(made.statements()) == list(bare.statements())
     return False
 

@@ -43,17 +43,19 @@ def draw_accuracy(
     for key, values in errors.items():
         size = 3.5 if "independent" in key else 2.5
         left.semilogx(100 * fractions.ravel(), 100 * values.ravel(), ls="", ms=size, **look(key))
-    left.set(ylim=(-70, 70), xlabel="contact area [% of the face]", ylabel="error of the force [%]")
+    left.set(
+        xlabel="contact area [% of the face]", ylabel="error of the force [%]", ylim=(-40, 100)
+    )
     joined = {key: place for key, place in places.items() if key.startswith("half-space")}
     right.loglog(*zip(*joined.values(), strict=True), **look("half-space"))
     for key, place in places.items():
         right.plot(*place, ms=5, **look(key))
     for axes, key, at, text in (
-        (left, "elliptic", (0.105, 60), "hollow: asperities without interaction"),
-        (left, "elliptic", (0.105, -52), "filled: asperities with interaction"),
-        (left, "half-space", (0.105, 12), "half-space, 64² heights"),
-        (right, "elliptic", (2.9, 23), "without interaction"),
-        (right, "elliptic", (2.9, 9), "with interaction"),
+        (left, "elliptic", (0.105, 93), "hollow: asperities without interaction"),
+        (left, "elliptic", (0.105, 84), "filled: with interaction"),
+        (left, "half-space", (0.105, 75), "triangles: half-space, 64² heights"),
+        (right, "elliptic", (2.9, 25), "without interaction"),
+        (right, "elliptic", (2.9, 10.5), "with interaction"),
         *((right, key, (1.25 * x, 1.05 * y), key) for key, (x, y) in joined.items()),
     ):
         side = "right" if at[0] > 30 else "left"

@@ -36,6 +36,8 @@ _FLUID = ListedColormap(colormaps["Blues"](np.linspace(0.1, 0.62, 256)), name="f
 """Colours of fluid pressures, on which flow lines are seen."""
 _COLOURS = {"x": BLUE, "y": ORANGE, "face": BLUE}
 """Colours of curves by the way of the flow."""
+_LOOKS = {"x": "o-", "y": "s-", "face": "o-"}
+"""Markers and lines of these curves."""
 
 
 @styled()
@@ -167,18 +169,17 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         rate, error = np.abs(_values(history, way, "rate")), _values(history, way, "error")
         error = np.nan_to_num(error)
         leaks = rate > 0.0
-        look: dict[str, Any] = {"color": _COLOURS[way]}
-        mark = "s-" if way == "y" else "o-"
+        look: dict[str, Any] = {"color": _COLOURS[way], "ms": 3.0}
         low = np.minimum(error, 0.9 * rate)  # of a logarithmic axis
         axes.errorbar(
-            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=mark, ms=3.0, lw=1.2,
+            pressure[leaks], rate[leaks], [low[leaks], error[leaks]], fmt=_LOOKS[way], lw=1.2,
             elinewidth=0.8, label=f"along {way}", **look,
         )  # fmt: skip
         closed = ~leaks & ~np.isnan(rate)
         any_closed |= bool(closed.any())
         axes.plot(
-            pressure[closed], np.full(closed.sum(), 0.03), "v", ms=4.0, mfc="white", clip_on=False,
-            transform=axes.get_xaxis_transform(), **look,
+            pressure[closed], np.full(closed.sum(), 0.03), "v", mfc="white", clip_on=False,
+            transform=axes.get_xaxis_transform(), **look | {"ms": 4.0},
         )  # fmt: skip
     title = "leak" + "; triangles: closed" * any_closed
     axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
@@ -202,7 +203,7 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
     for way in ways:
         factor = _values(history, way, "flow_factor")
         leaks = factor > 0.0
-        axes.plot(pressure[leaks], factor[leaks], "o-", ms=3.0, color=_COLOURS[way])
+        axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
     axes.set_xlim(0.0, None)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)

@@ -235,7 +235,7 @@ def _in_rows(
             place = (left / width, (top + below) / height, wide / width, tall / height)
             axes.append(figure.add_axes(place))
     if title:
-        figure.suptitle(title)
+        figure.suptitle(title, y=1.0 - 0.08 / height)
     for spare in axes[count:]:
         spare.remove()
     return figure, axes[:count]

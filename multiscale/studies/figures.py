@@ -89,6 +89,9 @@ def sweep_figure(sweep: Any) -> Figure:
             _draw_scatter(force, statistics, colour)
     force.set(xlabel="approach [µm]", ylabel="mean pressure [MPa]")
     area.set(xlabel="mean pressure [MPa]", ylabel="contact area fraction [%]")
+    if len(sweep) > len(ensembles):
+        force.set_title("thick: means; dashed: medians; bands: middle 90 %")
+        area.set_title("thick: means; thin: single cases")
     add_legend(figure)
     return figure
 

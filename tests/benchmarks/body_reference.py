@@ -72,7 +72,7 @@ def shown(problem, state):
     contact = nodal_contact(problem, state)
     touching = contact.region >= 0
     return {
-        "corners": np.concatenate([facets.corners, -facets.depth[..., None]], axis=2),
+        "corners": np.concatenate([facets.corners, -facets.depth[..., None]], axis=2)[:, :3],
         "moved": problem.body.function(state.displacement).x.array.reshape(-1, 3)[nodes],
         "spots": np.stack([contact.x, contact.y], axis=1)[touching],
     }
