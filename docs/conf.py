@@ -18,7 +18,7 @@ import generated  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 
 project = "patchlaw"
-author = "the patchlaw project"
+author = "The patchlaw developers"
 version = release = generated.version()
 extensions = [
     "myst_nb",
