@@ -80,10 +80,6 @@ class Network:
         """Whether a path of links leads from the inlet to the outlet."""
         return bool(self.joined[self.inlet] == self.joined[self.outlet])
 
-    def between_terminals(self) -> Network:
-        """Return the network without the links that no path from a terminal reaches."""
-        return self.only(self.joined[self.tail] == self.joined[self.inlet])
-
     def only(self, links: Flags) -> Network:
         """Return the network of some links.
 

@@ -176,11 +176,6 @@ class LoadPosition:
     largest: float = 0.0
     origin: tuple[float, float] = (0.0, 0.0)
 
-    @property
-    def is_below_past(self) -> bool:
-        """Whether the force was larger at an earlier load step, by more than solvers leave."""
-        return self.force < (1.0 - 1e-6) * self.largest
-
     def is_at_end(self, load_history: LoadHistory) -> bool:
         """Whether all load steps of a load history are accepted."""
         return self.targets == load_history.count and not self.ahead
