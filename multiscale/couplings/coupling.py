@@ -283,65 +283,41 @@ class Coupling(SceneParts, ABC):
         return max(self.plane.approach, float(self.cell_interference.max()))
 
     def statements(self, cost: Iterable[tuple[str, str]] = ()) -> Iterator[tuple[str, str]]:
-        """Yield pairs of topic and sentence that say what will be done and why.
+        """Yield pairs of topic and sentence that say what will be done and why, in one order.
 
         Args:
             cost: What it costs, see `cost_statements`.
         """
-        yield "inputs", f"{describe.materials(self)}; a surface of {describe.dimensions(self)}"
-        yield "surface", describe.surface(self)
-        yield "contact", self.contact_statement()
+        said = {**self.describe(), **dict(cost)}
+        yield from ((topic, said[topic]) for topic in describe.TOPICS if topic in said)
+
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, a sentence for each of some of `describe.TOPICS`."""
+        why, cells = self.unmeasured(), f"{self.surface.heights.size} cells"
+        said = {
+            "inputs": f"{describe.materials(self)}; a surface of {describe.dimensions(self)}",
+            "surface": describe.surface(self),
+            "contact": cells,
+            "micro model": describe.micro_model(self.scene.micro, self.micro),
+            "load": describe.load(self),
+            "error": f"not measured: {why}" if why else describe.checks(self, self.error_causes),
+        }
+        if self.plane_at_largest_load is not None:
+            within = int((self.cell_interference > 0.0).sum())
+            said["contact"] = f"{cells}, {within} within the largest approach"
+            if self.load_history.quantity == "force":
+                approach = quantity(self.plane.approach - self.zero, "mm", 3)
+                said["load"] += f"; on a half-space its approach is about {approach}"
         if self.scene.counter_surface is not None:
-            yield "two rough sides", describe.two_sides(self)
-        yield "micro model", describe.micro_model(self.scene.micro, self.micro)
-        yield "coupling", self.coupling_statement()
-        yield from self.body_statements()
-        yield from self.law_statements()
-        yield "load", self.load_statement()
+            said["two rough sides"] = describe.two_sides(self)
         if self.decision is not None:
-            yield "choice", self.decision.sentence
-        yield from cost
-        yield "error", self.error_statement()
+            said["choice"] = self.decision.sentence
+        return said
 
-    def contact_statement(self) -> str:
-        """Say what is in contact."""
-        cells = f"{self.surface.heights.size} cells"
-        if self.plane_at_largest_load is None:
-            return cells
-        return f"{cells}, {int((self.cell_interference > 0.0).sum())} within the largest approach"
-
-    @abstractmethod
-    def coupling_statement(self) -> str:
-        """Say how contacts and bodies are put together."""
-
-    @abstractmethod
-    def body_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield what the bodies are, with topics."""
-
-    def law_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield how load steps are found from laws, with topics."""
-        return iter(())
-
-    def load_statement(self) -> str:
-        """Say the load steps, and the approach under a force where it is estimated."""
-        text = describe.load(self)
-        if self.load_history.quantity == "force" and self.plane_at_largest_load is not None:
-            approach = quantity(self.plane.approach - self.zero, "mm", 3)
-            text += f"; on a half-space its approach is about {approach}"
-        return text
-
-    def error_statement(self) -> str:
-        """Say how the run will know its error."""
-        return f"not measured: {self.unmeasured()}"
-
-    def measured_at(self, causes: Iterable[str]) -> str:
-        """Say at which load steps errors are measured.
-
-        Args:
-            causes: Their causes.
-        """
-        which = "every load step" if self.scene.output.check == "all" else "the last load step"
-        return f"measured at {which}, by cause: {', '.join(causes)}"
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
+        return ""
 
     def warnings(self) -> Iterator[str]:
         """Yield what a user should know about the validity of the scene."""

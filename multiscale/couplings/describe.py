@@ -25,6 +25,13 @@ _LOADS = {
 }
 
 
+TOPICS = (
+    "inputs", "surface", "contact", "two rough sides", "micro model", "coupling", "block", "body",
+    "body term", "newton", "friction", "load", "choice", "work", "cost", "error",
+)  # fmt: skip
+"""What is said of a scene, in this order."""
+
+
 def materials(parts: SceneParts) -> str:
     """Say the elastic constants of both sides."""
     second = parts.materials.second
@@ -142,6 +149,12 @@ def _pair(history: LoadHistory, pair: tuple[float, float]) -> str:
     """Say a shear along x and y."""
     unit = "mm" if history.shear_key == "shear" else "N"
     return f"({', '.join(quantity(one, unit, 6) for one in pair)})"
+
+
+def checks(parts: SceneParts, causes: str) -> str:
+    """Say at which load steps errors are measured, and their causes."""
+    which = "every load step" if parts.scene.output.check == "all" else "the last load step"
+    return f"measured at {which}, by cause: {causes}"
 
 
 def stages(parts: SceneParts) -> Iterator[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -81,14 +80,14 @@ class LawCoupling(Coupling):
     def _make_solver(self) -> StepSolver:
         return self._solver_of(self.make_laws())
 
-    def law_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield how load steps are found from laws."""
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, and how load steps are found from laws."""
         choice = self.newton()
         way = "condensed to the patches" if choice.condensed else "full, on the mesh"
-        yield "newton", f"{way}: {choice.why}"
+        said = super().describe() | {"newton": f"{way}: {choice.why}"}
         if self.law_friction is not None:
-            yield (
-                "friction",
+            said["friction"] = (
                 f"coefficient {self.law_friction.coefficient:g}; the laws are beds of springs with "
-                "a slider each; GMRES, as tangents are unsymmetric",
+                "a slider each; GMRES, as tangents are unsymmetric"
             )
+        return said

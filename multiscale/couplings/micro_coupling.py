@@ -247,33 +247,23 @@ class MicroCoupling(PressedSurface):
 
     # --- statements
 
-    def contact_statement(self) -> str:
-        """Say what is in contact."""
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, of summits and of the body."""
+        said = super().describe()
         if self.summits is not None:
             within = f"{int(self.interfering_summits.sum())} within the largest approach"
-            return f"{len(self.summits)} summits, {within}; the others cost nothing"
-        return super().contact_statement()
+            said["contact"] = f"{len(self.summits)} summits, {within}; the others cost nothing"
+        if self.has_body and not self.body.on_mesh:
+            said["block"] = describe.block(self)
+        elif self.has_body:
+            said |= {"body": describe.body(self), "body term": describe.body_term(self)}
+        return said
 
-    def body_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield what the bodies are, with topics."""
-        if not self.has_body:
-            return
-        if not self.body.on_mesh:
-            yield "block", describe.block(self)
-            return
-        yield "body", describe.body(self)
-        yield "body term", self._body_term_statement()
-
-    def _body_term_statement(self) -> str:
-        return describe.body_term(self)
-
-    def error_statement(self) -> str:
-        """Say how the run will know its error."""
-        if self.unmeasured():
-            return super().error_statement()
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
         body = ", body" if self.has_body else "; there is no block"
-        laws = " and laws" * self.has_laws
-        return self.measured_at(("grid", "zero", f"slopes{body}{laws}"))
+        return f"grid, zero, slopes{body}{' and laws' * self.has_laws}"
 
     def contact_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the contact and of its micro model."""
@@ -337,12 +327,12 @@ class ConcurrentCoupling(MicroCoupling):
             nx, ny = map(min, self.surface.grid, (nx, ny))
         return PatchGrid(grid=(nx, ny), lengths=self.surface.lengths)
 
-    def coupling_statement(self) -> str:
-        """Say how contacts and bodies are put together."""
-        return (
-            "concurrent: the whole surface on the block at every load step, no laws; "
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why."""
+        return super().describe() | {
+            "coupling": "concurrent: the whole surface on the block at every load step, no laws; "
             f"{describe.times(self.patches.grid)} patches gather the results"
-        )
+        }
 
 
 @dataclass(kw_only=True, eq=False)
@@ -353,9 +343,9 @@ class AnalyticCoupling(ConcurrentCoupling):
     shows_contacts: ClassVar[bool] = False
     patches_interact: ClassVar[bool] = False
 
-    def coupling_statement(self) -> str:
-        """Say how contacts and bodies are put together."""
-        counted = "; displacements, and so the approach, count from the mean of the surface"
-        return "analytic: the micro model alone on a half-space, no finite elements" + (
-            counted if self.scene.surface.periodic else ""
-        )
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why."""
+        text = "analytic: the micro model alone on a half-space, no finite elements"
+        if self.scene.surface.periodic:
+            text += "; displacements, and so the approach, count from the mean of the surface"
+        return super().describe() | {"coupling": text}

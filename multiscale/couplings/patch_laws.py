@@ -149,15 +149,15 @@ class PatchLaws(LawCoupling, MicroCoupling):
                 yield Detail(f"Newton condensed to the patches, not full: {taken.why}")
         yield from super().notes(steps)
 
-    def coupling_statement(self) -> str:
-        """Say how contacts and bodies are put together."""
-        patches = self.patches
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why."""
+        patches, coupling = self.patches, self.scene.coupling
         grid = f"{times(patches.grid)} patches"
         if self.plane_at_largest_load is not None:
             laws = self.interfering_patches
             grid += f", {laws} get a law, {patches.count - laws} stay open"
-        coupling = self.scene.coupling
-        return f"{coupling.kind}: {grid}; {self._made}; {coupling.interface} closure"
+        text = f"{coupling.kind}: {grid}; {self._made}; {coupling.interface} closure"
+        return super().describe() | {"coupling": text}
 
     @property
     @abstractmethod
@@ -333,8 +333,12 @@ class IsolatedCoupling(PatchLaws):
                 "inside their laws is an approximation there"
             )
 
-    def _body_term_statement(self) -> str:
-        return "none: every patch is taken alone on a half-space"
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why."""
+        said = super().describe()
+        if "body term" in said:
+            said["body term"] = "none: every patch is taken alone on a half-space"
+        return said
 
     @property
     def _made(self) -> str:

@@ -267,32 +267,22 @@ class ReferenceCoupling(PressedSurface):
         cycles = SET_UP_CYCLES + steps * 30.0 * self.rough_meshes.degree
         return Work(unknowns=unknowns, cycles=unknowns * cycles, ranks=ranks)
 
-    def coupling_statement(self) -> str:
-        """Say how the rough surface is pressed."""
-        return (
-            "reference: the rough surface itself, meshed and pressed by "
-            f"{self.scene.reference.method}; {describe.times(self.patches.grid)} patches gather "
-            "the results"
-        )
-
-    def body_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield what the meshes are."""
-        if self.scene.block is None:
-            own = f"bisected from the {self.body.cells} of {self._mesh_name}"
-            yield "body", f"{self.rough_meshes.statement}; {own}"
-        else:
-            sides = self.scene.block.sides
-            yield "block", f"{self.rough_meshes.statement}; {sides} sides"
-
-    @property
-    def _mesh_name(self) -> str:
-        """Name of the file of the body's mesh."""
-        return "" if self.scene.body is None else Path(self.scene.body.mesh).name
-
-    def error_statement(self) -> str:
-        """Say how the run will know its error."""
-        told = "the meshes of the reference tell it, at every load step"
-        return super().error_statement() if self.unmeasured() else told
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, and what the meshes are."""
+        scene, meshes = self.scene, self.rough_meshes.statement
+        said = super().describe() | {
+            "coupling": "reference: the rough surface itself, meshed and pressed by "
+            f"{scene.reference.method}; {describe.times(self.patches.grid)} patches gather the "
+            "results"
+        }
+        if scene.block is not None:
+            said["block"] = f"{meshes}; {scene.block.sides} sides"
+        elif scene.body is not None:
+            own = f"bisected from the {self.body.cells} of {Path(scene.body.mesh).name}"
+            said["body"] = f"{meshes}; {own}"
+        if not self.unmeasured():
+            said["error"] = "the meshes of the reference tell it, at every load step"
+        return said
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""

@@ -191,11 +191,10 @@ class RepresentativeCoupling(LawCoupling):
             return NOT_WITH_FRICTION
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
-    def error_statement(self) -> str:
-        """Say how the run will know its error."""
-        if self.unmeasured():
-            return super().error_statement()
-        return self.measured_at(causes_of(self.samples))
+    @property
+    def error_causes(self) -> str:
+        """The causes of errors that a run measures."""
+        return ", ".join(causes_of(self.samples))
 
     # --- errors
 
@@ -389,19 +388,16 @@ class RepresentativeCoupling(LawCoupling):
 
     # --- statements
 
-    def coupling_statement(self) -> str:
-        """Say what the laws are made from."""
+    def describe(self) -> dict[str, str]:
+        """Return what will be done and why, and what the laws are made from."""
         parts = []
         for region in self.samples:
             x, y = (quantity(side, "mm") for side in region.surfaces[0].lengths)
             count = len(region.surfaces)
             samples = f"{count} periodic samples" if count > 1 else "a periodic sample"
             parts.append(f"{region.name}: {samples} of {x} × {y}")
-        return f"representative: {'; '.join(parts)}; the law holds at every point of the face"
-
-    def body_statements(self) -> Iterator[tuple[str, str]]:
-        """Yield what the bodies are, with topics."""
-        yield "body", describe.body(self)
+        text = f"representative: {'; '.join(parts)}; the law holds at every point of the face"
+        return super().describe() | {"coupling": text, "body": describe.body(self)}
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
