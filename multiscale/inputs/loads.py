@@ -19,6 +19,8 @@ from support.fields import part_of
 
 Problem = tuple[str, Any, str, str]
 """A key, its value, why it makes no sense, and what is allowed."""
+STEEPEST_PLANE = 0.2
+"""Largest slope of a plane: its normal force and that along z then differ by 2 %, 1 − cos 0.2."""
 PROVISIONAL_PATCHES = (4, 4)
 """Patches that stand for ``"auto"`` until they are chosen."""
 
@@ -112,7 +114,9 @@ def check_load(
         _without_load(scene, load_history),
         _beyond_hardness(scene, load_history, area),
         _without_gap(scene, surfaces[0], load_history),
+        _too_steep(scene),
         () if body is None else _beyond_body(scene, load_history, area, body),
+        () if body is None else _beyond_edge(scene, load_history, surfaces[0], body),
     )
     for key, value, problem, allowed in problems:
         raise InputError(problem, key=key, value=value, allowed=allowed)
@@ -169,7 +173,16 @@ def _without_load(scene: Scene, load_history: LoadHistory) -> Iterator[Problem]:
         return
     if scene.loading.stage:
         allowed = "an approach, a force or a pressure of one of the stages"
-        yield "load.stage", None, "presses nothing: no stage has a load of the plane", allowed
+        problem = "presses nothing: no stage has a load of the plane"
+        yield "load.stage", [stage.name for stage in scene.loading.stage], problem, allowed
+
+
+def _too_steep(scene: Scene) -> Iterator[Problem]:
+    """Yield planes that lie too steeply for small rotations."""
+    tilt = scene.loading.slopes
+    if tilt is not None and max(map(abs, tilt)) > STEEPEST_PLANE:
+        problem = "is too steep for the theory of small rotations"
+        yield "load.tilt", list(tilt), problem, f"slopes within ±{STEEPEST_PLANE:g}"
 
 
 def _beyond_body(
@@ -184,3 +197,18 @@ def _beyond_body(
     if load_history.largest > largest:
         key, points = scene.loading.stated
         yield f"load.{key}", points, "presses the body to nothing", f"at most {most}"
+
+
+def _beyond_edge(
+    scene: Scene, load_history: LoadHistory, surface: Surface, body: BodyFacts
+) -> Iterator[Problem]:
+    """Yield tilts by which an edge of the body is pressed to nothing."""
+    tilt = scene.loading.slopes
+    if tilt is None or load_history.quantity != "approach":
+        return
+    lengths = body.lengths if scene.law.representative else surface.lengths
+    lowered = 0.5 * sum(abs(t) * length for t, length in zip(tilt, lengths, strict=True))
+    if lowered > 0.0 and load_history.largest + lowered > body.depth:
+        problem = f"presses an edge of the body to nothing, {lowered:.6g} mm below the middle"
+        most = body.depth - load_history.largest
+        yield "load.tilt", list(tilt), problem, f"an edge at most {most:.6g} mm below"

@@ -350,12 +350,13 @@ def _cubes(shape: RefinedShape) -> float:
             np.minimum(size, edge + shape.growth * away, out=size)
         return float(np.sum(size**-3.0))
 
-    # layers half as thick as the edges at their depth below the smallest
+    # layers half as thick as the edges at their depth below the smallest, or a twentieth of it: very
+    # small edges, which do not fit into any memory, would grow through 10⁵ layers and more
     depths, total, least = [0.0], 0.0, min(edges)
     while depths[-1] < shape.height:
         grown = least + shape.growth * max(depths[-1] - 2.0 * least, 0.0)
         edge = min(grown, shape.coarse + shape.growth * depths[-1])
-        depths.append(min(depths[-1] + 0.5 * edge, shape.height))
+        depths.append(min(depths[-1] + max(0.5 * edge, 0.05 * depths[-1]), shape.height))
     for above, below in pairwise(depths):
         total += (below - above) * density(0.5 * (above + below))
     return total * float(np.prod(spacing))

@@ -5,11 +5,14 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from geometry import (
     InputError,
@@ -178,6 +181,7 @@ def region_samples(
         if section is scene.surface:
             others = (replace(section, file=file) for file in scene.law.samples)
             surfaces += [sample_surface(scene, one, "law.samples") for one in others]
+            _check_different(scene, surfaces)
         if above is not None:
             with located(scene, "counter_surface"):
                 laid = [laid_counter_surface(scene, above, surface) for surface in surfaces]
@@ -192,6 +196,16 @@ def region_samples(
         )
         found.append(region)
     return tuple(found)
+
+
+def _check_different(scene: Scene, surfaces: Sequence[Surface]) -> None:
+    """Refuse a map that is one of the others: it hides the scatter and counts twice in the mean."""
+    names = (scene.surface.file, *scene.law.samples)
+    for (one, first), (other, second) in combinations(zip(names, surfaces, strict=False), 2):
+        if np.array_equal(first.heights, second.heights):
+            problem = f"has the heights of '{one}', which would count twice"
+            with located(scene, "law.samples"):
+                raise InputError(problem, value=other, allowed="further maps")
 
 
 def _seeded(section: SurfaceSection, seeds: tuple[int, ...]) -> list[SurfaceSection]:

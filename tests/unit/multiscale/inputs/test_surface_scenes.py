@@ -114,3 +114,28 @@ def test_further_maps_are_samples_like_seeds(tmp_path):
         np.testing.assert_allclose(one.heights, other.heights, rtol=1e-14, atol=1e-17)
     with pytest.raises(InputError, match=r"none.npy: law.samples: there is no such file"):
         setup(maps, samples=["none.npy"])
+
+
+def test_a_map_named_twice_hides_the_scatter(tmp_path):
+    """Copies of a file are found by their heights."""
+    heights = 1e-3 * np.random.default_rng(5).random((16, 16))
+    for name in ("one", "two", "copy"):
+        np.save(tmp_path / f"{name}.npy", heights + (1e-4 * heights**2 if name == "two" else 0.0))
+    data = {
+        "surface": {"file": "one.npy", "lengths": [1.0, 1.0], "height_unit": "um"},
+        "block": {"young_modulus": 4e3, "poisson_ratio": 0.2, "lengths": [5.0, 5.0]},
+        "load": {"pressure": 1.0},
+    }
+
+    def setup(*samples):
+        law = {"kind": "representative", "samples": list(samples)}
+        return make_setup(Scene.from_dict({**data, "law": law}, source=tmp_path / "scene.toml"))
+
+    assert len(setup("two.npy").samples[0].surfaces) == 2
+    for samples, text in (
+        (["one.npy"], r"law.samples = 'one.npy': has the heights of 'one.npy'"),
+        (["two.npy", "copy.npy"], r"law.samples = 'copy.npy': has the heights of 'one.npy', which"),
+        (["two.npy", "two.npy"], r"law.samples = 'two.npy': has the heights of 'two.npy', which"),
+    ):
+        with pytest.raises(InputError, match=text):
+            setup(*samples)

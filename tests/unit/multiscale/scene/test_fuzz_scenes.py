@@ -3,12 +3,14 @@
 import os
 import re
 import tomllib
+from time import process_time
 
 import pytest
 from helpers.scene_inputs import BASE, KEYS, damaged, odd_text, planned, put, ran, scenes, toml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import ClusterNodes
 from multiscale.scene.scene import Scene
 from multiscale.scene.scene_file import MOST_BYTES, parsed
@@ -104,6 +106,28 @@ def test_more_bombs(tmp_path):
         make_setup(Scene.load(path))
 
 
+def test_tiny_edges_below_a_summit_between_the_heights_are_counted_soon(tmp_path):
+    """No height of the grid lies above the plane, so that no node is known to be in contact."""
+    path = tmp_path / "between.toml"
+    data = put(put(BASE, "coupling.kind", "reference"), "reference.fine", "1 nm")
+    path.write_text(toml(put(data, "load", {"approach": "1 nm"})), encoding="utf-8")
+    scene = Scene.load(path)
+    surface = make_surface(scene)
+    assert surface.highest - surface.heights.max() > 1e-6
+    began = process_time()
+    with pytest.raises(InputError, match=r"reference.fine = 1.0\d*e-06: the reference needs about"):
+        make_setup(scene)
+    assert process_time() - began < 60.0  # layers as thin as the edges take many minutes
+
+
+def test_a_tilt_presses_an_edge_of_a_thin_block_to_nothing(tmp_path):
+    path = tmp_path / "edge.toml"
+    data = put(put(BASE, "coupling.kind", "concurrent"), "block.height", "20 um")
+    path.write_text(toml(put(data, "load", {"approach": "1 um", "tilt": [0.0, 0.1]})))
+    with pytest.raises(InputError, match=r"load.tilt = .*an edge of the body to nothing, 0.05 mm"):
+        make_setup(Scene.load(path))
+
+
 def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
     text = refused(tmp_path, "block.height", "1e9 km", kind="reference")
     assert "reference.fine = None: the reference needs about" in text
@@ -115,6 +139,8 @@ def test_block_of_a_kilometre_needs_no_layers_to_be_counted(tmp_path):
         ("load.approach", "1.1 mm", "[1.1]: presses the body to nothing (allowed: at most the"),
         ("load.approach", "1e-300 mm", "'1e-300 mm': is out of any scale (allowed: 1e-15 to 1e+15"),
         ("load.approach", 10**400, "…: is not finite"),
+        ("load.tilt", [1, 0], "load.tilt = [1.0, 0.0]: is too steep for the theory of small rot"),
+        ("load.tilt", [0, "-12 deg"], "load.tilt = [0.0, -0.20943951"),
         ("load.approach", "9**9**9**9 um", "'9**9**9**9 um': cannot be read as a quantity"),
         ("load.approach", "1 m^9^9^9", "'1 m^9^9^9': cannot be read as a quantity"),
         ("block.young_modulus", "(" * 90, "((': cannot be read as a quantity (allowed: a quantity"),
