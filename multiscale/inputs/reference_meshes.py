@@ -350,8 +350,8 @@ def _cubes(shape: RefinedShape) -> float:
             np.minimum(size, edge + shape.growth * away, out=size)
         return float(np.sum(size**-3.0))
 
-    # layers half as thick as the edges at their depth below the smallest, or a twentieth of it: tiny
-    # edges, which do not fit into any memory, would grow through 10⁵ layers and more
+    # layers half as thick as the edges at their depth below the smallest, or a twentieth of it:
+    # edges too tiny for any memory would grow through 10⁵ layers and more
     depths, total, least = [0.0], 0.0, min(edges)
     while depths[-1] < shape.height:
         grown = least + shape.growth * max(depths[-1] - 2.0 * least, 0.0)
