@@ -22,7 +22,7 @@ from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
-from multiscale.couplings import describe
+from multiscale.couplings import describe, validity
 from multiscale.couplings.cost import Work, cost_statement
 from multiscale.inputs.bodies import (
     FIELD_CELLS,
@@ -323,9 +323,9 @@ class Coupling(SceneParts, ABC):
         """Yield what a user should know about the validity of the scene."""
         known = self.plane_at_largest_load is not None
         size = self.largest_interference if known else roughness(self.surface).sq
-        yield from describe.surface_warnings(self, size)
+        yield from validity.of_surface(self, size)
         yield from self.contact_warnings()
-        yield from describe.output_warnings(self, cells=self.shows_cells)
+        yield from validity.of_output(self, cells=self.shows_cells)
         if self.has_body:
             yield from self.body_warnings()
         if self.decision is not None and self.decision.warning:

@@ -22,7 +22,7 @@ from geometry import Asperities, Control, InputError, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
-from multiscale.couplings import describe
+from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import NOT_WITH_FRICTION, Source
@@ -285,11 +285,11 @@ class MicroCoupling(PressedSurface):
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies."""
         if self.body.on_mesh:
-            yield from describe.mesh_warnings(self)
+            yield from validity.of_meshes(self)
             return
-        yield from describe.proportions(self)
+        yield from validity.proportions(self)
         if not self.scene.decomposed:
-            yield from describe.coarse_cells(self)
+            yield from validity.coarse_cells(self)
 
     @property
     def shows_cells(self) -> bool:

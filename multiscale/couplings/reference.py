@@ -16,7 +16,7 @@ import numpy as np
 
 from geometry import RefinedShape
 from micro import HalfSpaceModel
-from multiscale.couplings import describe
+from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from multiscale.couplings.cost import SET_UP_CYCLES, Work
 from multiscale.couplings.coupling import Meshes, Source
@@ -287,7 +287,7 @@ class ReferenceCoupling(PressedSurface):
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the block and of its meshes."""
         if not self.body.on_mesh:
-            yield from describe.proportions(self)
+            yield from validity.proportions(self)
         yield from self.body.notes
         yield from self.rough_meshes.warnings()
-        yield from describe.locking(self.body.poisson_ratio, self.rough_meshes.degree)
+        yield from validity.locking(self.body.poisson_ratio, self.rough_meshes.degree)

@@ -17,7 +17,7 @@ import numpy as np
 from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, on_body
-from multiscale.couplings import describe
+from multiscale.couplings import describe, validity
 from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import NOT_WITH_FRICTION, Meshes, Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
@@ -401,7 +401,7 @@ class RepresentativeCoupling(LawCoupling):
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
-        yield from describe.mesh_warnings(self)
+        yield from validity.of_meshes(self)
         side = math.sqrt(self.body.area)
         for region in self.samples:
             largest = max(max(surface.lengths) for surface in region.surfaces)

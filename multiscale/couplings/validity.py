@@ -1,0 +1,126 @@
+"""What a user should know about the validity of a scene: warnings that couplings share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from geometry.meshes.block import misalignment
+from multiscale.inputs.scene_parts import SceneParts
+from multiscale.readable import quantity
+from multiscale.scene.keys import bare_quantities
+
+
+def of_surface(parts: SceneParts, size: float) -> Iterator[str]:
+    """Yield what a user should know about the surface and the numbers of the scene.
+
+    Args:
+        parts: What is known of the scene.
+        size: What the interpolant may exceed the heights by a tenth of [mm].
+    """
+    rough_surface = parts.surface
+    yield from rough_surface.notes
+    if bare := list(bare_quantities(parts.scene.written)):
+        yield f"numbers without a unit: {', '.join(bare)}"
+    excess = rough_surface.highest - rough_surface.heights.max()
+    if not parts.zero and excess > 0.1 * size:
+        x, y = rough_surface.highest_point
+        yield (
+            "the approach counts from the interpolant's highest point, "
+            f"{quantity(excess, 'mm', 3)} above the highest of the given heights, at "
+            f"x = {x:.4g} mm, y = {y:.4g} mm: the heights are too coarse or too noisy there"
+        )
+
+
+def of_output(parts: SceneParts, *, cells: bool) -> Iterator[str]:
+    """Yield what of the requested output there will not be.
+
+    Args:
+        parts: What is known of the scene.
+        cells: Whether pressures of the surface's cells will be known.
+    """
+    output = parts.scene.output
+    if output.fields and not parts.has_body:
+        yield (
+            "output.fields: there is no block, and no fields are written; the analytic coupling "
+            "presses a half-space (a block has coupling.kind = 'concurrent', 'consistent', "
+            "'isolated' or 'reference')"
+        )
+    if output.figures == "all" and not cells:
+        yield (
+            "output.figures = 'all': no block.png is drawn, for no pressures of cells are known; "
+            "micro.model = 'half-space' has them, with laws where output.contact = 'last'"
+        )
+
+
+def of_meshes(parts: SceneParts) -> Iterator[str]:
+    """Yield what a user should know about bodies on meshes, or under laws of samples."""
+    for facts in filter(None, (parts.body, parts.counter)):
+        yield from facts.notes
+        yield from locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
+
+
+def proportions(parts: SceneParts) -> Iterator[str]:
+    """Yield what is doubtful of the proportions of a block."""
+    shape = parts.body.shape
+    assert shape is not None
+    widths = [side + 2.0 * shape.margin for side in parts.surface.lengths]
+    (least, most), high, height = sorted(widths), shape.height, ""
+    unequal = 3.0  # few mean such edges, and many forget a unit
+    if high > unequal * least:
+        height = "most of the approach may be the compression of the column below the surface"
+    elif least > unequal * high:
+        height = "the fixed bottom is near, and stiffens what lies above it"
+    if height:
+        ratio = max(high / least, least / high)
+        yield (
+            f"the block is {high:g} mm high and {least:g} mm wide, a ratio of {ratio:.3g}: "
+            f"{height}; block.height is the shorter side when not given"
+        )
+    if most > unequal * least:
+        yield (
+            f"the block is {widths[0]:g} × {widths[1]:g} mm wide, a ratio of {most / least:.3g}: "
+            "are these the lengths along x and y of the whole map?"
+        )
+
+
+def locking(
+    poisson_ratio: float, degree: int, what: str = "block", take: str = ""
+) -> Iterator[str]:
+    """Yield a warning where linear elements lock.
+
+    Two by two patches on 8 × 8 × 6 trilinear cells are 1.6 % too stiff at a Poisson's ratio of
+    0.45, 6 % at 0.49 and 57 % at 0.4999. As many nodes of quadratic cells are 0.5, 1.1 and 1.5 %
+    too stiff.
+
+    Args:
+        poisson_ratio: Poisson's ratio of the body.
+        degree: Degree of the displacements.
+        what: The body.
+        take: What does not lock; by default what blocks can have.
+    """
+    if degree == 1 and poisson_ratio > 0.45:
+        take = take or (
+            "block.element = 'Q2' or 'P2', or coupling.compliance = 'decomposed', whose elements "
+            "are of high order"
+        )
+        yield (
+            f"linear elements lock as Poisson's ratio comes near 0.5 (here {poisson_ratio:g}): the "
+            f"{what} is too stiff by several per cent or more; take {take}"
+        )
+
+
+def coarse_cells(parts: SceneParts) -> Iterator[str]:
+    """Yield what is doubtful of the cells of a meshed block under its patches."""
+    shape = parts.body.shape
+    assert shape is not None
+    counts = zip(shape.cells[:2], parts.patches.grid, strict=True)
+    cells = min(cells / patches for cells, patches in counts)
+    if cells * shape.degree < 4:
+        yield (
+            f"{cells:.3g} cells along a patch: fewer than four linear (two quadratic) ones "
+            "make the block stiffer by several per cent under a patch's pressure; refine "
+            "block.cells"
+        )
+    yield from locking(parts.materials.first.poisson_ratio, shape.degree)
+    if sentence := misalignment(shape, parts.patches):
+        yield sentence
