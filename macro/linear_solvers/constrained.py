@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_array
 
-from macro.linear_solvers.node_matrices import coupled_nodes, dofs_of, node_submatrix
+from macro.linear_solvers.node_matrices import (
+    coupled_nodes,
+    dofs_of,
+    node_submatrix,
+    nodes_beside,
+)
 from macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
 from support.errors import NotConverged
 
@@ -212,7 +217,7 @@ class _Neighbourhood:
 
     def __init__(self, matrix: PETSc.Mat, dofs: Indices, nodes: Indices) -> None:
         self.dofs = dofs
-        neighbours = _neighbours(matrix, nodes)
+        neighbours = nodes_beside(matrix, nodes)
         self.coupled = dofs_of(neighbours)
         self.rows = node_submatrix(matrix, nodes, neighbours)[np.isin(dofs_of(nodes), dofs)]
         square = csr_array(self.rows[:, np.searchsorted(self.coupled, dofs)])
@@ -235,14 +240,6 @@ def _nearby(
     """Return the free unknowns within some layers of constrained ones, and all nodes there."""
     nodes = np.unique(constrained // 3)
     for _ in range(layers):
-        nodes = _neighbours(matrix, nodes)
+        nodes = nodes_beside(matrix, nodes)
     dofs = dofs_of(nodes) if layers else constrained
     return dofs[~(np.isin(dofs, constrained) | np.isin(dofs // 3, excluded))], nodes
-
-
-def _neighbours(matrix: PETSc.Mat, nodes: Indices) -> Indices:
-    """Return the nodes that have entries in the rows of some nodes, ascending."""
-    if not len(nodes):
-        return nodes
-    every = np.arange(matrix.getSize()[1] // 3)
-    return np.unique(node_submatrix(matrix, nodes, every).indices // 3).astype(np.intp)

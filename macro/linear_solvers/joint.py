@@ -70,7 +70,7 @@ def _two_grids(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened
     grid = CoarserGrid(transfer, with_springs(matrices, springs))
     springs.destroy()
     options = quadratic_options(_hardest(bodies))
-    finest = stiffened.product, stiffened.diagonal_blocks()
+    finest = stiffened.product, stiffened.block_diagonal()
     return linear_solver(stiffness, [grid], options, finest=finest)
 
 

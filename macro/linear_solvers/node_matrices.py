@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from macro.compat import call
 from macro.linear_solvers.options import shell
 
 Indices = NDArray[np.intp]
@@ -18,7 +20,8 @@ Indices = NDArray[np.intp]
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:
     """Return the part of a matrix that belongs to some nodes.
 
-    Whole nodes are taken because matrices of PETSc's type ``baij`` give no smaller parts.
+    Whole nodes are taken because matrices of PETSc's type ``baij`` give no smaller parts. Those of
+    type ``sbaij`` give square ones alone, so that rows and columns had better be the same or few.
 
     Args:
         matrix: The matrix; of this process alone, or of all ranks.
@@ -28,14 +31,41 @@ def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_ma
     Note:
         Collective over the ranks of the matrix.
     """
-    rows_of, columns_of = (
-        PETSc.IS().createBlock(3, nodes.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        for nodes in (rows, columns)
-    )
-    part = matrix.createSubMatrices(rows_of, columns_of)[0]
+    half = matrix.getType().endswith("sbaij")
+    nodes = (np.union1d(rows, columns),) * 2 if half else (rows, columns)
+    sets = [
+        PETSc.IS().createBlock(3, each.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        for each in nodes
+    ]
+    (part,) = matrix.createSubMatrices(*sets)
+    if half:
+        part.convert("aij")
     starts, places, entries = part.getValuesCSR()
     part.destroy()
-    return csr_matrix((entries, places, starts), shape=(3 * len(rows), 3 * len(columns)))
+    whole = csr_matrix((entries, places, starts), shape=[3 * len(each) for each in nodes])
+    if not half:
+        return whole
+    down, along = (dofs_of(np.searchsorted(nodes[0], each)) for each in (rows, columns))
+    return whole[down][:, along]
+
+
+def nodes_beside(matrix: PETSc.Mat, nodes: Indices) -> Indices:
+    """Return the nodes that have entries in the rows of some nodes, ascending.
+
+    There, and nowhere else, the product of the matrix with random numbers at the nodes is not zero.
+
+    Args:
+        matrix: Symmetric, of this process alone.
+        nodes: The nodes.
+    """
+    numbers, product = matrix.createVecs()
+    entries = dofs_of(nodes)
+    numbers.array[entries] = np.random.default_rng(1).uniform(1.0, 2.0, len(entries))
+    matrix.mult(numbers, product)
+    beside = np.flatnonzero(product.array_r.reshape(-1, 3).any(axis=1))
+    for part in (numbers, product):  # PETSc keeps objects that Python drops
+        part.destroy()
+    return beside
 
 
 def coupled_nodes(matrix: PETSc.Mat) -> Indices:
@@ -241,20 +271,55 @@ class Stiffened:
         """Return the sum with entries, which takes as much memory as K."""
         return with_springs(self._parts, self.springs)
 
-    def diagonal_blocks(self) -> PETSc.Mat:
+    def block_diagonal(self) -> PETSc.Mat:
         """Return the 3 × 3 blocks of the nodes, a matrix without others."""
-        inverses = [np.reshape(part.invertBlockDiagonal(), (-1, 3, 3)) for part in self._parts]
-        blocks = np.linalg.inv(np.concatenate(inverses))
+        blocks = np.concatenate([diagonal_blocks(part) for part in self._parts])
         starts, columns, entries = self.springs.getDiagonalBlock().getValuesCSR()
         rows = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
         own = rows // 3 == columns // 3
         rows, columns = rows[own], columns[own]
         blocks[rows // 3, rows % 3, columns % 3] += entries[own]
-        first, count = self.springs.getOwnershipRange()[0] // 3, len(blocks)
-        pattern = np.arange(count + 1, dtype=PETSc.IntType), first + np.arange(count)
-        csr = (pattern[0], pattern[1].astype(PETSc.IntType), blocks.ravel())
-        size = (3 * count, None)
-        return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=self.springs.comm)
+        return block_diagonal(blocks, self.springs.comm)
+
+
+def diagonal_blocks(matrix: PETSc.Mat) -> Array:
+    """Return the 3 × 3 blocks on the diagonal of a matrix, of this rank's nodes, shape (n, 3, 3).
+
+    Args:
+        matrix: Of type ``aij``, ``baij`` or ``sbaij``; positive definite blocks.
+
+    Note:
+        Collective.
+    """
+    if not matrix.getType().endswith("sbaij"):
+        return np.linalg.inv(np.reshape(matrix.invertBlockDiagonal(), (-1, 3, 3)))
+    own = matrix.getDiagonalBlock()
+    starts, _ = own.getRowIJ(compressed=True)
+    entries = ctypes.POINTER(ctypes.c_double)()
+    call("MatSeqSBAIJGetArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
+    if not len(starts) or not starts[-1]:
+        return np.zeros((0, 3, 3))
+    blocks = np.ctypeslib.as_array(entries, (int(starts[-1]), 3, 3))[starts[:-1]]
+    call("MatSeqSBAIJRestoreArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
+    return np.asarray(blocks)
+
+
+def block_diagonal(blocks: Array, comm: PETSc.Comm) -> PETSc.Mat:
+    """Return the matrix of 3 × 3 blocks on the diagonal, of type ``baij``.
+
+    Args:
+        blocks: Those of this rank's nodes, shape (n, 3, 3).
+        comm: Communicator of the matrix.
+
+    Note:
+        Collective.
+    """
+    count = len(blocks)
+    first = comm.tompi4py().exscan(count) or 0
+    starts, columns = np.arange(count + 1), first + np.arange(count)
+    csr = (starts.astype(PETSc.IntType), columns.astype(PETSc.IntType), blocks.ravel())
+    size = (3 * count, None)
+    return PETSc.Mat().createBAIJ((size, size), 3, csr=csr, comm=comm)
 
 
 def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:
@@ -269,7 +334,8 @@ def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:
     """
     structure = PETSc.Mat.Structure
     if len(parts) == 1:
-        matrix = parts[0].copy()
+        half = parts[0].getType().endswith("sbaij")
+        matrix = parts[0].convert("aij", PETSc.Mat()) if half else parts[0].copy()
         matrix.axpy(1.0, springs, structure=structure.SUBSET_NONZERO_PATTERN)
         matrix.setNearNullSpace(parts[0].getNearNullSpace())
         return matrix

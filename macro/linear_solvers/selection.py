@@ -57,7 +57,13 @@ from scipy import sparse
 
 from macro import compat
 from macro.linear_solvers.multigrid import coarser_grids
-from macro.linear_solvers.node_matrices import Stiffened, for_displacements, with_springs
+from macro.linear_solvers.node_matrices import (
+    Stiffened,
+    block_diagonal,
+    diagonal_blocks,
+    for_displacements,
+    with_springs,
+)
 from macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     DIRECT_DEFAULTS,
@@ -156,9 +162,9 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
         return linear_solver(matrix, coarser_grids(lattice, matrix, body.free), smoother)
     modes = None if stiffened is None else body.solver.modes
     if lattice is None and body.degree == 2 and requested in ("", "mg"):
-        springs, finest = None, None
+        springs, finest = None, (matrix, block_diagonal(diagonal_blocks(matrix), matrix.comm))
         if stiffened is not None:
-            springs, finest = stiffened.springs, (stiffened.product, stiffened.diagonal_blocks())
+            springs, finest = stiffened.springs, (stiffened.product, stiffened.block_diagonal())
         grid = vertex_grid(body.space, body.linear, body.free, springs)
         solver = linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
         if not PETSc.Options(PREFIX).hasName("mg_coarse_pc_type"):

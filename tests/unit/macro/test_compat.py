@@ -5,11 +5,16 @@ import weakref
 
 import numpy as np
 import pytest
+from helpers.body_meshes import box, standing
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from macro import compat
+from geometry import PatchGrid
+from macro import Material, compat
 from support.errors import InputError
+
+SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
+WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
@@ -85,3 +90,19 @@ def test_what_python_has_dropped_is_freed():
     del matrix, context
     compat.collect_garbage(vector.comm)
     assert alive() is None  # PETSc held the only reference
+
+
+@pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])
+def test_half_of_a_symmetric_matrix_is_all_of_it(cell):
+    body = standing(box((0, 0, -0.5), (1, 1, 0), (3, 2, 2), cell), SOFT, WHOLE, 2).body
+    half, form = body.stiffness, compat.compile_form(body.form)
+    whole = compat.assemble_matrix(form, body.conditions, "baij")
+    x = whole.createVecRight()
+    x.array[:] = np.random.default_rng(3).standard_normal(x.local_size)
+    expected = (whole * x).array_r
+    # round-off of some hundred terms
+    np.testing.assert_allclose((half * x).array_r, expected, rtol=0, atol=1e-13 * expected.max())
+    facts, nodes = half.getInfo(), body.owned_dofs // 3
+    assert facts["nz_used"] == (whole.getInfo()["nz_used"] + 9 * nodes) / 2  # with the diagonal
+    assert facts["nz_allocated"] == facts["nz_used"]
+    assert facts["mallocs"] == 0

@@ -39,7 +39,7 @@ def test_diagonal_blocks_are_those_of_the_sum(stiffened):
     every = np.arange(stiffened.product.size[0], dtype=PETSc.IntType)
     blocks, whole = (
         of.convert("aij", PETSc.Mat()).getValues(every, every)
-        for of in (stiffened.diagonal_blocks(), stiffened.assembled())
+        for of in (stiffened.block_diagonal(), stiffened.assembled())
     )
     same_node = every[:, None] // 3 == every // 3
     np.testing.assert_allclose(blocks, np.where(same_node, whole, 0.0), atol=1e-11 * whole.max())
