@@ -66,5 +66,35 @@ def mode_means(borders: ArrayLike, length: float, count: int) -> Array:
     return np.asarray(np.diff(integrals, axis=1) / np.diff(t) * _norms(count))
 
 
+def modes_within(
+    lengths: tuple[float, float],
+    whole: tuple[float, float],
+    origin: tuple[float, float],
+    count: int,
+) -> Array:
+    """Return the modes of a rectangle in those of a part of it.
+
+    On a part of the rectangle its modes are polynomials of the same degrees, so that nothing is
+    lost.
+
+    Args:
+        lengths: Sides of the part, whose corner is the origin of the coordinates [mm].
+        whole: Sides of the rectangle [mm].
+        origin: Corner of the rectangle [mm].
+        count: Number of modes K along a side.
+
+    Returns:
+        Means over the part of its modes times those of the rectangle, shape (K², K²).
+    """
+    nodes, weights = legendre.leggauss(count)
+    share = 0.5 * (1.0 + nodes)
+    along = [
+        (0.5 * weights * mode_values(share * inner, inner, count))
+        @ mode_values(share * inner - start, length, count).T
+        for inner, start, length in zip(lengths, origin, whole, strict=True)
+    ]
+    return np.kron(*along)
+
+
 def _norms(count: int) -> Array:
     return np.asarray(np.sqrt(2.0 * np.arange(count) + 1.0)[:, None])

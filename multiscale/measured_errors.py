@@ -104,6 +104,7 @@ class ErrorProbe:
         start: Start | None = None,
         turns: bool = False,
         stiffness: bool = False,
+        behind: float | None = None,
     ) -> MeasuredErrors:
         """Measure the errors of the force of one load step.
 
@@ -115,6 +116,7 @@ class ErrorProbe:
             turns: Whether the plane was free to tilt. Laws are then compared with a solution whose
                 plane is free. The other causes are measured under the plane as it is.
             stiffness: Whether the stiffness is requested.
+            behind: Force of the contact that laws stand for, where friction changes it [N].
 
         Raises:
             NotConverged: When one of the contact problems cannot be solved.
@@ -123,7 +125,7 @@ class ErrorProbe:
         if self.by_laws:
             free = Control(approach=approach, tilt=None if turns else tilt)
             found = self.on_body(self.model, self.order).press(free, start=start)
-            parts["laws"] = abs(force - found.force)
+            parts["laws"] = abs(force - (found.force if behind is None else behind))
             force, tilt, start = found.force, found.plane.tilt, found.guess
         problems = _Problems(self, Control(approach=approach, tilt=tilt), start)
         parts |= problems.body_error()
@@ -272,6 +274,7 @@ def checked(
     comm: Any,
     *,
     start: Start | None = None,
+    behind: float | None = None,
 ) -> LoadStep:
     """Return a load step with its errors measured; rank 0 solves for all.
 
@@ -281,6 +284,7 @@ def checked(
         load_history: The loads.
         comm: MPI communicator; None for this process alone.
         start: The solution of the load step on rank 0, where the run has it.
+        behind: See `ErrorProbe.measure`.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
@@ -293,7 +297,7 @@ def checked(
     plane = step.force_N, step.approach_mm, step.tilt
 
     def measured() -> MeasuredErrors:
-        return probe.measure(*plane, start=start, turns=turns, stiffness=by_force)
+        return probe.measure(*plane, start=start, turns=turns, stiffness=by_force, behind=behind)
 
     found = on_root_alone(comm, measured)
     return with_errors(step, found, by_force=by_force)

@@ -23,6 +23,7 @@ from dataclasses import replace
 import numpy as np
 
 from geometry import Control, NotConverged
+from geometry.contact_state import ContactState
 from geometry.shear_state import ShearControl, ShearState
 from micro import HalfSpaceModel
 from micro.friction.coupled import press_coupled
@@ -43,7 +44,11 @@ _NORMAL = ("body", "slopes", ZERO)
 
 
 def shear_errors(
-    probe: ErrorProbe, friction: FrictionModel, steps: Sequence[LoadStep], history: LoadHistory
+    probe: ErrorProbe,
+    friction: FrictionModel,
+    steps: Sequence[LoadStep],
+    history: LoadHistory,
+    behind: ShearState | None = None,
 ) -> dict[str, float]:
     """Measure the errors of the shear of the last of some load steps.
 
@@ -52,30 +57,38 @@ def shear_errors(
         friction: Friction on the cells of the run.
         steps: All load steps up to that one.
         history: The loads.
+        behind: The shear of the cells behind laws, see `behind_laws`, where the load steps come
+            from laws; all that differs is then an error by the laws.
 
     Returns:
         By cause the error of the shear force where the shift is prescribed [N], of the shift where
         the shear force is [mm]; infinite where it is not measured.
     """
-    step, by_shift = steps[-1], history.shear_key == "shear"
+    step, by_shift = steps[-1], history.shear_key != "shear_force"
     grid = probe.model.surface.grid
     if min(grid) < _FEWEST_CELLS:
         return {"grid": math.inf}
     half, quarter = ((grid[0] // n, grid[1] // n) for n in (2, 4))
-    path = [_control(one, history) for one in turning_points(steps, by_shift=by_shift)]
+    if behind is not None:
+        friction = replace(friction, coupled=True)
+    path = _path(steps, history, every_load=behind is not None)
     normal, coarse = _resampled(probe, friction, half)
 
     def found(model: FrictionModel, contact: HalfSpaceModel = normal) -> Array:
         try:
-            state = _gone(contact, model, path)
+            return _of(_gone(contact, model, path)[1], by_shift=by_shift)
         except NotConverged:
             return np.full(2, np.inf)
-        return np.array(state.force if by_shift else state.shift)
 
     own, again = _response(step, by_shift=by_shift), found(coarse)
+    parts = {}
+    if behind is not None:
+        cells = _of(behind, by_shift=by_shift)
+        parts["laws"] = _apart(own, cells)
+        own = cells
     coarser, rough = _resampled(probe, friction, quarter)
     twice = _apart(found(rough, coarser), again)
-    parts = {"grid": _grid_error(_apart(again, own), twice)}
+    parts["grid"] = _grid_error(_apart(again, own), twice)
     if coarse.body is not None:
         few = coarse.body.fewer(math.ceil(0.75 * coarse.body.count))
         parts["body"] = _apart(found(replace(coarse, body=few)), again)
@@ -85,6 +98,48 @@ def shear_errors(
         others = sum(error for cause, error in step.errors if cause in _NORMAL)
         parts["normal force"] = float(np.hypot(*own)) * others / step.force_N
     return parts
+
+
+def behind_laws(
+    probe: ErrorProbe, friction: FrictionModel, steps: Sequence[LoadStep], history: LoadHistory
+) -> tuple[ContactState, ShearState]:
+    """Return the contact that laws with friction stand for, by going their path on cells.
+
+    Pressures and tractions see each other there, as they do on the meshed body of the laws.
+
+    Args:
+        probe: The normal contact, on the cells that the laws were made from.
+        friction: Friction on these cells.
+        steps: All load steps up to the one that is wanted.
+        history: The loads.
+
+    Returns:
+        The contact under the approach of the load step, and the shear under its load.
+
+    Raises:
+        NotConverged: When a contact problem cannot be solved.
+    """
+    normal, cells = _resampled(probe, friction, probe.model.surface.grid)
+    cells = replace(cells, coupled=True)
+    *path, last = _path(steps, history, every_load=True)
+    before = _gone(normal, cells, path) if path else None
+    state, shear = _gone(normal, cells, [last], before)
+    if last.force is not None:
+        same = replace(last, force=None, approach=steps[-1].approach_mm)
+        state, _ = _gone(normal, cells, [same], before)
+    return state, shear
+
+
+def _of(shear: ShearState, *, by_shift: bool) -> Array:
+    """Return the shear force where the shift is prescribed, else the shift."""
+    return np.array(shear.force if by_shift else shear.shift)
+
+
+def _path(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
+    """Return what the load steps prescribe that the path of a shear cannot do without."""
+    by_shift = history.shear_key != "shear_force"
+    kept = turning_points(steps, by_shift=by_shift, every_load=every_load)
+    return [_control(one, history) for one in kept]
 
 
 def _resampled(
@@ -105,7 +160,9 @@ def _grid_error(half: float, quarter: float) -> float:
     return max(_HALF * half, _QUARTER * quarter)
 
 
-def turning_points(steps: Sequence[LoadStep], *, by_shift: bool) -> list[LoadStep]:
+def turning_points(
+    steps: Sequence[LoadStep], *, by_shift: bool, every_load: bool = False
+) -> list[LoadStep]:
     """Return the load steps that the path of a shear cannot do without.
 
     Those are left out that lie on a straight way of the shear under one normal load, and those of a
@@ -114,18 +171,22 @@ def turning_points(steps: Sequence[LoadStep], *, by_shift: bool) -> list[LoadSte
     Args:
         steps: The load steps.
         by_shift: Whether the shift is prescribed, and not the shear force.
+        every_load: Whether rising loads count before any shear, as on laws, which slip under them.
     """
     kept: list[LoadStep] = []
     for step, after in zip(steps, [*steps[1:], None], strict=True):
-        if after is None or not _between(kept[-1] if kept else None, step, after, by_shift):
+        before = kept[-1] if kept else None
+        if after is None or not _between(before, step, after, by_shift, every_load):
             kept.append(step)
     return kept
 
 
-def _between(before: LoadStep | None, step: LoadStep, after: LoadStep, by_shift: bool) -> bool:
+def _between(
+    before: LoadStep | None, step: LoadStep, after: LoadStep, by_shift: bool, every_load: bool
+) -> bool:
     here, there = _prescribed(step, by_shift), _prescribed(after, by_shift)
     if not (here.any() or there.any()):
-        return step.force_N <= after.force_N
+        return not every_load and step.force_N <= after.force_N
     if before is None or not all(_same_load(step, one) for one in (before, after)):
         return False
     first, second = here - _prescribed(before, by_shift), there - here
@@ -153,7 +214,8 @@ def _response(step: LoadStep, *, by_shift: bool) -> Array:
 
 def _control(step: LoadStep, history: LoadHistory) -> Control:
     """Return what a load step prescribed."""
-    by_shift, tilt = history.shear_key == "shear", None if history.slopes is None else step.tilt
+    by_shift = history.shear_key != "shear_force"
+    tilt = None if history.slopes is None else step.tilt
     x, y = (float(one) for one in _prescribed(step, by_shift))
     shear = ShearControl(shift=(x, y)) if by_shift else ShearControl(force=(x, y))
     if history.quantity_in(step.stage) == "force":
@@ -161,20 +223,26 @@ def _control(step: LoadStep, history: LoadHistory) -> Control:
     return Control(approach=step.approach_mm, tilt=tilt, shear=shear)
 
 
-def _gone(normal: HalfSpaceModel, friction: FrictionModel, path: Sequence[Control]) -> ShearState:
-    """Return the shear at the end of a path from nothing."""
-    shear, start, last = None, None, None
+def _gone(
+    normal: HalfSpaceModel,
+    friction: FrictionModel,
+    path: Sequence[Control],
+    before: tuple[ContactState, ShearState] | None = None,
+) -> tuple[ContactState, ShearState]:
+    """Return the contact and its shear at the end of a path, from nothing or from those before."""
+    last = None
     for control in path:
         assert control.shear is not None
+        start, shear = (None, None) if before is None else (before[0].start, before[1])
         if friction.coupled:
             state, shear = press_coupled(normal, friction, control, shear, start=start)
         else:
             if last != (load := replace(control, shear=None)):
                 state, last = normal.press(control, start=start), load
             shear = friction.advance(shear, state.pressures, control.shear)
-        start = state.start
-    assert shear is not None
-    return shear
+        before = state, shear
+    assert before is not None
+    return before
 
 
 def _apart(one: Array, other: Array) -> float:

@@ -12,7 +12,7 @@ Theory: section 6 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -61,6 +61,10 @@ class HalfSpaceFields(Protocol):
 
     def modes(self) -> tuple[Array, Array]:
         """Return displacements (K², K²) [mm/N] and stresses (3, K², K²) [1/mm²] in modes."""
+        ...
+
+    def displacement_modes(self) -> Array:
+        """Return displacements along x, y and downwards in modes, shape (3, K², K²) [mm/N]."""
         ...
 
 
@@ -147,6 +151,68 @@ def mesh_face_compliance(
     return _gathered(responses / area, area, material, fields)
 
 
+def mesh_face_tractions(
+    body: ElasticBody,
+    facets: ContactFacets,
+    rectangle: PatchGrid,
+    material: Material,
+    count: int,
+    fields: Sequence[HalfSpaceFields] | None,
+) -> Array:
+    """Solve for the displacements of a rectangle on a body's face by every mode of traction.
+
+    Args:
+        body: The body.
+        facets: Facets of its contact face, in its frame.
+        rectangle: The rectangle as one patch, in that frame.
+        material: Elastic constants under the rectangle.
+        count: Modes K along a side of the rectangle.
+        fields: The half-space of that material under modes along x, along y and downwards; None to
+            load the mesh by the modes themselves, see `mesh_face_compliance`.
+
+    Returns:
+        Displacements along x, along y and downwards by tractions likewise, in modes: symmetric,
+        shape (3, 3, K², K²) [mm/N]; the same on every rank.
+
+    Raises:
+        NotConverged: When a linear solve fails.
+
+    Note:
+        Collective. One solve for each of the 3 K² modes.
+    """
+    moments = FaceMoments(body, facets, rectangle, count)
+    corrections = [_Corrections(body, facets, rectangle, material, field) for field in fields or ()]
+    loads = _InTurn(corrections or [_Tractions(moments, axis) for axis in range(3)], count**2)
+    total = np.zeros((3, 3, count**2, count**2))
+    for number, values in _solutions(body, loads, 3 * count**2):
+        axis, mode = divmod(number, count**2)
+        moved = body.function(values)
+        if corrections:
+            moved.x.array[:] += corrections[axis].prescribed(mode)
+        total[:, axis, :, mode] = moments.displacements(moved)
+    total /= float(np.prod(rectangle.lengths))
+    if fields is not None:
+        total += np.stack([field.displacement_modes() for field in fields], axis=1)
+    return np.asarray(0.5 * (total + total.transpose(1, 0, 3, 2)))
+
+
+def seen_from_behind(tractions: Array) -> Array:
+    """Return displacements by tractions of a counter-body's face as the first body has them.
+
+    Tractions on both bodies are opposite, and displacements are those of one against the other. In
+    the counter-body's own frame, which is turned about the y axis, those along x and into the body
+    are alike, and those along y opposite.
+
+    Args:
+        tractions: What `mesh_face_tractions` returned in that frame, with x counted from the other
+            end of the rectangle.
+    """
+    count = round(tractions.shape[-1] ** 0.5)
+    odd = np.kron((-1.0) ** np.arange(count), np.ones(count))
+    ways = np.array([1.0, -1.0, 1.0])
+    return np.asarray(np.einsum("a,b,m,n->abmn", ways, ways, odd, odd) * tractions)
+
+
 def _gathered(
     responses: Array, area: float, material: Material, fields: HalfSpaceFields | None
 ) -> FaceCompliance:
@@ -160,6 +226,34 @@ def _gathered(
     work = xx.T @ (xx - nu * yy) + yy.T @ (yy - nu * xx) + 2.0 * (1.0 + nu) * xy.T @ xy
     growth = np.eye(len(normal)) / area / modulus - area * (work / modulus)
     return FaceCompliance.of(normal, growth, stresses)
+
+
+class _Tractions:
+    """Modes of traction along an axis, as loads of the mesh."""
+
+    def __init__(self, moments: FaceMoments, axis: int) -> None:
+        self._moments, self._axis = moments, axis
+
+    def load(self, mode: int) -> Array:
+        """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
+        return self._moments.load(mode, self._axis)
+
+
+class _InTurn:
+    """Modes along three axes in turn, as loads of the mesh.
+
+    Args:
+        parts: The loads by axis.
+        count: Modes of each.
+    """
+
+    def __init__(self, parts: Sequence[_Tractions | _Corrections], count: int) -> None:
+        self._parts, self._count = parts, count
+
+    def load(self, number: int) -> Array:
+        """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
+        axis, mode = divmod(number, self._count)
+        return self._parts[axis].load(mode)
 
 
 class _Corrections:
@@ -261,7 +355,7 @@ class _Corrections:
 
 
 def _solutions(
-    body: ElasticBody, loads: FaceMoments | _Corrections, count: int
+    body: ElasticBody, loads: FaceMoments | _InTurn | _Corrections, count: int
 ) -> Iterator[tuple[int, Array]]:
     """Yield every mode and its displacements, this rank's owned ones."""
     free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()

@@ -8,6 +8,7 @@ Theory: sections 5 and 6 of ``docs/theory.md``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -186,28 +187,51 @@ class FaceMoments:
         local = np.stack([self._modes @ (part @ values) for part in self._operators])
         return np.asarray(self._body.comm.allreduce(local) / self._area)
 
-    def load(self, mode: int) -> Array:
-        """Return the nodal forces of a mode of pressure at this rank's owned dofs [N]."""
-        return compat.sum_of_ranks(self._body.space, self._operators[0].T @ self._modes[mode])
+    def displacements(self, displacement: Any) -> Array:
+        """Return the same of the displacements along x, along y and into the body, (3, K²) [mm].
+
+        Args:
+            displacement: dolfinx Function, ghosts up to date [mm].
+        """
+        values = displacement.x.array
+        local = np.stack([self._modes @ (part @ values) for part in self._components])
+        return np.asarray(self._body.comm.allreduce(local) / self._area)
+
+    def load(self, mode: int, axis: int = 2) -> Array:
+        """Return the nodal forces of a mode of traction at this rank's owned dofs [N].
+
+        Args:
+            mode: The mode.
+            axis: 0 along x, 1 along y, 2 into the body, as pressures are.
+        """
+        return compat.sum_of_ranks(self._body.space, self._components[axis].T @ self._modes[mode])
+
+    @cached_property
+    def _components(self) -> tuple[csr_matrix, ...]:
+        """From nodal values to displacements along x, along y and into the body at the points."""
+        axes, values = self._frame.axes, self.points.values[..., None]
+        return tuple(self._matrices([values * axes[0], values * axes[1], -values * axes[2]]))
 
     @cached_property
     def _operators(self) -> tuple[csr_matrix, ...]:
         """From nodal values to displacements into the body and strains at the points."""
-        points, axes = self.points, self._frame.axes
-        slopes = self._slopes()
+        axes, slopes = self._frame.axes, self._slopes()
         parts = [
-            -points.values[..., None] * axes[2],
             *(slopes[..., a : a + 1] * axes[a] for a in (0, 1)),
             0.5 * (slopes[..., :1] * axes[1] + slopes[..., 1:] * axes[0]),
         ]
+        return (self._components[2], *self._matrices(parts))
+
+    def _matrices(self, parts: list[Array]) -> Iterator[csr_matrix]:
+        """Yield sums of nodal values at the points, weighted by parts of shape (n, m, 3)."""
+        points = self.points
         columns = (3 * points.nodes[..., None] + np.arange(3)).reshape(
             len(points.x), 3 * points.nodes.shape[1]
         )
         starts = columns.shape[1] * np.arange(len(points.x) + 1)
         size = len(points.x), 3 * len(self._body.space.tabulate_dof_coordinates())
-        return tuple(
-            csr_matrix((part.ravel(), columns.ravel(), starts), shape=size) for part in parts
-        )
+        for part in parts:
+            yield csr_matrix((part.ravel(), columns.ravel(), starts), shape=size)
 
     def _slopes(self) -> Array:
         """Return the slopes of the basis functions along both axes of the face, (n, m, 2)."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import PatchGrid
-from geometry.legendre_modes import mode_means, mode_values
+from geometry.legendre_modes import mode_means, mode_values, modes_within
 from micro.boundary_elements.grid_compliance import CellGrid
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
@@ -109,21 +109,12 @@ class BodyModes:
     def within(self, lengths: tuple[float, float]) -> BodyModes:
         """Return the compliance of a rectangle of the top, in modes of its own.
 
-        On a part of the top its modes are polynomials of the same degrees, so that nothing is lost.
-
         Args:
             lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
         """
         if lengths == self.lengths and self.origin == (0.0, 0.0):
             return self
-        nodes, weights = np.polynomial.legendre.leggauss(self.count)
-        part = 0.5 * (1.0 + nodes)
-        along = [
-            (0.5 * weights * mode_values(part * inner, inner, self.count))
-            @ mode_values(part * inner - start, whole, self.count).T
-            for inner, start, whole in zip(lengths, self.origin, self.lengths, strict=True)
-        ]
-        change = np.kron(*along)
+        change = modes_within(lengths, self.lengths, self.origin, self.count)
 
         def changed(matrix: Array) -> Array:
             found = change @ matrix @ change.T

@@ -1,4 +1,4 @@
-"""Displacements and stresses in a half-space under Legendre modes of pressure on a rectangle.
+"""Displacements and stresses in a half-space under Legendre modes of traction on a rectangle.
 
 A point force 2π on the half-space z > 0 makes, with ρ² = x² + y² + z²,
 
@@ -6,7 +6,15 @@ A point force 2π on the half-space z > 0 makes, with ρ² = x² + y² + z²,
     σ_xx = (1 − 2ν) [z/ρ³ − 1/(ρ (ρ + z)) + x² h] − 3 x² z/ρ⁵,   h = (2 ρ + z)/(ρ³ (ρ + z)²),
     σ_xy = (1 − 2ν) x y h − 3 x y z/ρ⁵,   σ_xz = −3 x z²/ρ⁵,   σ_zz = −3 z³/ρ⁵,
 
-and with x and y exchanged. Integrals over the rectangle are split at its point nearest to the one
+and with x and y exchanged. One along x makes (Cerruti), with a = 1/(ρ + z),
+
+    u_x = (1 + ν)/E [1/ρ + x²/ρ³ + (1 − 2ν) (a − x² a²/ρ)],
+    u_y = (1 + ν)/E [x y/ρ³ − (1 − 2ν) x y a²/ρ],   u_z = (1 + ν)/E [x z/ρ³ + (1 − 2ν) x a/ρ],
+    σ_xx = (1 − 2ν) [x/ρ³ − 3 x a²/ρ + x³ k] − 3 x³/ρ⁵,   k = a²/ρ³ + 2 a³/ρ²,
+    σ_yy = (1 − 2ν) [x/ρ³ − x a²/ρ + x y² k] − 3 x y²/ρ⁵,   σ_zz = −3 x z²/ρ⁵,
+    σ_xy = (1 − 2ν) [x² y k − y a²/ρ] − 3 x² y/ρ⁵,   σ_xz = −3 x² z/ρ⁵,   σ_yz = −3 x y z/ρ⁵.
+
+Integrals over the rectangle are split at its point nearest to the one
 where the fields are wanted. Along either axis x = d sinh t, with d the distance, makes the
 integrand smooth, so that Gauss' rules of t converge fast however close the point is.
 
@@ -18,7 +26,7 @@ distance s from the side, over a length ℓ on which they vanish likewise,
     H₀ = 1 − 10 s³ + 15 s⁴ − 6 s⁵,   H₁ = s − 6 s³ + 8 s⁴ − 3 s⁵,   H₂ = (s² − 3 s³ + 3 s⁴ − s⁵)/2.
 
 Source:
-    Johnson 1985, Contact Mechanics, section 3.2.
+    Johnson 1985, Contact Mechanics, sections 3.2 and 3.6.
 
 Theory: docs/theory.md, section 6.
 """
@@ -36,6 +44,7 @@ from numpy.polynomial import legendre
 from geometry.legendre_modes import mode_values
 from geometry.materials import Material
 from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
+from micro.boundary_elements.traction_modes import half_space_traction_modes
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
 
@@ -48,13 +57,14 @@ _NEAREST = 1e-9
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RectangleFields:
-    """Fields in a half-space under modes of pressure on the rectangle [0, Lx] × [0, Ly].
+    """Fields in a half-space under modes of traction on the rectangle [0, Lx] × [0, Ly].
 
     Args:
         lengths: Sides (Lx, Ly) of the rectangle [mm].
         count: Modes K along a side; mode k K + l is k along x, l along y, of mean square 1 MPa².
         material: Elastic constants of the half-space.
-        extended: Sides beyond which the pressures go on smoothly.
+        extended: Sides beyond which the tractions go on smoothly.
+        axis: Direction of the tractions: 0 along x, 1 along y, 2 pressures, into the half-space.
 
     Raises:
         InputError: When a length is not positive.
@@ -64,6 +74,7 @@ class RectangleFields:
     count: int
     material: Material
     extended: Sides = (False, False, False, False)
+    axis: int = 2
 
     def __post_init__(self) -> None:
         positive_lengths(self.lengths, "the rectangle")
@@ -89,17 +100,40 @@ class RectangleFields:
         lengths, count, material = self.lengths, self.count, self.material
         normal = half_space_modes(lengths, count) / material.contact_modulus
         stresses = half_space_stress_modes(lengths, material.poisson_ratio, count)
+        moved, added = self._moments_beyond()
+        return normal + moved[2], stresses + added
+
+    def displacement_modes(self) -> Array:
+        """Return displacements along x, y and downwards by unit moments, in modes.
+
+        Returns:
+            Shape (3, K², K²) [mm/N].
+        """
+        material = self.material
+        whole = half_space_traction_modes(self.lengths, material.poisson_ratio, self.count)
+        moved, _ = self._moments_beyond()
+        return np.asarray(whole[:, self.axis] / material.contact_modulus + moved)
+
+    def _moments_beyond(self) -> tuple[Array, Array]:
+        """Return what goes on beyond the sides adds in modes.
+
+        Returns:
+            Displacements along x, y and downwards, (3, K², K²) [mm/N]; σ_xx, σ_yy and σ_xy,
+            (3, K², K²) [1/mm²].
+        """
+        lengths, count = self.lengths, self.count
         beyond = [parts for parts in self._parts() if parts != (0, 0)]
         if not beyond:
-            return normal, stresses
+            return np.zeros((3, count**2, count**2)), np.zeros((3, count**2, count**2))
         (x, along_x), (y, along_y) = (_graded(length, count) for length in lengths)
         places = np.stack(np.meshgrid(x, y, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
         fields = sum(self._of_parts(places, *parts) for parts in beyond)
         displacement, stress = self._assembled(fields)
         # the moments of a mode's displacement, by the mode's own moment: the area
         tests = np.kron(along_x, along_y) / (lengths[0] * lengths[1]) ** 2
+        moved = [sign * (tests @ displacement[:, i]) for i, sign in enumerate((1.0, 1.0, -1.0))]
         added = [tests @ stress[:, i, j] for i, j in ((0, 0), (1, 1), (0, 1))]
-        return normal - tests @ displacement[:, 2], stresses + np.stack(added)
+        return np.stack(moved), np.stack(added)
 
     @property
     def reach(self) -> tuple[float, float]:
@@ -160,12 +194,16 @@ class RectangleFields:
         self, points: Array, along_x: tuple[Array, Array], along_y: tuple[Array, Array]
     ) -> Array:
         """Return the nine kernels summed over places and weights along both axes, (n, 9, K²)."""
-        kernels = _kernels(
-            (points[:, :1] - along_x[0])[:, :, None],
-            (points[:, 1:2] - along_y[0])[:, None, :],
-            np.maximum(-points[:, 2], _NEAREST * max(self.lengths))[:, None, None],
-            self.material.poisson_ratio,
-        )
+        x = (points[:, :1] - along_x[0])[:, :, None]
+        y = (points[:, 1:2] - along_y[0])[:, None, :]
+        z = np.maximum(-points[:, 2], _NEAREST * max(self.lengths))[:, None, None]
+        nu = self.material.poisson_ratio
+        if self.axis == 2:
+            kernels = _kernels(x, y, z, nu)
+        elif self.axis == 0:
+            kernels = _shear_kernels(x, y, z, nu)
+        else:
+            kernels = _shear_kernels(y, x, z, nu)[:, [1, 0, 2, 4, 3, 5, 6, 8, 7]]
         sums = along_x[1][:, None] @ kernels @ along_y[1].transpose(0, 2, 1)[:, None]
         return np.asarray(sums.reshape(len(points), 9, -1) / (2.0 * np.pi))
 
@@ -257,6 +295,31 @@ def _kernels(x: Array, y: Array, z: Array, nu: float) -> Array:
             x * y * across,
             x * steep,
             y * steep,
+        ],
+        axis=1,
+    )
+
+
+def _shear_kernels(x: Array, y: Array, z: Array, nu: float) -> Array:
+    """Return the same by forces 2π along x."""
+    square = x * x + y * y + z * z
+    r = np.sqrt(square)
+    side, cube, a = 1.0 - 2.0 * nu, 1.0 / (square * r), 1.0 / (r + z)
+    bent, five = a * a / r, 3.0 * cube / square
+    across = side * a * a * (cube + 2.0 * a / square) - five
+    radial = cube - side * bent
+    straight = side * (cube - bent)
+    return np.stack(
+        [
+            1.0 / r + side * a + x * x * radial,
+            x * y * radial,
+            x * (z * cube + side * a / r),
+            x * (straight - 2.0 * side * bent + x * x * across),
+            x * (straight + y * y * across),
+            -five * x * z * z,
+            y * (x * x * across - side * bent),
+            -five * x * x * z,
+            -five * x * y * z,
         ],
         axis=1,
     )

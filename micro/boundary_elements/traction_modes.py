@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.legendre_modes import mode_means
+from geometry.legendre_modes import mode_means, modes_within
 from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from support.arrays import Array, Indices
 from support.errors import InputError
@@ -94,6 +94,33 @@ class TractionModes:
         some = self.matrix.reshape(3, 3, *4 * (self.count,))
         some = some[:, :, :count, :count, :count, :count].reshape(3, 3, count**2, count**2)
         return TractionModes(self.lengths, some, self.origin)
+
+    def within(self, lengths: tuple[float, float]) -> TractionModes:
+        """Return the compliance of a rectangle of the top, in modes of its own.
+
+        Args:
+            lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
+        """
+        if lengths == self.lengths and self.origin == (0.0, 0.0):
+            return self
+        change = modes_within(lengths, self.lengths, self.origin, self.count)
+        found = change @ self.matrix @ change.T
+        return TractionModes(lengths, 0.5 * (found + found.transpose(1, 0, 3, 2)))
+
+    def plus(self, other: TractionModes) -> TractionModes:
+        """Return the compliance of this body and of another one on the same rectangle.
+
+        Args:
+            other: That of the other body, whose modes may be more or fewer.
+        """
+        count = max(self.count, other.count)
+        total = np.zeros((3, 3, *4 * (count,)))
+        for one in (self, other):
+            few = one.count
+            part = one.matrix.reshape(3, 3, *4 * (few,))
+            total[:, :, :few, :few, :few, :few] += part
+        matrix = total.reshape(3, 3, count**2, count**2)
+        return TractionModes(self.lengths, matrix, self.origin)
 
     def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
         """Return the compliance of cells of uniform tractions, by means over the cells.

@@ -131,10 +131,9 @@ class FaceTerms(ABC):
             self._faces[count] = found
         return found
 
-    def traction_term(self, comm: Any) -> TractionModes | None:
-        """Return what the body adds to a half-space under tractions; None where it is not known.
-
-        Free sides are part of it.
+    @abstractmethod
+    def traction_term(self, comm: Any) -> TractionModes:
+        """Return what the body adds to a half-space under tractions; free sides are part of it.
 
         Args:
             comm: MPI communicator; None for this process alone.
@@ -142,7 +141,6 @@ class FaceTerms(ABC):
         Note:
             Collective.
         """
-        return None
 
     @abstractmethod
     def _solved_face(self, comm: Any, count: int) -> FaceCompliance:

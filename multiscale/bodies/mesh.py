@@ -9,7 +9,14 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from geometry import Material, PatchGrid, Surface
-from micro import BodyModes, FreeSides, RectangleFields, SurfaceStress
+from micro import (
+    BodyModes,
+    FreeSides,
+    RectangleFields,
+    SurfaceStress,
+    TractionModes,
+    half_space_traction_modes,
+)
 from multiscale.bodies.face_terms import (
     LEAST_WITH_MARGIN,
     LEAST_WITH_SIDES,
@@ -136,6 +143,34 @@ class MeshTerms(FaceTerms):
         found = FaceCompliance(**cached("mesh-face", self._key(count), compute, self.body.comm))
         return turned(found) if self.behind else found
 
+    def traction_term(self, comm: Any) -> TractionModes:
+        """Return what the body adds to a half-space under tractions; see `FaceTerms`."""
+        from macro.compliance.cache import cached
+        from macro.compliance.mesh_face import mesh_face_tractions, raised, seen_from_behind
+
+        lengths, material = self.lengths, self.material
+        count, body = max(self.modes, 2), raised(self.body)
+
+        def compute() -> dict[str, Any]:
+            fields = [
+                RectangleFields(
+                    lengths=lengths,
+                    count=count,
+                    material=material,
+                    extended=self.around.free_sides,
+                    axis=axis,
+                )
+                for axis in range(3)
+            ]
+            loads = fields if self.around.below else None
+            found = mesh_face_tractions(body, self.facets, self.rectangle, material, count, loads)
+            return {"tractions": found}
+
+        whole = cached("mesh-tractions", self._key(count), compute, self.body.comm)["tractions"]
+        without = half_space_traction_modes(lengths, material.poisson_ratio, count)
+        matrix = whole - without / material.contact_modulus
+        return TractionModes(lengths, seen_from_behind(matrix) if self.behind else matrix)
+
     def _resolved(self, count: int) -> int:
         """Return as many modes along a side, or as many as the mesh itself resolves."""
         return count if self.around.below else min(count, 6)
@@ -237,6 +272,11 @@ class PairTerms(FaceTerms):
         """Solve for the compliances of both faces."""
         first = self.first.face(comm, modes=count)
         return BothFaces(first, self._behind.face(comm, modes=count))
+
+    def traction_term(self, comm: Any) -> TractionModes:
+        """Return what both bodies add to half-spaces under tractions; see `FaceTerms`."""
+        own = self.first.traction_term(comm).within(self.lengths)
+        return own.plus(self.second.traction_term(comm))
 
     @property
     def _alike(self) -> bool:

@@ -378,6 +378,9 @@ class Coupling(SceneParts, ABC):
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
 
+    checks_shear: ClassVar[bool] = False
+    """Whether errors of the shear are measured by themselves, see `MicroCoupling.shear_checked`."""
+
     @property
     def checks_steps(self) -> bool:
         """Whether further solutions measure the errors of load steps, see `checked`."""
@@ -453,11 +456,12 @@ class Coupling(SceneParts, ABC):
         detail = self.solver.detail(latest)
         return None if detail is None else (step, detail)
 
-    def checked(self, step: LoadStep) -> LoadStep:
+    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
         """Return a load step with its errors measured; as it is where they cannot be.
 
         Args:
             step: The load step.
+            past: All load steps before it.
 
         Raises:
             NotConverged: When a contact problem cannot be solved.

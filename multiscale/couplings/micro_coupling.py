@@ -25,7 +25,7 @@ from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
 from multiscale.couplings.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
-from multiscale.couplings.coupling import NOT_WITH_FRICTION, Source
+from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.loading.load_step import LoadStep
@@ -156,7 +156,7 @@ class MicroCoupling(PressedSurface):
             zero=self.zero_error,
         )
 
-    def checked(self, step: LoadStep) -> LoadStep:
+    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
         """Return a load step of contacts on cells with its errors measured."""
         known = None if self.has_laws else self.solver.latest
         start = None if known is None else known.guess
@@ -167,7 +167,7 @@ class MicroCoupling(PressedSurface):
         probe, friction, history = self.error_probe(), self.friction_model, self.load_history
         assert friction is not None
         measured = partial(shear_errors, probe, friction, [*past, step], history)
-        by_shift = history.shear_key == "shear"
+        by_shift = history.shear_key != "shear_force"
         return with_shear_errors(step, on_root_alone(self.comm, measured), by_shift=by_shift)
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
@@ -189,8 +189,6 @@ class MicroCoupling(PressedSurface):
         """Return why a run does not measure the errors of its load steps; empty where it does."""
         if self.cells is None:
             return f"{self.micro.name} contacts have no measure of it, half-space has"
-        if self.scene.rubs_on_mesh:
-            return NOT_WITH_FRICTION
         if self.scene.loads_bodies:
             return "the measure does not know of loads of the body besides the contact"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
@@ -263,7 +261,8 @@ class MicroCoupling(PressedSurface):
     def error_causes(self) -> str:
         """The causes of errors that a run measures."""
         body = ", body" if self.has_body else "; there is no block"
-        return f"grid, zero, slopes{body}{' and laws' * self.has_laws}"
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        return f"grid, zero, slopes{body}{' and laws' * self.has_laws}{shear}"
 
     def contact_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the contact and of its micro model."""
@@ -315,6 +314,7 @@ class ConcurrentCoupling(MicroCoupling):
     """The whole surface on the scene's body at every load step, without laws."""
 
     shows_contacts: ClassVar[bool] = True
+    checks_shear: ClassVar[bool] = True
 
     def _make_solver(self) -> StepSolver:
         return self.contact_solver(self.model_on_body())

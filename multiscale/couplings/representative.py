@@ -198,7 +198,7 @@ class RepresentativeCoupling(LawCoupling):
 
     # --- errors
 
-    def checked(self, step: LoadStep) -> LoadStep:
+    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
         """Return a load step with its errors measured, by further steps on the same bodies."""
         solver = self.solver
         assert isinstance(solver, ExtendedLaws)

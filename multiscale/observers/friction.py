@@ -52,10 +52,8 @@ class FrictionObserver(StepObserver):
         """Yield what the last loop lost, and what friction leaves out."""
         if loop := last_loop(steps):
             yield loop
-        if self._coupling.scene.rubs_on_mesh:
-            yield from self._law_notes()
-            return
-        yield from self._coupling_notes()
+        by_laws = self._coupling.scene.rubs_on_mesh
+        yield from self._law_notes() if by_laws else self._coupling_notes()
         yield from shear_error_notes(steps, by_shift=self._by_shift)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
@@ -66,21 +64,15 @@ class FrictionObserver(StepObserver):
 
     @property
     def _by_shift(self) -> bool:
-        return self._coupling.load_history.shear_key == "shear"
+        return self._coupling.load_history.shear_key != "shear_force"
 
     def _coupling_notes(self) -> Iterator[str]:
         """Yield what cells leave out of shear: the body, and what pressures and tractions do."""
         coupling, friction = self._coupling, self._coupling.scene.friction
-        beta, model = coupling.materials.dundurs_beta, coupling.friction_model
-        whole = not coupling.has_body or model.body is not None
-        if not whole:
-            yield (
-                "shift and tangential stiffness are those of the contact on a half-space; the "
-                "body's own shear comes on top"
-            )
+        beta = coupling.materials.dundurs_beta
         if friction.coupled:
             yield "friction: pressures and tractions were solved in turn at every load step"
-        elif beta or (coupling.has_body and whole):
+        elif beta or coupling.has_body:
             yield (
                 f"friction after Goodman: that pressures pull the surface sideways and tractions "
                 f"lift it (Dundurs' β = {number(beta, 3)}"
@@ -113,8 +105,8 @@ class FrictionObserver(StepObserver):
         if beta:
             yield (
                 "friction of laws after Goodman: that pressures of single contacts pull the "
-                f"surface sideways (Dundurs' β = {number(beta, 3)}) is left out, and not measured; "
-                "what pressures on the whole face do is part of the mesh"
+                f"surface sideways (Dundurs' β = {number(beta, 3)}) is left out; what pressures on "
+                "the whole face do is part of the mesh"
             )
 
 

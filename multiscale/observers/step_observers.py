@@ -201,7 +201,7 @@ class ErrorCheck(StepObserver):
             return step
         with self._coupling.clock.phase("check"):
             try:
-                return self._coupling.checked(step)
+                return self._coupling.checked(step, past)
             except NotConverged as error:
                 self._failures[f"errors of load step {step.step} not measured: {error}"] = None
                 return step
@@ -309,7 +309,7 @@ def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
     yield from (_loaded(place, coupling) for place in _places(coupling))
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
-    if coupling.scene.friction is not None and not coupling.has_laws:
+    if coupling.scene.friction is not None and coupling.checks_shear:
         yield _loaded("friction.ShearErrorCheck", coupling)
 
 

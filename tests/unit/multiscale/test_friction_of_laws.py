@@ -172,9 +172,11 @@ def test_law_files_have_springs_and_their_tangential_stiffness(tmp_path):
         assert same.springs.stiffness == pytest.approx(law.springs.stiffness, rel=1e-12)
 
 
-def test_the_plan_says_friction_and_that_errors_are_not_measured():
+def test_the_plan_says_friction_and_whether_errors_are_measured():
     said = dict(make_setup(scene(output={"check": "last"})).statements())
     assert "coefficient 0.3; the laws are beds of springs" in said["friction"]
+    assert said["error"].endswith("body and laws; those of the shear as well")
+    said = dict(make_setup(scene("representative", output={"check": "last"})).statements())
     assert "what has slipped under laws" in said["error"]
 
 

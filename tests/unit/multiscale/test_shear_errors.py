@@ -93,3 +93,51 @@ def test_paths_are_gone_through_their_turning_points():
     eased = [replace(step, force_N=6.0 - 0.1 * step.step, approach_mm=step.step) for step in steps]
     assert [step.step for step in turning_points(eased[1:], by_shift=True)] == [2, 3, 4, 5, 6, 7, 8]
     assert turning_points(steps[:1], by_shift=True) == list(steps[:1])
+    every = turning_points(steps, by_shift=True, every_load=True)
+    assert [step.step for step in every] == [1, 2, 5, 8]
+
+
+LAWS = {
+    "friction": {"coefficient": 0.3},
+    "patches": {"grid": [2, 2]},
+    "micro": {"finite_slopes": False},  # isolated laws have none
+}
+
+
+@pytest.mark.parametrize("kind", ["consistent", "isolated"])
+@pytest.mark.parametrize("load", [{"force": 6.0}, {"approach": 7e-3}], ids=["force", "approach"])
+def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
+    surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
+    loads = load | {"steps": 1, "shear": [[1e-3, 2e-4]], "shear_steps": 1}
+    quiet = {"figures": False, "report": False}
+    sections = LAWS | {"surface": surface, "block": block}
+    laws = run(pressed_cells(kind, loads, output=quiet | {"check": "last"}, **sections))
+    own = laws.steps[-1]
+    sections["friction"] = {"coefficient": 0.3, "coupled": True}
+    cells = run(pressed_cells("concurrent", loads, output=quiet | {"check": "none"}, **sections))
+    exact = cells.steps[-1]
+    parts = dict(own.shear_errors)
+    assert list(parts)[:3] == ["laws", "grid", "body"]
+    assert "coupling" not in parts  # which the laws are compared with
+    apart = np.hypot(*(response(own) - response(exact)))
+    assert parts["laws"] == pytest.approx(apart, rel=0.01)  # of steps that agree to 1e-6
+    assert parts["laws"] > 0.02 * np.hypot(*response(exact))
+    assert own.shear_force_error_N == pytest.approx(sum(parts.values()))
+    under_approach = dict(own.errors)["laws"]
+    if "approach" in load:
+        assert under_approach == pytest.approx(abs(own.force_N - exact.force_N), rel=0.01)
+    else:
+        way = abs(own.approach_mm - exact.approach_mm)
+        assert own.approach_error_mm >= 0.7 * way  # by the stiffness of a frictionless contact
+    assert "its shift the shear force is within" in " ".join(laws.notes)
+
+
+def test_laws_without_shear_state_what_holds_their_face():
+    """Friction holds the face under the plane, and its shear force has an error."""
+    surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
+    sections = LAWS | {"surface": surface, "block": block}
+    quiet = {"figures": False, "report": False, "check": "last"}
+    step = run(pressed_cells("consistent", {"force": 6.0, "steps": 2}, output=quiet, **sections))
+    assert dict(step.steps[-1].shear_errors)["laws"] > 0.0

@@ -37,8 +37,9 @@ def test_uniform_pressure_is_loves():
     np.testing.assert_allclose(found[:, 1, 2], -yz, atol=1e-7)
 
 
-def test_displacements_have_the_stresses_by_hookes_law():
-    field, step = fields(4), 1e-4
+@pytest.mark.parametrize("axis", range(3))
+def test_displacements_have_the_stresses_by_hookes_law(axis):
+    field, step = fields(4, axis=axis), 1e-4
     place = np.array([0.3, 0.6, -0.2])
     ends = place + step * np.array([s * e for s in (1.0, -1.0) for e in np.eye(3)])
     values = field(ends)[0]
@@ -48,6 +49,29 @@ def test_displacements_have_the_stresses_by_hookes_law():
     trace = np.einsum("iik->k", strain)
     expected = 2.0 * shear * strain + first * np.eye(3)[..., None] * trace
     np.testing.assert_allclose(field(place[None])[1][0], expected, atol=1e-4)  # step² × curvature
+
+
+@pytest.mark.parametrize("axis", range(2))
+def test_below_the_surface_the_stress_is_the_traction(axis):
+    inside, outside = fields(axis=axis)(np.array([[0.4, 0.3, -1e-6], [1.3, 0.3, -1e-6]]))[1]
+    expected = np.eye(3)[axis]
+    np.testing.assert_allclose(inside[:, 2, 0], expected, atol=1e-5)  # as much as the depth
+    np.testing.assert_allclose(outside[:, 2, 0], 0.0, atol=1e-5)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_displacements_in_the_surface_have_the_modes_own_moments_in_all_directions(axis):
+    count, sides = 2, (True, False, False, True)
+    (x, along_x), (y, along_y) = (graded(count, length) for length in LENGTHS)
+    places = np.stack(np.meshgrid(x, y, [0.0], indexing="ij"), axis=-1).reshape(-1, 3)
+    tests = np.kron(along_x, along_y) / np.prod(LENGTHS) ** 2
+    for extended in ((False,) * 4, sides):
+        field = fields(count, axis=axis, extended=extended)
+        displacement, expected = field(places)[0], field.displacement_modes()
+        for part, (i, sign) in zip(expected, enumerate((1.0, 1.0, -1.0)), strict=True):
+            # steeper at the sides than across them
+            atol = 5e-5 * np.abs(expected).max()
+            np.testing.assert_allclose(sign * tests @ displacement[:, i], part, atol=atol)
 
 
 def graded(count, length):

@@ -1,0 +1,162 @@
+"""Are the errors of the shear that runs state those that they have?
+
+    .venv/bin/python tests/benchmarks/shear_error_study.py [--scenes N] [--seed S] [--laws]
+
+Scenes are drawn anew for every seed: rough half-spaces and blocks on 48² or 64² cells, with any
+Poisson's ratio up to 0.45 and a coefficient of friction from 0.1 to 0.8, pressed to 1 to 15 %
+contact area by a force or an approach, then sheared on one or two legs, by a shift or a shear
+force. The errors by grid and body are judged by the same run on four times as many cells a side.
+Every second scene is also judged with what the coupling changes, by a coupled run on twice as many
+cells.
+
+With ``--laws`` the scenes have patch laws on 48² cells (consistent or isolated, 1 to 4 × 4
+patches), and are judged by coupled cells on the block, on twice as many a side. Run it from the
+project's root.
+"""
+
+import argparse
+import os
+import time
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np
+
+from geometry import NotConverged
+from multiscale import Scene, run
+
+FINER, COUPLED_ON = 4, 2
+"""Cells a side of the runs that judge, over those of the scene."""
+BLOCK = {"young_modulus": 4000.0}
+ALLOWED = 1.5
+"""True errors over stated ones that count as kept."""
+
+
+def scene_of(random, *, laws):
+    """Return one scene as nested dictionaries, without its shear, and how it will be sheared."""
+    slope, waves = float(random.uniform(0.05, 0.2)), (2, int(random.integers(4, 9)))
+    nu, mu = float(random.uniform(0.0, 0.45)), float(random.uniform(0.1, 0.8))
+    modulus, area = BLOCK["young_modulus"] / (1.0 - nu**2), float(random.uniform(0.01, 0.15))
+    kinds = ("consistent", "isolated") if laws else ("analytic", "concurrent")
+    kind = str(random.choice(kinds))
+    cells = 48 if laws else int(random.choice([48, 64]))
+    spectrum = {
+        "hurst": float(random.uniform(0.5, 1.0)),
+        "waves": list(waves),
+        "rms_slope": slope,
+        "seed": int(random.integers(2**31)),
+    }
+    data = {
+        "surface": {"spectrum": spectrum, "grid": [cells, cells], "lengths": [1.0, 1.0]},
+        "block": BLOCK | {"poisson_ratio": nu, "height": float(random.choice([0.5, 1.0, 3.0]))},
+        "micro": {"model": "half-space"},
+        "coupling": {"kind": kind},
+        "friction": {"coefficient": mu},
+        "load": {"force": 0.5 * area * slope * modulus, "steps": 1},
+        "output": {"check": "last", "figures": False, "report": False},
+    }
+    patches = int(random.choice([1, 2, 4]))
+    if laws:
+        data["patches"] = {"grid": [patches, patches]}
+        data["block"]["cells"] = [8, 8, 6]
+    legs = [float(random.uniform(0.2, 0.95)), float(random.uniform(-0.9, 0.9))]
+    turns = np.radians([float(random.uniform(0, 360)), float(random.choice([0.0, 0.0, 90.0]))])
+    ways = np.cumsum(turns)[: 1 + int(random.integers(2))]
+    by_force, by_approach = random.random() < 0.4, random.random() < 0.3
+    points = np.stack([np.cos(ways), np.sin(ways)], axis=1) * np.array(legs)[: len(ways), None]
+    return data, points, by_force, by_approach
+
+
+def sheared(data, points, *, by_force, by_approach):
+    """Return the scene with its shear, in parts of what slides."""
+    hardly = data["load"] | {"shear": [1e-9, 0.0], "shear_steps": 1}
+    alone = data | {"load": hardly, "output": data["output"] | {"check": "none"}}
+    pressed = run(Scene.from_dict(alone)).steps[-1]
+    slides = data["friction"]["coefficient"] * pressed.force_N
+    load = dict(data["load"])
+    if by_approach:
+        load = {"approach": pressed.approach_mm, "steps": 1}
+    if not by_force:
+        slides *= 1.5 / pressed.tangential_stiffness_N_per_mm
+    key = "shear_force" if by_force else "shear"
+    load |= {key: (slides * points).tolist(), "shear_steps": 2}
+    return data | {"load": load}
+
+
+def response(data, by_force, **changes):
+    """Return the shear of the last load step of a scene with some changes."""
+    surface = data["surface"] | {"grid": [changes.pop("cells")] * 2}
+    output = data["output"] | {"check": "none"}
+    step = run(Scene.from_dict(data | {"surface": surface, "output": output} | changes)).steps[-1]
+    return of(step, by_force)
+
+
+def of(step, by_force):
+    names = ("shear_x_mm", "shear_y_mm") if by_force else ("shear_force_x_N", "shear_force_y_N")
+    return np.array([getattr(step, name) for name in names])
+
+
+def judged(number, random, *, laws):
+    """Run one scene; print it, and return true and stated error by (cells, coupling), or None."""
+    began = time.perf_counter()
+    data, points, by_force, by_approach = scene_of(random, laws=laws)
+    how = {"by_force": by_force, "by_approach": by_approach}
+    data = sheared(data, points, **how)
+    step = run(Scene.from_dict(data)).steps[-1]
+    own, parts = of(step, by_force), dict(step.shear_errors)
+    cells, size = data["surface"]["grid"][0], float(np.hypot(*own))
+    rows = {}
+    if not laws:
+        exact = response(data, by_force, cells=FINER * cells)
+        stated = sum(error for cause, error in parts.items() if cause != "coupling")
+        rows["cells"] = float(np.hypot(*(exact - own))), stated
+    if laws or number % 2 == 0:
+        on = {"friction": data["friction"] | {"coupled": True}}
+        if laws:
+            on["coupling"] = {"kind": "concurrent"}
+        exact = response(data, by_force, cells=COUPLED_ON * cells, **on)
+        rows["coupling"] = float(np.hypot(*(exact - own))), sum(parts.values())
+    told = ", ".join(f"{cause} {error / size:.2%}" for cause, error in parts.items())
+    found = "; ".join(f"{name} {off / size:.2%}" for name, (off, _) in rows.items())
+    nu, mu = data["block"]["poisson_ratio"], data["friction"]["coefficient"]
+    load = f"{'force' if by_force else 'shift'}{', approach' * by_approach}"
+    missed = any(off > ALLOWED * stated for off, stated in rows.values())
+    print(
+        f"{number:3d} {data['coupling']['kind']:10s} {cells}² ν {nu:.2f} µ {mu:.2f} "
+        f"{len(points)} legs, {load}: true {found}; stated {told} "
+        f"({time.perf_counter() - began:.0f} s){' MISSED' * missed}",
+        flush=True,
+    )
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--scenes", type=int, default=60)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--laws", action="store_true", help="patch laws in place of cells")
+    given = parser.parse_args()
+    found = {"cells": [], "coupling": []}
+    for number in range(given.scenes):
+        try:
+            random = np.random.default_rng([given.seed, number])
+            rows = judged(number, random, laws=given.laws)
+        except NotConverged as error:
+            print(f"{number:3d} not converged: {error}", flush=True)
+            continue
+        for name, row in rows.items():
+            found[name].append(row)
+    names = {"cells": "by grid and body", "coupling": "with the coupling"}
+    for name, what in names.items():
+        if not found[name]:
+            continue
+        off, stated = np.array(found[name]).T
+        kept = int((off <= ALLOWED * stated).sum())
+        print(
+            f"{what}: true error within {ALLOWED} × the stated one on {kept} of {len(off)}; stated "
+            f"over true in the median {np.median(stated / np.maximum(off, 1e-300)):.2f}"
+        )
+
+
+if __name__ == "__main__":
+    main()

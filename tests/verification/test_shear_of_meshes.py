@@ -1,0 +1,72 @@
+"""Shear of the measured surface on bodies from meshes, against blocks and against each other."""
+
+import numpy as np
+import pytest
+from helpers.box_msh import write_box
+
+from multiscale import Scene, run
+
+CONSTANTS = {"young_modulus": 4000.0, "poisson_ratio": 0.15}
+SCENE = {
+    "surface": {
+        "spectrum": {"hurst": 0.95, "waves": [2, 10], "rms_slope": 0.215, "seed": 1},
+        "grid": [64, 64],
+        "lengths": [1, 1],
+    },
+    "coupling": {"kind": "concurrent"},
+    "micro": {"finite_slopes": False},
+    "output": {"figures": False, "report": False, "check": "none"},
+}
+TURN = {"force": 2.0, "steps": 1, "shear": [[1e-3, 0.0], [1e-3, 8e-4]], "shear_steps": 1}
+
+
+def sheared(*, coupled=False, **sections):
+    """Return shear forces and approach of the last load steps, shape (2, 3) [N, µm]."""
+    friction = {"coefficient": 0.4, "coupled": coupled}
+    history = run(Scene.from_dict(SCENE | {"friction": friction, "load": TURN} | sections))
+    rows = [(s.shear_force_x_N, s.shear_force_y_N, 1e3 * s.approach_mm) for s in history.steps]
+    return np.array(rows[1:])
+
+
+def cube(folder, cells, *, margin=0.0, above=False):
+    path = folder / f"{cells}-{margin}-{above}.msh"
+    across = np.linspace(-margin, 1.0 + margin, cells + 1)
+    levels = np.linspace(0.0, 1.0, cells + 1) if above else np.linspace(-1.0, 0.0, cells + 1)
+    write_box(path, (across, across, levels))
+    faces = ("bottom", "top") if above else ("top", "bottom")
+    supports = [{"surface": faces[1]}]
+    return {"mesh": str(path), "contact": faces[0], "supports": supports, **CONSTANTS}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("coupled", [False, True])
+def test_a_cube_on_a_mesh_is_the_block(tmp_path, coupled):
+    """Its own shear is more than a third of the shift."""
+    found = sheared(body=cube(tmp_path, 6), coupled=coupled)
+    expected = sheared(block=CONSTANTS, coupled=coupled)
+    alone = sheared(block=CONSTANTS, coupling={"kind": "analytic"})
+    largest = np.abs(expected[:, :2]).max()
+    # 6³ quadratic hexahedra are 0.3 % too stiff in shear, as their edges at the support are
+    # singular; coupled, more than half of the force is what pressures of the whole face do
+    atol = (0.016 if coupled else 0.008) * largest
+    np.testing.assert_allclose(found[:, :2], expected[:, :2], atol=atol)
+    np.testing.assert_allclose(found[:, 2], expected[:, 2], rtol=1e-3)
+    assert np.abs(alone[0, 0] / expected[0, 0]) > 1.4
+
+
+@pytest.mark.long
+def test_two_alike_bodies_are_one_of_half_the_modulus(tmp_path):
+    body, counter = cube(tmp_path, 4), cube(tmp_path, 4, above=True)
+    found = sheared(body=body, counter_body=counter)
+    softer = sheared(body=body | {"young_modulus": 2000.0})
+    np.testing.assert_allclose(found, softer, atol=1e-6 * np.abs(softer).max())
+
+
+@pytest.mark.long
+def test_a_meshed_counter_body_goes_with_a_margin(tmp_path):
+    wide = CONSTANTS | {"margin": 0.2}
+    counter = cube(tmp_path, 7, margin=0.2, above=True)
+    found = sheared(block=wide, counter_body=counter)
+    softer = sheared(block=wide | {"young_modulus": 2000.0})
+    # that of the mesh, one half of the compliance
+    np.testing.assert_allclose(found, softer, atol=0.004 * np.abs(softer[:, :2]).max())
