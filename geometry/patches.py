@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -61,12 +62,12 @@ class PatchGrid:
     @property
     def borders_x(self) -> Array:
         """Borders along x, ascending, shape (Nx + 1,) [mm]."""
-        return self.origin[0] + np.linspace(0.0, self.lengths[0], self.grid[0] + 1)
+        return _borders(self.origin[0], self.lengths[0], self.grid[0])
 
     @property
     def borders_y(self) -> Array:
         """Borders along y, ascending, shape (Ny + 1,) [mm]."""
-        return self.origin[1] + np.linspace(0.0, self.lengths[1], self.grid[1] + 1)
+        return _borders(self.origin[1], self.lengths[1], self.grid[1])
 
     @property
     def areas(self) -> Array:
@@ -187,6 +188,14 @@ class Regions:
         return self.names.index(name)
 
 
+@lru_cache(maxsize=64)
+def _borders(origin: float, length: float, count: int) -> Array:
+    """Return the borders of equal intervals, not to be written to, shape (count + 1,) [mm]."""
+    borders = origin + np.linspace(0.0, length, count + 1)
+    borders.flags.writeable = False
+    return borders
+
+
 def patch_means(surface: Surface, patches: PatchGrid) -> Array:
     """Average the heights over every patch; cells that straddle a border are shared by area.
 
@@ -200,23 +209,52 @@ def patch_means(surface: Surface, patches: PatchGrid) -> Array:
     Raises:
         InputError: When a patch reaches beyond the surface.
     """
-    shares_x = _shares(patches.borders_x, surface.lengths[0], surface.grid[0], "x")
-    shares_y = _shares(patches.borders_y, surface.lengths[1], surface.grid[1], "y")
-    return (shares_x @ surface.heights @ shares_y.T).ravel()
+    return field_means(surface.heights, surface.lengths, patches)
 
 
-def overlaps(borders: Array, length: float, cells: int) -> Array:
-    """Return the length of every cell in every interval, shape (intervals, cells) [mm].
-
-    What lies beyond the outer borders counts for the nearest interval.
+def field_means(field: Array, lengths: tuple[float, float], patches: PatchGrid) -> Array:
+    """Average a field on the cells of a rectangle over every patch; see `patch_means`.
 
     Args:
-        borders: Ends of the intervals, ascending, shape (intervals + 1,) [mm].
-        length: Side that equal cells divide [mm].
-        cells: Their number.
+        field: The field, constant on every cell, shape (nx, ny).
+        lengths: Sides of the rectangle [mm].
+        patches: Patches inside the rectangle.
+
+    Returns:
+        Means in flat order, shape (N,).
+
+    Raises:
+        InputError: When a patch reaches beyond the rectangle.
     """
-    endless = np.concatenate([[-np.inf], borders[1:-1], [np.inf]])
-    return interval_overlaps(endless, np.linspace(0.0, length, cells + 1))
+    (nx, ny), (x, y) = field.shape, patches.origin
+    shares_x = _shares(x, patches.lengths[0], patches.grid[0], lengths[0], nx, "x")
+    shares_y = _shares(y, patches.lengths[1], patches.grid[1], lengths[1], ny, "y")
+    return (shares_x @ field @ shares_y.T).ravel()
+
+
+@lru_cache(maxsize=32)
+def overlaps(
+    patches: PatchGrid, lengths: tuple[float, float], grid: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Return the length of every row of cells in every row of patches, and of columns likewise.
+
+    What lies beyond the outer borders counts for the nearest patch.
+
+    Args:
+        patches: Nx × Ny patches.
+        lengths: Sides of a rectangle that equal cells divide [mm].
+        grid: Their numbers (nx, ny).
+
+    Returns:
+        Shapes (Nx, nx) and (Ny, ny), not to be written to [mm].
+    """
+    borders = patches.borders_x, patches.borders_y
+    along = []
+    for ends, length, cells in zip(borders, lengths, grid, strict=True):
+        endless = np.concatenate([[-np.inf], ends[1:-1], [np.inf]])
+        along.append(interval_overlaps(endless, np.linspace(0.0, length, cells + 1)))
+        along[-1].flags.writeable = False
+    return along[0], along[1]
 
 
 def interval_overlaps(first: Array, second: Array) -> Array:
@@ -231,8 +269,12 @@ def interval_overlaps(first: Array, second: Array) -> Array:
     return np.clip(upper - lower, 0.0, None)
 
 
-def _shares(borders: Array, length: float, cells: int, axis: str) -> Array:
-    """Return the share of every cell in every interval's mean, shape (intervals, cells)."""
+@lru_cache(maxsize=64)
+def _shares(
+    origin: float, whole: float, count: int, length: float, cells: int, axis: str
+) -> Array:
+    """Return the share of every cell in every interval's mean, shape (count, cells)."""
+    borders = _borders(origin, whole, count)
     slack = 1e-9 * length  # rounding of borders that were computed from an origin
     if borders[0] < -slack or borders[-1] > length + slack:
         raise InputError(

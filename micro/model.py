@@ -81,11 +81,14 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def is_quick(self, control: Control) -> bool:
-        """Return whether a solution takes milliseconds, from one nearby, up to a load.
+    def quick_up_to(self, control: Control) -> Self | None:
+        """Return the model for many loads, each solved in milliseconds from one nearby.
 
         Args:
-            control: The load.
+            control: The largest of these loads.
+
+        Returns:
+            The model, or one that remembers more; None where a solution may take long.
         """
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:

@@ -106,9 +106,8 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
-    def is_quick(self, control: Control) -> bool:
-        """Return that a solution may take long; see `MicroModel.is_quick`."""
-        return False
+    def quick_up_to(self, control: Control) -> None:
+        """Return that a solution may take long; see `MicroModel.quick_up_to`."""
 
     def press(
         self,

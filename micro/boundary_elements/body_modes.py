@@ -314,13 +314,13 @@ class BodyStresses:
         """Apply the transpose of `stresses`.
 
         Args:
-            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny).
+            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, in b ways, (b, 3, nx, ny).
 
         Returns:
-            Weights of the pressures, shape (nx, ny).
+            Weights of the pressures, shape (b, nx, ny).
         """
         on = self._on_cells
         amplitudes = on.means_x @ fields @ on.means_y.T
-        moments = np.tensordot(amplitudes.reshape(3, -1), on.matrix, axes=2)
+        moments = np.tensordot(amplitudes.reshape(len(fields), 3, -1), on.matrix, axes=2)
         loads_x, loads_y = on.means_x * on.widths_x, on.means_y * on.widths_y
-        return np.asarray(loads_x.T @ moments.reshape(amplitudes.shape[1:]) @ loads_y)
+        return np.asarray(loads_x.T @ moments.reshape(-1, *amplitudes.shape[2:]) @ loads_y)

@@ -34,7 +34,7 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from scipy import fft
@@ -63,11 +63,37 @@ class SurfaceStress(Protocol):
         """Apply the transpose of `stresses`.
 
         Args:
-            fields: What σ_xx, σ_yy and σ_xy are multiplied by, shape (3, nx, ny).
+            fields: What σ_xx, σ_yy and σ_xy are multiplied by, in b ways, (b, 3, nx, ny).
 
         Returns:
-            What the pressures are multiplied by, with the same sum, shape (nx, ny).
+            What the pressures are multiplied by, with the same sums, shape (b, nx, ny).
         """
+
+
+_TWICE_SHEAR = np.array([1.0, 1.0, 2.0])[:, None, None]
+"""Of xx, yy and xy, as yx is there too."""
+
+
+class _Orders(NamedTuple):
+    """The parts of the forms of both orders at some pressures, on sx × sy coarse cells.
+
+    Attributes:
+        fields: Pressures and stresses, shape (4, sx, sy).
+        works: What the form of first order multiplies them by, with heights from the top.
+        value: Value of the form of second order.
+        pushed: What the form of first order multiplies pressures by, shape (sx, sy).
+        first: What it takes stresses off with, shape (3, sx, sy).
+        second: What the form of second order multiplies stresses by, shape (3, sx, sy).
+        bent: Twice what it multiplies curvatures by, shape (3, sx, sy).
+    """
+
+    fields: Array
+    works: Array
+    value: float
+    pushed: Array
+    first: Array
+    second: Array
+    bent: Array
 
 
 class FiniteSlopes:
@@ -89,6 +115,7 @@ class FiniteSlopes:
         grid: Cells that the term works on, the surface's or coarser; `coarse_grid` when not given.
 
     Attributes:
+        surface: The surface.
         grid: Cells that the term works on.
         spacing: Sides of these cells [mm].
 
@@ -111,7 +138,7 @@ class FiniteSlopes:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         check_finite_slopes(surface)
         self.material, self.edge_stresses = material, tuple(edge_stresses)
-        self._surface, self._periodic = surface, periodic
+        self.surface, self._periodic = surface, periodic
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = surface_waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
@@ -131,28 +158,75 @@ class FiniteSlopes:
         Returns:
             Shape (nx, ny) [mm].
         """
-        waves, heights, below = self._waves, self._heights, self._below
-        nu, modulus = self.material.poisson_ratio, self.material.young_modulus
-        loaded = waves.alone(waves.coarsened(pressure))
+        orders = self._orders(self.coarsened(pressure))
+        share = second_share(float(np.vdot(orders.fields, orders.works)), orders.value)
+        weights = share * orders.second - orders.first
+        moved = self._moved(orders.pushed[None], weights[None], share * orders.bent)
+        return self.refined(moved[0])
+
+    def coarsened(self, field: Array) -> Array:
+        """Return a field of all cells, (nx, ny), on those that the term works on, (cx, cy)."""
+        return self._waves.coarsened(field)
+
+    def refined(self, field: Array) -> Array:
+        """Return a field on the cells that the term works on, (cx, cy), on all cells, (nx, ny)."""
+        return self._waves.refined(field)
+
+    def orders(self, loaded: Array) -> tuple[Array, Array, Array]:
+        """Return what pressures displace in the first and in the second order.
+
+        Args:
+            loaded: Pressures on the cells that the term works on, shape (cx, cy) [MPa].
+
+        Returns:
+            Both displacements there, shape (2, cx, cy) [mm], and two fields, (4, sx, sy) both: the
+            sum of the first by some pressures times the second by others is the form of the first
+            order, with heights from the top.
+        """
+        orders = self._orders(loaded)
+        pushed = np.stack([orders.pushed, np.zeros_like(orders.pushed)])
+        moved = self._moved(pushed, np.stack([-orders.first, orders.second]), orders.bent)
+        return moved, orders.fields, orders.works
+
+    def _orders(self, loaded: Array) -> _Orders:
+        """Return the parts of both orders by pressures on the coarse cells, shape (cx, cy)."""
+        modulus, below = self.material.young_modulus, self._below
+        loaded = self._waves.alone(loaded)
         directed, curvatures = self._directed(loaded)
         stresses = self._stresses(loaded, directed)
         strains = self._strains(stresses)
-        pushed = heights * loaded / modulus
-        value, more = self._second(stresses, curvatures)
-        energy = loaded**2 / modulus - _product(stresses, strains)
-        share = _share(float(np.sum(below * energy)), value)
-        weights = share * more - heights * strains
+        value, second = self._second(stresses, curvatures)
+        return _Orders(
+            fields=np.concatenate([loaded[None], stresses]),
+            works=below * np.concatenate([loaded[None] / modulus, -_TWICE_SHEAR * strains]),
+            value=value,
+            pushed=self._heights * loaded / modulus,
+            first=self._heights * strains,
+            second=second,
+            bent=below**2 * stresses,
+        )
+
+    def _moved(self, pushed: Array, weights: Array, bent: Array) -> Array:
+        """Return the displacements of the coarse cells by the parts of b forms, (b, cx, cy).
+
+        Args:
+            pushed: What pressures are multiplied by, shape (b, sx, sy).
+            weights: What stresses are multiplied by, shape (b, 3, sx, sy).
+            bent: Twice what the last form multiplies curvatures by, shape (3, sx, sy); the others
+                have none.
+        """
+        waves, nu, count = self._waves, self.material.poisson_ratio, len(weights)
         for term in self.edge_stresses:
-            pushed += term.adjoint(weights * np.array([1.0, 1.0, 2.0])[:, None, None])  # xy and yx
+            pushed = pushed + term.adjoint(_TWICE_SHEAR * weights)
         # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
-        pushed -= 2.0 * nu * (weights[0] + weights[1])
-        bent = share * below**2 * stresses
-        fields = np.concatenate([(2.0 * nu - 1.0) * weights, bent])
-        moved = waves.changed(fields, self._displaced, 1, inside=True)[0]
-        moved += pushed[: moved.shape[0], : moved.shape[1]]
+        pushed = pushed - 2.0 * nu * (weights[:, 0] + weights[:, 1])
+        tensors = (2.0 * nu - 1.0) * weights
+        fields = np.concatenate([tensors.reshape(-1, *bent.shape[1:]), bent])
+        moved = waves.changed(fields, self._displaced, count, inside=True)
+        moved += pushed[:, : moved.shape[1], : moved.shape[2]]
         if self._periodic:
-            moved -= moved.mean()
-        return waves.refined(moved)
+            moved -= moved.mean(axis=(1, 2), keepdims=True)
+        return moved
 
     def error(self, pressure: Array) -> float:
         """Return what ∫ p u dA may be off by, as orders beyond those taken are left out [N mm].
@@ -186,7 +260,7 @@ class FiniteSlopes:
 
     def on_half_space(self) -> FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
-        return FiniteSlopes(self._surface, self.material, periodic=self._periodic, grid=self.grid)
+        return FiniteSlopes(self.surface, self.material, periodic=self._periodic, grid=self.grid)
 
     def _second(self, stresses: Array, curvatures: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses in it.
@@ -251,14 +325,15 @@ class FiniteSlopes:
         return parts
 
     def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
-        """Return the waves of the displacement by those of two tensors.
+        """Return the waves of the displacements by those of tensors, of which one is added last.
 
-        Each tensor t contributes k · t k/k², the second one times (1 − ν) |k|/(2 G).
+        Each tensor t contributes k · t k/k², the one that is added (1 − ν) |k|/(2 G) times that.
         """
         stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
-        bending = 0.5 / stiffness * self._waves.wave_number[:, here]
-        both = waves[:3] + bending * waves[3:]
-        return _lengthwise(both, self._waves.directions[:, :, here])[None]
+        waves[-6:-3] += 0.5 / stiffness * self._waves.wave_number[:, here] * waves[-3:]
+        directions = self._waves.directions[:, :, here]
+        tensors = waves[:-3].reshape(-1, 3, *waves.shape[1:])
+        return np.stack([_lengthwise(tensor, directions) for tensor in tensors])
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""
@@ -300,8 +375,13 @@ def _lengthwise(tensor: Spectrum, directions: Array) -> Spectrum:
     return np.asarray(xx * tensor[0] + yy * tensor[1] + 2.0 * xy * tensor[2])
 
 
-def _share(first: float, second: float) -> float:
-    """Return the share of the second order that the orders beyond leave, ½ at least."""
+def second_share(first: float, second: float) -> float:
+    """Return the share of the second order that the orders beyond leave, ½ at least.
+
+    Args:
+        first: Value of the form of first order, with heights from the top.
+        second: Value of that of second order.
+    """
     if abs(second) >= abs(first):
         return 0.5
     return 1.0 / (1.0 + (second / first) ** 2)

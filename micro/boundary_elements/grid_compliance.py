@@ -21,6 +21,7 @@ from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
+from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
 
@@ -200,7 +201,7 @@ class Compliance:
     periodic: bool
     modulus: float = 1.0
     terms: Sequence[BodyTerm] = ()
-    slopes: tuple[FiniteSlopes, ...] = ()
+    slopes: tuple[FiniteSlopes | RememberedSlopes, ...] = ()
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -286,6 +287,21 @@ class Compliance:
         if self._last is None or not same:
             self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
+
+    @property
+    def remembering(self) -> tuple[RememberedSlopes, ...]:
+        """The finite slopes, where they remember what they do on few cells, the same of all."""
+        found = tuple(each for each in self.slopes if isinstance(each, RememberedSlopes))
+        return found if len(found) == len(self.slopes) else ()
+
+    def slopes_on_few(self, pressure: Array) -> Array:
+        """Return what finite slopes add to the displacements of few cells, shape (n, 1) [mm].
+
+        Args:
+            pressure: Pressures / E* on these cells, which alone are loaded, shape (n, 1).
+        """
+        loaded = pressure.ravel() * self.modulus
+        return np.sum([each.on_cells(loaded) for each in self.remembering], axis=0)[:, None]
 
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
         """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).

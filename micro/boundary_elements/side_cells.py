@@ -149,10 +149,15 @@ class _SidePair:
         return self.on_cells(waves, 3)
 
     def adjoint(self, fields: Array) -> Array:
-        """Apply the transpose of `stresses`, shape (rows, cells)."""
-        waves = self.loaded(fields)
-        waves[:, -(waves.shape[1] // 3) :] *= _SHEAR.conj()
-        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves), 1)[0]
+        """Apply the transpose of `stresses` to b × 3 fields of cells, shape (b, rows, cells)."""
+        count, kernels = len(fields), self.kernels.transpose(0, 2, 1)
+        waves = self.loaded(fields.reshape(-1, *fields.shape[2:]))
+        three = waves.reshape(len(kernels), count, -1, 2)
+        three[:, :, -(three.shape[2] // 3) :] *= _SHEAR.conj()
+        made = np.empty((count, *kernels.shape[:2], 2), complex)
+        for each, one in zip(made, three.transpose(1, 0, 2, 3), strict=True):
+            each[:] = _multiplied(kernels, np.ascontiguousarray(one))
+        return self.on_cells(made.transpose(1, 0, 2, 3).reshape(len(kernels), -1, 2), count)
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
@@ -322,17 +327,17 @@ class SideStresses:
         """Apply the transpose of `stresses`.
 
         Args:
-            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, shape (3, nx, ny).
+            fields: Weights of σ_xx, σ_yy and σ_xy on the cells, in b ways, (b, 3, nx, ny).
 
         Returns:
-            Weights of the pressures, shape (nx, ny).
+            Weights of the pressures, shape (b, nx, ny).
         """
         across_x, across_y = self._pairs
-        turned = fields[_SWAPPED].transpose(0, 2, 1)
+        turned = fields[:, _SWAPPED].transpose(0, 1, 3, 2)
         one, other = _of_both(
-            lambda: across_x.adjoint(fields), lambda: across_y.adjoint(turned), fields[0].size
+            lambda: across_x.adjoint(fields), lambda: across_y.adjoint(turned), fields[0, 0].size
         )
-        return one + other.T
+        return one + other.transpose(0, 2, 1)
 
 
 @lru_cache(maxsize=8)

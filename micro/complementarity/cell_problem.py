@@ -55,6 +55,18 @@ class ContactPressures(NamedTuple):
     by_slopes: Array | None = None
     nearby: tuple[tuple[Array, Array], ...] = ()
 
+    def among(self, cells: tuple[Indices, Indices]) -> ContactPressures:
+        """Return the same on some cells alone.
+
+        Args:
+            cells: Their rows and columns, equal in shape, which fields then have.
+        """
+        return self._replace(
+            pressure=self.pressure[cells],
+            by_slopes=None if self.by_slopes is None else self.by_slopes[cells],
+            nearby=tuple((one[cells], other[cells]) for one, other in self.nearby),
+        )
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CellProblem:

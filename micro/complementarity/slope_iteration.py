@@ -10,13 +10,19 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.solver import solve_on_surface
+from micro.complementarity.solver import (
+    Place,
+    on_place,
+    penetrates_outside,
+    solve_few,
+    solve_on_surface,
+)
 from support.arrays import Array, Flags
 from support.errors import NotConverged
 
@@ -110,9 +116,44 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by
             finite slopes do not agree with the pressures.
     """
-    if not problem.compliance.slopes:
+    compliance = problem.compliance
+    if not compliance.slopes:
         return solve_on_surface(problem, start)
-    iteration, used = _SlopeIteration(problem, start), 0
+    found = _solved_on_few(problem, start)
+    if found is not None and not penetrates_outside(*found):
+        return found[2]
+    start = start if found is None else found[2]
+    return _solved(_SlopeIteration(problem, start, solve_on_surface, compliance.slope_displacement))
+
+
+def _solved_on_few(
+    problem: CellProblem, start: ContactPressures | None
+) -> tuple[CellProblem, Place, ContactPressures] | None:
+    """Solve on few cells, where finite slopes remember what they add to the displacements of these.
+
+    Returns:
+        The problem of all cells without finite slopes, the few cells, and the solution; None where
+        others can touch, too, or finite slopes do not remember.
+    """
+    compliance, shape = problem.compliance, problem.interference.shape
+    if problem.motions.count or not compliance.remembering:
+        return None
+    place = np.unravel_index(compliance.remembering[0].cells[:, None], shape)
+    few = on_place(problem, place)
+    if np.count_nonzero(few.interference > 0.0) < np.count_nonzero(problem.interference > 0.0):
+        return None
+    start = None if start is None else start.among(place)
+    found = _solved(_SlopeIteration(few, start, solve_few, compliance.slopes_on_few))
+    pressure = np.zeros(shape)
+    pressure[place] = found.pressure
+    displaced = compliance.slope_displacement(pressure)
+    lowered = replace(problem, interference=problem.interference - displaced, lowered=displaced)
+    return lowered, place, found._replace(pressure=pressure, by_slopes=displaced)
+
+
+def _solved(iteration: _SlopeIteration) -> ContactPressures:
+    """Return the solution that an iteration comes to."""
+    used = 0
     for _ in range(_MOST_SOLUTIONS):
         solution = iteration.next_solution()
         used += solution.iterations
@@ -134,22 +175,30 @@ class _SlopeIteration:
     Args:
         problem: The contact problem.
         start: What the first solution starts from.
+        solve: Solves a problem without finite slopes, from a solution nearby.
+        by_slopes: Returns what finite slopes add by pressures / E* on the cells.
 
     Attributes:
         displaced: What finite slopes add at the next solution, shape (nx, ny) [mm].
         change: Last change of it over the largest interference; infinite where it is not known.
     """
 
-    def __init__(self, problem: CellProblem, start: ContactPressures | None) -> None:
+    def __init__(
+        self,
+        problem: CellProblem,
+        start: ContactPressures | None,
+        solve: Callable[[CellProblem, ContactPressures | None], ContactPressures],
+        by_slopes: Callable[[Array], Array],
+    ) -> None:
         self._problem, self._start = problem, start
+        self._solve, self._by_slopes = solve, by_slopes
         self._begin_without()
         self.change, first = np.inf, _FIRST
         if start is not None and not problem.motions.count:
             self._mixing = AndersonMixing(start.nearby)
         if start is not None and start.pressure.any():
-            known, compliance = start.by_slopes, problem.compliance
-            here = compliance.slope_displacement(start.pressure) if known is None else known
-            self.displaced, first = here, _FIRST**2
+            known, first = start.by_slopes, _FIRST**2
+            self.displaced = by_slopes(start.pressure) if known is None else known
         self._accuracy = max(problem.tolerance, first)
 
     def _begin_without(self) -> None:
@@ -165,7 +214,7 @@ class _SlopeIteration:
             lowered=self.displaced,
             tolerance=self._accuracy,
         )
-        self._start = solve_on_surface(lowered, self._start)
+        self._start = self._solve(lowered, self._start)
         return self._start
 
     def judged(self, solution: ContactPressures) -> float | None:
@@ -189,7 +238,7 @@ class _SlopeIteration:
         exact = sound and self._accuracy <= tolerance
         if exact and self._ahead <= least:
             return max(solution.residual, self._ahead)
-        change = problem.compliance.slope_displacement(solution.pressure) - self.displaced
+        change = self._by_slopes(solution.pressure) - self.displaced
         before, self.change = self.change, np.inf
         if sound:
             self.change = float(np.abs(change[touching]).max()) / largest

@@ -110,6 +110,17 @@ def touches_few_cells(problem: CellProblem) -> bool:
     return not touchable.any() or not isinstance(place_of(problem, touchable)[0], slice)
 
 
+def solve_few(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve one contact of few cells with a matrix, without finite slopes.
+
+    Args:
+        problem: The contact problem, of a column of cells.
+        start: A solution nearby.
+    """
+    known = None if start is None else start.pressure.copy()  # the search overwrites it
+    return solve(problem, _even_pressure(problem) if known is None or not known.any() else known)
+
+
 def place_of(problem: CellProblem, touchable: Flags) -> Place:
     """Return where to solve: the rows and columns of few cells, or a box around many.
 
@@ -159,6 +170,17 @@ def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> C
         again = _solve_on(problem, place, solution.pressure)
         solution = again._replace(iterations=solution.iterations + again.iterations)
     return solution
+
+
+def penetrates_outside(problem: CellProblem, place: Place, solution: ContactPressures) -> bool:
+    """Return whether cells outside a place penetrate the rigid body.
+
+    Args:
+        problem: The contact problem of all cells of a surface, without free motions.
+        place: Where it was solved on.
+        solution: The solution.
+    """
+    return bool(_lifted(problem, place, problem.interference, solution.pressure).any())
 
 
 def _lifted(problem: CellProblem, place: Place, interference: Array, pressure: Array) -> Flags:

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry import Surface, overlaps, patch_means
+from geometry import Surface, overlaps
 from geometry.contact_state import ContactState
+from geometry.patches import field_means
 from micro.half_space.contact_spots import find_spots
 from support.arrays import Array
 
@@ -41,7 +42,7 @@ def summed(
     cell = surface.spacing[0] * surface.spacing[1]
 
     def means(field: Array) -> Array:
-        return patch_means(Surface(heights=field, lengths=surface.lengths), patches)
+        return field_means(field, surface.lengths, patches)
 
     displacement, depth, work = means(moved), None, 0.0
     separation = depths - plane.means(patches) + displacement
@@ -54,8 +55,7 @@ def summed(
         spent = np.multiply(hardness, depth, out=np.zeros_like(depth), where=left)
         work = float(spent.sum()) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
-    borders = patches.borders_x, patches.borders_y
-    along_x, along_y = map(overlaps, borders, surface.lengths, surface.grid)
+    along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
     return replace(
         state,
         moment=plane.moment(surface.x[:, None], surface.y, pressure * cell),

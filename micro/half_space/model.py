@@ -20,6 +20,7 @@ from micro.boundary_elements.body_modes import BodyModes
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
+from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from micro.boundary_elements.side_cells import SideTerm
 from micro.complementarity.cell_fields import PressureBound
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
@@ -91,7 +92,7 @@ class HalfSpaceModel:
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: tuple[FiniteSlopes, ...] = ()
+    slopes: tuple[FiniteSlopes | RememberedSlopes, ...] = ()
     hardness: float | None = None
 
     def __post_init__(self) -> None:
@@ -244,16 +245,22 @@ class HalfSpaceModel:
         depths = self.reference_height - means
         return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
 
-    def is_quick(self, control: Control) -> bool:
-        """Return whether the cells that a plane can touch are few; see `MicroModel.is_quick`."""
+    def quick_up_to(self, control: Control) -> Self | None:
+        """Return the model for many loads, where few cells touch; see `MicroModel.quick_up_to`.
+
+        Its finite slopes remember the pressures of earlier solutions.
+        """
         if self.periodic:
-            return self.surface.heights.size <= _QUICK_CELLS
+            return self if self.surface.heights.size <= _QUICK_CELLS else None
         if control.approach is None or control.tilt is None:
-            return False
+            return None
         interference = self.interference(
             RigidPlane.moved(self.surface, control.prescribed(np.zeros(3)))
         )
-        return touches_few_cells(self._problem(interference, control.free, control.loads))
+        if not touches_few_cells(self._problem(interference, control.free, control.loads)):
+            return None
+        cells = np.flatnonzero(interference > 0.0)
+        return replace(self, slopes=tuple(RememberedSlopes(each, cells) for each in self.slopes))
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.

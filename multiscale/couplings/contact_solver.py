@@ -158,8 +158,7 @@ class ContactSolver(StepSolver):
         def pressures() -> Array:
             if isinstance(self._model, HalfSpaceModel):
                 pressure, surface = self._solved().pressures, self._model.surface
-                borders = parts.borders_x, parts.borders_y
-                x, y = map(overlaps, borders, surface.lengths, surface.grid)
+                x, y = overlaps(parts, surface.lengths, surface.grid)
                 return np.asarray((x @ pressure @ y.T).ravel() / parts.area)
             spots = self._solved().spots
             assert spots is not None

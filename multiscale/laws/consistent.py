@@ -101,7 +101,9 @@ def consistent_laws(
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
-    whole = replace(whole, quick=model.is_quick(Control(approach=end, tilt=largest.tilt)))
+    quick = model.quick_up_to(Control(approach=end, tilt=largest.tilt))
+    if quick is not None:
+        whole = replace(whole, model=quick, quick=True)
     laws, error = refined(
         whole.rows,
         whole.laws,

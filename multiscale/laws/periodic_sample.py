@@ -50,7 +50,7 @@ class PeriodicSample:
     @property
     def quick(self) -> bool:
         """Whether its rows take so little that one rank solves them all."""
-        return self.model.is_quick(Control(approach=self.reference))
+        return self.model.quick_up_to(Control(approach=self.reference)) is not None
 
     @property
     def area(self) -> float:

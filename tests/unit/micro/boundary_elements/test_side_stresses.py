@@ -25,7 +25,7 @@ def test_adjoint_is_the_transpose(cells):
     p, fields = random(1), random(2, (3, *GRID))
     # rounding
     assert np.vdot(fields, cells.stresses(p)) == pytest.approx(
-        np.vdot(cells.adjoint(fields), p), rel=1e-12
+        np.vdot(cells.adjoint(fields[None])[0], p), rel=1e-12
     )
 
 

@@ -126,7 +126,7 @@ def test_body_stresses_have_a_transpose(matrix):
     body = BodyStresses(LENGTHS, grid, matrix)
     pressure, fields = rng.normal(size=grid), rng.normal(size=(3, *grid))
     work = np.sum(fields * body.stresses(pressure))
-    assert np.sum(body.adjoint(fields) * pressure) == pytest.approx(work, rel=1e-12)
+    assert np.sum(body.adjoint(fields[None])[0] * pressure) == pytest.approx(work, rel=1e-12)
 
 
 @pytest.mark.parametrize("shape", [(3, 5, 5), (2, 4, 4), (3, 4, 9), (3, 0, 0)])

@@ -1,0 +1,119 @@
+"""Finite slopes that remember, against the same slopes worked out anew every time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from geometry import Control, Material, Spectrum, synthesise
+from micro import FreeSides, HalfSpaceModel
+from micro.boundary_elements.finite_slopes import FiniteSlopes
+from micro.boundary_elements.remembered_slopes import RememberedSlopes
+from micro.boundary_elements.side_cells import SideStresses
+from micro.complementarity import slope_iteration
+
+MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.3)
+SURFACE = synthesise(
+    Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=3), grid=(64, 48), lengths=(1.0, 0.75)
+)
+SIDES = FreeSides(lengths=SURFACE.lengths, poisson_ratio=0.3, decay_length=0.5)
+EDGES = {"half-space": (), "free sides": [SideStresses(SIDES, SURFACE.spacing)]}
+LARGEST = Control(approach=8e-3, tilt=(3e-3, -2e-3))
+
+
+@pytest.fixture(params=EDGES)
+def slopes(request):
+    return FiniteSlopes(SURFACE, MATERIAL, edge_stresses=EDGES[request.param], grid=SURFACE.grid)
+
+
+def model_with(slopes, **options):
+    return HalfSpaceModel(
+        surface=SURFACE,
+        contact_modulus=MATERIAL.contact_modulus,
+        slopes=(slopes,),
+        highest=SURFACE.highest,
+        tolerance=1e-10,
+        **options,
+    )
+
+
+def test_new_pressures_and_their_combinations_are_exact(slopes):
+    cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
+    one, other = np.random.default_rng(1).random((2, len(cells)))
+    remembering = RememberedSlopes(slopes, cells)
+    for few in (one, other, one + 3.0 * other, np.zeros_like(one)):
+        everywhere = np.zeros(SURFACE.grid)
+        everywhere.ravel()[cells] = few
+        exact = slopes.displacement(everywhere)
+        # the share of the second order is known to single precision
+        slack = 1e-6 * np.abs(exact).max()
+        assert remembering.displacement(everywhere) == pytest.approx(exact, abs=slack)
+        assert remembering.on_cells(few) == pytest.approx(exact.ravel()[cells], abs=slack)
+
+
+def test_a_combination_is_not_worked_out_anew(slopes, monkeypatch):
+    cells = np.arange(100, 140)
+    one, other = np.random.default_rng(2).random((2, len(cells)))
+    remembering = RememberedSlopes(slopes, cells)
+    remembering.on_cells(one)
+    remembering.on_cells(other)
+    monkeypatch.setattr(FiniteSlopes, "orders", lambda *_: pytest.fail("worked out anew"))
+    assert np.any(remembering.on_cells(2.0 * one + other))
+
+
+def test_pressures_on_other_cells_are_taken_as_they_are(slopes):
+    remembering = RememberedSlopes(slopes, np.arange(10))
+    pressure = np.random.default_rng(3).random(SURFACE.grid)
+    np.testing.assert_array_equal(remembering.displacement(pressure), slopes.displacement(pressure))
+
+
+@pytest.mark.parametrize("hardness", [None, 200.0], ids=["elastic", "yielding"])
+def test_a_path_of_loads_has_the_same_forces(slopes, hardness):
+    model = model_with(slopes, hardness=hardness)
+    quick, start = model.quick_up_to(LARGEST), None
+    for part in (0.2, 0.5, 0.35, 1.0):
+        control = replace(LARGEST, approach=part * LARGEST.approach)
+        state = quick.press(control, start=start)
+        start = state.guess
+        exact = model.press(control)
+        # the search ends at 3e-9 of the interference; a rest of 1e-6 counts by its square
+        assert state.force == pytest.approx(exact.force, rel=2e-8)
+        assert state.patch_displacement == pytest.approx(exact.patch_displacement, rel=2e-8)
+        slack = 1e-7 * exact.pressure.max()
+        assert state.pressure == pytest.approx(exact.pressure, abs=slack)
+
+
+def test_a_larger_load_than_foreseen_is_solved_all_the_same(slopes):
+    quick = model_with(slopes).quick_up_to(replace(LARGEST, approach=1e-3))
+    assert quick.press(LARGEST).force == pytest.approx(
+        model_with(slopes).press(LARGEST).force, rel=2e-8
+    )
+
+
+def test_loads_on_a_path_take_few_evaluations(slopes, monkeypatch):
+    """Twenty loads between two that are known take fewer than two evaluations each."""
+    quick, count = model_with(slopes).quick_up_to(LARGEST), 0
+    orders = FiniteSlopes.orders
+
+    def counted(*given):
+        nonlocal count
+        count += 1
+        return orders(*given)
+
+    monkeypatch.setattr(FiniteSlopes, "orders", counted)
+    start = None
+    for part in np.linspace(0.5, 1.0, 20):
+        control = replace(LARGEST, approach=part * LARGEST.approach)
+        start = quick.press(control, start=start).guess
+    assert 1 < count < 40
+    before = count
+    quick.press(replace(LARGEST, approach=0.77 * LARGEST.approach), start=start)
+    assert count - before <= 3
+
+
+def test_few_cells_are_searched_apart(slopes, monkeypatch):
+    """Among few cells the search for all cells of the surface is not entered."""
+    monkeypatch.setattr(
+        slope_iteration, "solve_on_surface", lambda *_: pytest.fail("searched everywhere")
+    )
+    assert model_with(slopes).quick_up_to(LARGEST).press(LARGEST).force > 0.0
