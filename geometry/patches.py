@@ -226,13 +226,11 @@ def field_means(field: Array, lengths: tuple[float, float], patches: PatchGrid) 
     Raises:
         InputError: When a patch reaches beyond the rectangle.
     """
-    (nx, ny), (x, y) = field.shape, patches.origin
-    shares_x = _shares(x, patches.lengths[0], patches.grid[0], lengths[0], nx, "x")
-    shares_y = _shares(y, patches.lengths[1], patches.grid[1], lengths[1], ny, "y")
+    shares_x = _shares(tuple(patches.borders_x), lengths[0], field.shape[0], "x")
+    shares_y = _shares(tuple(patches.borders_y), lengths[1], field.shape[1], "y")
     return (shares_x @ field @ shares_y.T).ravel()
 
 
-@lru_cache(maxsize=32)
 def overlaps(
     patches: PatchGrid, lengths: tuple[float, float], grid: tuple[int, int]
 ) -> tuple[Array, Array]:
@@ -248,13 +246,17 @@ def overlaps(
     Returns:
         Shapes (Nx, nx) and (Ny, ny), not to be written to [mm].
     """
-    borders = patches.borders_x, patches.borders_y
-    along = []
-    for ends, length, cells in zip(borders, lengths, grid, strict=True):
-        endless = np.concatenate([[-np.inf], ends[1:-1], [np.inf]])
-        along.append(interval_overlaps(endless, np.linspace(0.0, length, cells + 1)))
-        along[-1].flags.writeable = False
-    return along[0], along[1]
+    along_x = _overlaps(tuple(patches.borders_x), lengths[0], grid[0])
+    return along_x, _overlaps(tuple(patches.borders_y), lengths[1], grid[1])
+
+
+@lru_cache(maxsize=64)
+def _overlaps(borders: tuple[float, ...], length: float, cells: int) -> Array:
+    """Return the length of every cell in every interval, shape (intervals, cells) [mm]."""
+    endless = np.array([-np.inf, *borders[1:-1], np.inf])
+    overlap = interval_overlaps(endless, np.linspace(0.0, length, cells + 1))
+    overlap.flags.writeable = False
+    return overlap
 
 
 def interval_overlaps(first: Array, second: Array) -> Array:
@@ -270,11 +272,8 @@ def interval_overlaps(first: Array, second: Array) -> Array:
 
 
 @lru_cache(maxsize=64)
-def _shares(
-    origin: float, whole: float, count: int, length: float, cells: int, axis: str
-) -> Array:
-    """Return the share of every cell in every interval's mean, shape (count, cells)."""
-    borders = _borders(origin, whole, count)
+def _shares(borders: tuple[float, ...], length: float, cells: int, axis: str) -> Array:
+    """Return the share of every cell in every interval's mean, shape (intervals, cells)."""
     slack = 1e-9 * length  # rounding of borders that were computed from an origin
     if borders[0] < -slack or borders[-1] > length + slack:
         raise InputError(
@@ -282,5 +281,5 @@ def _shares(
             value=(float(borders[0]), float(borders[-1])),
             allowed=f"0 … {length} mm",
         )
-    overlap = interval_overlaps(borders, np.linspace(0.0, length, cells + 1))
+    overlap = interval_overlaps(np.array(borders), np.linspace(0.0, length, cells + 1))
     return overlap / overlap.sum(axis=1, keepdims=True)

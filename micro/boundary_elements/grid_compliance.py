@@ -196,17 +196,20 @@ class Compliance:
         terms: What else than the half-space is compliant.
         slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
             grids has to take them into account (`micro.complementarity.slope_iteration`).
+        few: Flat indices of the few cells that are loaded mostly, ascending, shape (n,). Finite
+            slopes then remember what they do with pressures on these cells.
     """
 
     periodic: bool
     modulus: float = 1.0
     terms: Sequence[BodyTerm] = ()
-    slopes: tuple[FiniteSlopes | RememberedSlopes, ...] = ()
+    slopes: tuple[FiniteSlopes, ...] = ()
+    few: Indices | None = None
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "_matrices", "_last"}
+        caches = {"half_space", "_terms_on", "_matrices", "_last", "_remembering"}
         return {name: value for name, value in vars(self).items() if name not in caches}
 
     def on_grid(
@@ -288,11 +291,12 @@ class Compliance:
             self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
 
-    @property
-    def remembering(self) -> tuple[RememberedSlopes, ...]:
-        """The finite slopes, where they remember what they do on few cells, the same of all."""
-        found = tuple(each for each in self.slopes if isinstance(each, RememberedSlopes))
-        return found if len(found) == len(self.slopes) else ()
+    @cached_property
+    def _remembering(self) -> tuple[RememberedSlopes, ...]:
+        """The finite slopes, with a memory; none where the loaded cells are not known to be few."""
+        if self.few is None:
+            return ()
+        return tuple(RememberedSlopes(each, self.few) for each in self.slopes)
 
     def slopes_on_few(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of few cells, shape (n, 1) [mm].
@@ -301,7 +305,7 @@ class Compliance:
             pressure: Pressures / E* on these cells, which alone are loaded, shape (n, 1).
         """
         loaded = pressure.ravel() * self.modulus
-        return np.sum([each.on_cells(loaded) for each in self.remembering], axis=0)[:, None]
+        return np.sum([each.on_cells(loaded) for each in self._remembering], axis=0)[:, None]
 
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
         """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).
@@ -322,4 +326,5 @@ class Compliance:
 
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""
-        return np.asarray(sum(each.displacement(pressure * self.modulus) for each in self.slopes))
+        slopes = self._remembering or self.slopes
+        return np.asarray(sum(each.displacement(pressure * self.modulus) for each in slopes))

@@ -22,8 +22,9 @@ from micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from support.arrays import Array, Indices
 
 _REST = 1e-6
-"""Rest of the pressures, over them, that is left out in part. Forces of 16 and 256 laws of the paper's
-cube, two surfaces, then changed by 5e-10, with 3e-6 by 6e-9. Of 178 evaluations 68 were left."""
+"""Rest of the pressures, over them, that is left out in part. Forces of 16 and 256 laws on two
+surfaces of the paper's recipe then changed by 5e-10, with 3e-6 by 6e-9. Of 178 evaluations for 70
+rows 68 were left."""
 _MOST = 192
 """Pressures that are remembered at most: 40 MB on 64² coarse cells."""
 
@@ -34,13 +35,10 @@ class RememberedSlopes:
     Args:
         slopes: The finite slopes.
         cells: Flat indices of the cells that may be loaded, ascending, shape (n,).
-
-    Attributes:
-        cells: These cells.
     """
 
     def __init__(self, slopes: FiniteSlopes, cells: Indices) -> None:
-        self.cells, self._slopes = cells, slopes
+        self._cells, self._slopes = cells, slopes
         coarse = slopes.grid[0] * slopes.grid[1]
         self._per_coarse = slopes.surface.heights.size / coarse
         # m directions of pressures, orthonormal, and displacements by them in both orders: on the
@@ -65,7 +63,7 @@ class RememberedSlopes:
         Args:
             pressure: Pressures on all cells, shape (nx, ny) [MPa].
         """
-        few = pressure.ravel()[self.cells]
+        few = pressure.ravel()[self._cells]
         if np.count_nonzero(few) < np.count_nonzero(pressure):
             return self._slopes.displacement(pressure)
         moved = self._combined(self._coarse, few)
@@ -92,7 +90,7 @@ class RememberedSlopes:
     def _loaded(self, pressure: Array) -> Array:
         """Return pressures on the coarse cells by those on the few, flat."""
         everywhere = np.zeros(self._slopes.surface.grid)
-        everywhere.ravel()[self.cells] = pressure
+        everywhere.ravel()[self._cells] = pressure
         return self._slopes.coarsened(everywhere).ravel()
 
     def _along(self, what: int, pressure: Array) -> Array:
@@ -109,13 +107,12 @@ class RememberedSlopes:
         moved, fields, works = slopes.orders(directions[last].reshape(slopes.grid))
         self._coarse[1:, last] = moved.reshape(2, -1)
         for few, coarse in zip(self._few, self._coarse, strict=True):
-            few[last] = slopes.refined(coarse[last].reshape(slopes.grid)).ravel()[self.cells]
+            few[last] = slopes.refined(coarse[last].reshape(slopes.grid)).ravel()[self._cells]
         if not last:  # fields only weigh the second order: single precision is enough
             self._fields = np.empty((_MOST, fields.size), np.float32)
         self._fields[last] = fields.ravel()
-        rows = *(directions[:end] @ self._coarse[order, last] for order in (1, 2)), (
-            self._fields[:end] @ works.ravel().astype(np.float32)
-        )
+        rows = [directions[:end] @ self._coarse[order, last] for order in (1, 2)]
+        rows.append(self._fields[:end] @ works.ravel().astype(np.float32))
         for form, row in zip(self._forms, rows, strict=True):
             form[last, :end] = form[:end, last] = row
         self._known = end

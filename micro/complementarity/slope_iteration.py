@@ -136,9 +136,10 @@ def _solved_on_few(
         others can touch, too, or finite slopes do not remember.
     """
     compliance, shape = problem.compliance, problem.interference.shape
-    if problem.motions.count or not compliance.remembering:
+    if problem.motions.count or compliance.few is None:
         return None
-    place = np.unravel_index(compliance.remembering[0].cells[:, None], shape)
+    row, column = np.unravel_index(compliance.few, shape)
+    place = row[:, None], column[:, None]
     few = on_place(problem, place)
     if np.count_nonzero(few.interference > 0.0) < np.count_nonzero(problem.interference > 0.0):
         return None

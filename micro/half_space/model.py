@@ -20,7 +20,6 @@ from micro.boundary_elements.body_modes import BodyModes
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
-from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from micro.boundary_elements.side_cells import SideTerm
 from micro.complementarity.cell_fields import PressureBound
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
@@ -30,7 +29,7 @@ from micro.complementarity.solver import touches_few_cells
 from micro.complementarity.tangent import approach_stiffness
 from micro.half_space.cell_sums import summed
 from micro.model import Stiffness, checked_patches
-from support.arrays import Array, Flags
+from support.arrays import Array, Flags, Indices
 from support.cores import blas_threads
 from support.errors import InputError, NotConverged
 
@@ -74,6 +73,8 @@ class HalfSpaceModel:
             cells of the surface; the theory of small slopes when not given.
         hardness: Hardness of the softer body, the largest pressure [MPa]; contacts are elastic
             when not given. The interference left where cells carry it is plastic depth.
+        few: Flat indices of the few cells that can touch, see `quick_up_to`; not known when not
+            given.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -92,8 +93,9 @@ class HalfSpaceModel:
     highest: float | None = None
     sides: FreeSides | None = None
     body: BodyModes | None = None
-    slopes: tuple[FiniteSlopes | RememberedSlopes, ...] = ()
+    slopes: tuple[FiniteSlopes, ...] = ()
     hardness: float | None = None
+    few: Indices | None = None
 
     def __post_init__(self) -> None:
         for what in ("contact_modulus", "tolerance"):
@@ -259,8 +261,7 @@ class HalfSpaceModel:
         )
         if not touches_few_cells(self._problem(interference, control.free, control.loads)):
             return None
-        cells = np.flatnonzero(interference > 0.0)
-        return replace(self, slopes=tuple(RememberedSlopes(each, cells) for each in self.slopes))
+        return replace(self, few=np.flatnonzero(interference > 0.0))
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
@@ -325,7 +326,11 @@ class HalfSpaceModel:
         terms: list[BodyTerm] = [] if self.sides is None else [SideTerm(self.sides)]
         terms += [] if self.body is None else [self.body]
         return Compliance(
-            periodic=self.periodic, modulus=self.contact_modulus, terms=terms, slopes=self.slopes
+            periodic=self.periodic,
+            modulus=self.contact_modulus,
+            terms=terms,
+            slopes=self.slopes,
+            few=self.few,
         )
 
     def _solved(
