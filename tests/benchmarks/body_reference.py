@@ -115,7 +115,7 @@ def draw(picture, path):
     map_axes(face, (1.0, 1.0))
     face.set_title("face, contact in orange")
     colour_bar(image, face, "moves down by [µm]")
-    curves = figure.add_axes((0.72, 0.17, 0.27, 0.76))
+    curves = figure.add_axes((0.74, 0.17, 0.25, 0.76))
     _draw_curves(curves, dict(picture["curves"]))
     figure.savefig(path, pil_kwargs={"optimize": True})
 
