@@ -126,7 +126,7 @@ ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)
 INTRO = """# What works with what
 
 Which choice goes with which coupling? `docs/what_works.py` writes this page from what the code
-itself refuses.
+itself refuses; a refusal also says what would do instead.
 
 * ● works.
 * ○ is accepted and changes nothing.
@@ -150,18 +150,15 @@ class Reason(NamedTuple):
     Attributes:
         key: Key of the scene that the code names; empty for none.
         problem: What is wrong.
-        allowed: What would do.
     """
 
     key: str
     problem: str
-    allowed: str
 
     @property
     def text(self) -> str:
         """The reason as the page shows it."""
-        said = f"`{self.key}`: {self.problem}" if self.key else self.problem
-        return f"{said} (instead: {self.allowed})" if self.allowed else said
+        return f"`{self.key}`: {self.problem}" if self.key else self.problem
 
 
 class Planner:
@@ -246,9 +243,9 @@ class Planner:
             load_finite_elements(scene, None)
             return make_setup(scene)
         except InputError as error:
-            return Reason(error.key or "", error.problem, error.allowed or "")
+            return Reason(error.key or "", error.problem)
         except NotConverged as error:
-            return Reason("", str(error), "")
+            return Reason("", str(error))
 
     def error(self, coupling: str, body: str) -> Reason | None:
         """Return why a coupling measures no error; None where it does."""
@@ -256,7 +253,7 @@ class Planner:
         if isinstance(made, Reason):
             return made
         why = made.unmeasured()
-        return Reason("", f"no error is measured: {why}", "") if why else None
+        return Reason("", f"no error is measured: {why}") if why else None
 
     def laws(self, coupling: str, body: str) -> Reason | None:
         """Return why a coupling has no laws; None where it has."""
@@ -264,7 +261,7 @@ class Planner:
         try:
             coupling_class(scene).check_has_laws(scene)
         except InputError as error:
-            return Reason(error.key or "", error.problem, error.allowed or "")
+            return Reason(error.key or "", error.problem)
         return None
 
 
@@ -355,7 +352,7 @@ def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
     try:
         return planner.laws(coupling, body)
     except InputError as error:
-        return Reason(error.key or "", error.problem, error.allowed or "")
+        return Reason(error.key or "", error.problem)
 
 
 def _reason(made: Any) -> Reason | None:
