@@ -19,6 +19,7 @@ from sphinx.application import Sphinx  # noqa: E402
 
 project = "patchlaw"
 author = "The patchlaw developers"
+project_copyright = "2026, The patchlaw developers"
 version = release = generated.version()
 extensions = [
     "myst_nb",

@@ -6,6 +6,7 @@
 # measured joints show; the more a bolt pulls, the less it matters.
 
 # %%
+# %matplotlib inline
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -52,7 +53,7 @@ middle = np.sqrt(pressure[1:] * pressure[:-1])
 axes.loglog(middle, 1e-3 * differences, "x", label="differences between them")
 axes.set(xlabel="mean pressure [MPa]", ylabel="stiffness of 1 mm² [N/µm]")
 axes.legend()
-figure
+plt.show()
 
 # %% [markdown]
 # Beside two plates of 10 mm each, which are springs in a row with the interface:

@@ -10,6 +10,7 @@ import re
 import tempfile
 from pathlib import Path
 
+# %matplotlib inline
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -47,7 +48,7 @@ for number, law in enumerate(laws.laws):
     axes.plot(1e3 * closure, law.pressure(closure), label=f"patch {laws.grid.unravel(number)}")
 axes.set(xlabel="closure [µm]", ylabel="pressure [MPa]")
 axes.legend()
-figure
+plt.show()
 
 # %% [markdown]
 # The file has a surface interaction for each patch. CalculiX reads it with `*INCLUDE,

@@ -6,6 +6,7 @@
 # What one learns: heat bows the pad, and its middle carries more than the mean pressure.
 
 # %%
+# %matplotlib inline
 import matplotlib.pyplot as plt
 import numpy as np
 import ufl
@@ -80,7 +81,7 @@ for name, rough in (("cold", cold), ("hot", hot)):
     axes.plot(points[near, 0][order], rough.pressure[near][order], ".", label=name)
 axes.set(xlabel="x [mm]", ylabel="pressure [MPa]")
 axes.legend()
-figure
+plt.show()
 
 # %%
 assert abs(hot.force - 800.0) < 1e-3 and abs(cold.force - 800.0) < 1e-3

@@ -6,6 +6,7 @@
 # matters more.
 
 # %%
+# %matplotlib inline
 import matplotlib.pyplot as plt
 import numpy as np
 
@@ -63,7 +64,7 @@ for slope, final in scatter.items():
     axes.plot(np.arange(1, 9), final, "o-", label=f"rms gradient {slope}")
 axes.set(xlabel="seed", ylabel="approach at 100 N [µm]", ylim=(0, None))
 axes.legend()
-figure
+plt.show()
 
 # %%
 assert np.all(scatter[0.05] < scatter[0.1])  # the finer finish wins, whatever the draw of its twin

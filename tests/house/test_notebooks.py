@@ -57,3 +57,17 @@ def test_a_kernel_shows_tables_progress_and_pictures():
     assert any("History of 4 load steps" in page and "0.6034 ± 0.0029" in page for page in pages)
     assert any("image/png" in one.get("data", {}) for one in shown)
     assert shown[-1].data["text/plain"] == "(1, True)"
+
+
+@pytest.mark.long
+def test_a_kernel_shows_a_picture_of_pyplot_once():
+    """Older matplotlib shows the first one only after the magic that chooses where it is drawn."""
+    pytest.importorskip("ipykernel")
+    nbclient, jupytext = pytest.importorskip("nbclient"), pytest.importorskip("jupytext")
+    notebook = jupytext.read(FOLDER / "joint_stiffness.py")
+    nbclient.NotebookClient(notebook, resources={"metadata": {"path": FOLDER}}).execute()
+    shown = [one for cell in notebook.cells for one in cell.get("outputs", ())]
+    assert sum("image/png" in one.get("data", {}) for one in shown) == 1
+    for script in SCRIPTS:
+        text = script.read_text(encoding="utf-8")
+        assert ("\n# %matplotlib inline\n" in text) == ("pyplot" in text), script.name
