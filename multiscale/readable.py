@@ -44,7 +44,7 @@ SCALED_UNITS = frozenset(_PREFIXES)
 
 _USUAL = {"mm": "µm", "N/mm": "kN/m"}
 """Units that columns and headlines keep as long as their numbers are of a handy size."""
-_HANDY = {"MPa": (0.1, 1e3), "mm²": (0.01, 1e6)}
+_HANDY = {"MPa": (0.1, 1e3), "mm²": (0.01, 1e6), "mm³/s": (1e-9, 1e6)}
 """Sizes of numbers that keep them, from the first on and below the second; else 0.1 and 1e4."""
 
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
