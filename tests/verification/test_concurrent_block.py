@@ -29,8 +29,11 @@ def coupling(block):
     return ContactSolver(model, PATCHES, patch_means(SURFACE, PATCHES))
 
 
-@pytest.mark.parametrize("tilt", [(0.005, -0.002), None], ids=["tilted", "balanced"])
-@pytest.mark.parametrize("block", BLOCKS)
+@pytest.mark.parametrize(
+    ("block", "tilt"),
+    [("pancake", None), ("cube", (0.005, -0.002)), ("column", None)],
+    ids=["pancake, balanced", "cube, tilted", "column, balanced"],
+)
 def test_the_way_back_is_the_way_there(block, tilt):
     points = (9e-3, 3e-3)
     load_history = LoadHistory(approach=points, steps=3, tilt=tilt)

@@ -82,8 +82,9 @@ def test_a_column_of_few_curved_cells_bears_what_a_round_one_does(tmp_path, cell
     assert pressed(space, straight.facet_tags, *tags, 0.0) < 0.97 * expected
 
 
-@pytest.mark.parametrize("kind", [dmesh.CellType.tetrahedron, dmesh.CellType.hexahedron])
-@pytest.mark.parametrize("degree", [1, 2])
+@pytest.mark.parametrize(
+    ("kind", "degree"), [(dmesh.CellType.tetrahedron, 2), (dmesh.CellType.hexahedron, 1)]
+)
 def test_straight_cells_of_second_order_are_those_of_first(kind, degree):
     """The maps are the same polynomials; what is left is rounding."""
     first = box((3, 2, 2), kind)

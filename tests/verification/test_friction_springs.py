@@ -88,9 +88,11 @@ PATHS = {
 TOLERANCES = {"loop": (0.004, 0.0135), "falling load": (0.004, 0.012), "turn": (0.005, 0.012)}
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.0, 0.3])
+# Poisson's ratio once a path; it changes the cells alone, not the law
+@pytest.mark.parametrize(
+    ("name", "poisson_ratio"), [*((name, 0.0) for name in SURFACES), (next(iter(SURFACES)), 0.3)]
+)
 @pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("name", SURFACES)
 def test_springs_follow_cells_along_paths(name, path, poisson_ratio):
     cells, springs, energies = both(name, poisson_ratio).along(PATHS[path])
     assert np.abs(cells).max() > 0.5
