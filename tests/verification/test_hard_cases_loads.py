@@ -161,17 +161,8 @@ def test_laws_with_a_kink_a_plateau_a_wall_or_noise(name, force):
         assert state.load[0] == pytest.approx(force, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("by_force", "name"),
-    [
-        # under a force the same approach is solved for first
-        pytest.param(by_force, name, id=f"{load}-{name}", marks=[pytest.mark.long] * slow)
-        for by_force, load in ((False, "approach"), (True, "force"))
-        for name in TABLES
-        for slow in [name == "nearly vertical" and not by_force]
-    ],
-)
-def test_nine_patches_with_such_laws(name, by_force):
+@pytest.mark.parametrize("name", TABLES)
+def test_nine_patches_with_such_laws(name):
     # hard: which patches are before the kink or wall, and which beyond, is one choice of 2^9
     closure, pressure = TABLES[name]
     if name == "noisy":
@@ -182,13 +173,12 @@ def test_nine_patches_with_such_laws(name, by_force):
     patches = PatchGrid(grid=(3, 3), lengths=(1.0, 1.0))
     yields = influence_matrix(patches) / (np.pi * 4092.0)
     newton = partial(equilibrium, PatchLaws(laws), yields, patches)
-    state = newton(Control(approach=0.01, tilt=(0.0, 0.0)))
-    if by_force:
-        level, state = state, newton(Control(force=float(state.load[0]), tilt=(0.0, 0.0)))
-        # the force is met to 1e-12, the approach follows from it
-        assert state.plane[0] == pytest.approx(level.plane[0], rel=1e-7)
+    level = newton(Control(approach=0.01, tilt=(0.0, 0.0)))
+    state = newton(Control(force=float(level.load[0]), tilt=(0.0, 0.0)))
+    # the force is met to 1e-12, the approach follows from it
+    assert state.plane[0] == pytest.approx(level.plane[0], rel=1e-7)
     # 74 and 92 at kinks, and none found at walls, before steps were bent along the laws
-    assert state.iterations <= 12
+    assert max(level.iterations, state.iterations) <= 12
     # patch after patch by Brent's method, until nothing moves: slow and sure, as energy is convex
     found = np.zeros(9)
     for _ in range(200):
