@@ -15,6 +15,7 @@ HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
 
 import generated  # noqa: E402
+from docutils import nodes  # noqa: E402
 from sphinx.application import Sphinx  # noqa: E402
 
 project = "patchlaw"
@@ -94,7 +95,17 @@ def _keep_bars(
         lines[number] = "``".join(parts)
 
 
+def _scale_pictures(app: Sphinx, tree: nodes.document) -> None:
+    """Show pictures in one scale, so that their text is of one size; the widest fill a page."""
+    for image in tree.findall(nodes.image):
+        path = Path(app.srcdir, image["uri"])
+        if path.suffix == ".png" and path.is_file() and "demos" in path.parts:
+            pixels = int.from_bytes(path.read_bytes()[16:20], "big")
+            image["width"] = f"{min(54.0, 54.0 * pixels / 1440.0):.1f}em"
+
+
 def setup(app: Sphinx) -> None:
     """Connect what is done while pages are read."""
+    app.connect("doctree-read", _scale_pictures)
     app.connect("autodoc-process-docstring", _keep_bars, priority=900)
     app.connect("include-read", _link_from_docs)

@@ -92,7 +92,7 @@ def scene_key_tables() -> str:
                 repeated.append((key.name, known[said]))
             elif not key.is_section:
                 rows.append((f"`{key.name}`", key.meaning, key.values, f"`{_default(key)}`"))
-        parts.append(f"{heading}\n\n{section.meaning}\n")
+        parts.append(f"{heading}\n\n{section.meaning * section.is_section}\n")
         parts.append(_table(("key", "meaning", "values", "default"), rows))
         if repeated:
             same = "".join(f"* `{name}`: as `{first}`\n" for name, first in repeated)

@@ -31,8 +31,8 @@ Changes = Mapping[str, Any]
 
 AS_SURFACE = "as the surface"
 """Value of a section that is a copy of ``[surface]``."""
-A_MAP = "a map.txt"
-"""A file of heights in the folder of the meshes."""
+A_MAP, ANOTHER_MAP = "a map.txt", "another map.txt"
+"""Files of heights in the folder of the meshes."""
 
 COUPLINGS: dict[str, Changes] = {
     "`analytic`": {"coupling.kind": "analytic"},
@@ -81,7 +81,7 @@ CHOICES: dict[str, dict[str, Changes]] = {
             "surface.grid": None,
             "surface.file": A_MAP,
             "surface.height_unit": "mm",
-            "law.samples": [A_MAP],
+            "law.samples": [ANOTHER_MAP],
         },
         "`law.crown`": {"law.crown": [100.0, "inf"]},
         '`reference.mesher = "gmsh"`': {"reference.cells": None, "reference.mesher": "gmsh"},
@@ -170,8 +170,9 @@ class Planner:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        heights = 1e-2 * np.random.default_rng(1).standard_normal((4, 4))
-        np.savetxt(folder / A_MAP, np.kron(heights, np.ones((4, 4))))
+        wave = np.cos(2.0 * np.pi * (np.arange(16) + 0.5) / 16)
+        np.savetxt(folder / A_MAP, 0.02 * np.outer(wave, wave))
+        np.savetxt(folder / ANOTHER_MAP, 0.018 * np.outer(wave, wave))
         write_mesh(folder / "below.msh", 0.0, 1.0, contact_above=True)
         write_mesh(folder / "above.msh", 1.0, 2.0, contact_above=False)
 
@@ -216,9 +217,10 @@ class Planner:
             data = data.setdefault(section, {})
         if value is None:
             data.pop(name, None)
-        elif value in (A_MAP, [A_MAP]):
-            path = str(self._folder / A_MAP)
-            data[name] = path if value == A_MAP else [path]
+        elif value == A_MAP:
+            data[name] = str(self._folder / value)
+        elif value == [ANOTHER_MAP]:
+            data[name] = [str(self._folder / ANOTHER_MAP)]
         elif value == AS_SURFACE:
             data[name] = {**data["surface"]}
         elif value == "a mesh":
