@@ -333,16 +333,24 @@ class LawContactProblem:
         forces.linearise(stiffness)
         self._preconditioner.update()
         way = np.ones_like(sampling.weight)
-        change = self._closed_in(way)
+        change, _ = self._closed_in(way)
         if opposite is not None:
             contact = _Pressed(self, self.forces.control)
             moved = opposite.followed(opposite.under(change), contact, _RESPONSE)
-            change = self._closed_in(way - opposite.at_samples(moved))
+            change, _ = self._closed_in(way - opposite.at_samples(moved))
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
 
-    def _closed_in(self, way: Array) -> Array:
-        """Return the change of pressures where samples close in, shapes (n,), to first order."""
+    def _closed_in(self, way: Array, tolerance: float = _LINEAR) -> tuple[Array, int]:
+        """Return the change of pressures where samples close in, shapes (n,), to first order.
+
+        Args:
+            way: What they close in by [mm].
+            tolerance: Relative residual of the linear solve.
+
+        Returns:
+            The change, and the linear iterations that it took.
+        """
         forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
         risen = forces.pressure_change(sampling.weight * way)
@@ -350,12 +358,12 @@ class LawContactProblem:
         sampling.operator.mult(sampling.values, load)
         solver = self.newton.snes.ksp
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
-        solve_linear(solver, load, moved)
+        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
+        iterations = solve_linear(solver, load, moved)
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
         compat.collect_garbage(load.comm)
-        return np.asarray(change)
+        return np.asarray(change), iterations
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""
@@ -433,18 +441,32 @@ class _Pressed:
     def __init__(self, problem: LawContactProblem, control: Control) -> None:
         self._problem, self._control, self._memory = problem, control, problem.memory
         self._found: list[FaceEquilibrium] = []
+        self._sunk: Array = np.zeros_like(problem._flat_gap)
+        self._iterations = 0
 
     def pressed(self, moved: Array) -> Array:
         """Solve the load step anew, from what friction left behind before it."""
-        problem = self._problem
+        problem, forces = self._problem, self._problem.forces
         problem.memory = self._memory
-        problem.forces.gap = problem._flat_gap + moved
-        self._found.append(problem._solved(self._control))
-        return self._found[-1].sample_pressure
+        forces.gap = problem._flat_gap + moved
+        state = problem._solved(self._control)
+        self._sunk = forces.levers.matrix @ problem._plane - forces.gap - state.sample_closure
+        self._found.append(state)
+        return state.sample_pressure
 
-    def closed_in(self, way: Array) -> Array:
+    def held(self, moved: Array) -> Array:
+        """Return the pressures on the body as it is displaced now."""
+        forces = self._problem.forces
+        forces.gap = self._problem._flat_gap + moved
+        closure = forces.closure_of(self._sunk)
+        forces.linearise(forces.stiffness(closure))
+        return forces.pressure(closure)
+
+    def closed_in(self, way: Array, tolerance: float) -> Array:
         """Return the change of pressures where samples close in."""
-        return self._problem._closed_in(way)
+        change, iterations = self._problem._closed_in(way, tolerance)
+        self._iterations += iterations
+        return change
 
     def alone(self, way: Array, softer: float = 0.0) -> Array:
         """Return that on a rigid body, or on a local compliance."""
@@ -463,7 +485,7 @@ class _Pressed:
         return replace(
             self._found[-1],
             iterations=sum(one.iterations for one in self._found),
-            linear_iterations=sum(one.linear_iterations for one in self._found),
+            linear_iterations=self._iterations + sum(one.linear_iterations for one in self._found),
         )
 
 

@@ -26,8 +26,12 @@ _COARSER = 1.5
 _TOLERANCE, _ROUGHLY, _NEARLY = 1e-8, 1e-3, 1e-2
 """Relative difference of displacements in equilibrium, of those that lead there, and of the
 preconditioner's."""
-_MOST = 60
-"""Iterations at most."""
+_INNER = 0.1
+"""Relative error of the body's responses over that of the displacements that are solved for."""
+_MOST, _MOST_HELD = 60, 15
+"""Iterations at most, and of those on a body that is held."""
+_GAINED = 0.1
+"""Residual after a step on the held body over that before it, with which another one follows."""
 
 _OVERSHOT, _MOST_CUTS = 0.5, 12
 """Slope of the energy along a step that it may end on, relative to the first one beyond the least
@@ -41,7 +45,11 @@ class Contact(Protocol):
         """Return the pressures of the samples in gaps that are wider by so much, (n,) [MPa]."""
         ...
 
-    def closed_in(self, way: Array, /) -> Array:
+    def held(self, moved: Array, /) -> Array:
+        """Return the pressures on the body as it is displaced now, (n,) [MPa]."""
+        ...
+
+    def closed_in(self, way: Array, tolerance: float, /) -> Array:
         """Return the change of pressures where samples close in, to first order, (n,) [MPa]."""
         ...
 
@@ -96,10 +104,12 @@ class OppositeHalfSpace:
         return np.asarray(self._spread @ moved.ravel())
 
     def follow(self, contact: Contact, what: str) -> None:
-        """Bring the half-space into equilibrium with a contact, by Newton's method.
+        """Bring the half-space into equilibrium with a contact.
 
-        The energy of both is convex in the forces between them. A step that goes beyond its least
-        value along the step is taken back to near it.
+        First the half-space settles on the body as it is displaced, which takes no solution of the
+        body, again and again while that brings both together; on a stiff body that is nearly all.
+        The rest is left to Newton's method. The energy of both is convex in the forces between
+        them. A step that goes beyond its least value along the step is taken back to near it.
 
         Args:
             contact: The contact on the other body.
@@ -108,21 +118,50 @@ class OppositeHalfSpace:
         Raises:
             NotConverged: When that many iterations do not find it.
         """
-        forces = self.forces
+        forces, on_held, last = self.forces, True, np.inf
         found = self.spread(contact.pressed(self.at_samples(self.moved(forces))))
         for _ in range(_MOST):
             rest = found - forces
-            apart = self.moved(rest)
-            if np.abs(apart).max() <= _TOLERANCE * np.abs(self.moved(found)).max():
+            apart, largest = self.moved(rest), np.abs(self.moved(found)).max()
+            left = np.abs(apart).max()
+            if left <= _TOLERANCE * largest:
                 self.forces = forces
                 return
-            step = self.followed(apart, contact, _ROUGHLY)
-            change = rest + self.spread(contact.closed_in(-self.at_samples(step)))
-            forces, found = self._along(forces, rest, change, contact)
+            on_held, last = on_held and left < _GAINED * last, left
+            if on_held:
+                settled = self._settled(forces, contact, _INNER * _GAINED * min(left, largest))
+                change = rest if settled is None else settled - forces
+                on_held = settled is not None and float(np.vdot(apart, change)) > 0.0
+            if not on_held:
+                step = self.followed(apart, contact, _ROUGHLY)
+                closed_in = contact.closed_in(-self.at_samples(step), _INNER * _ROUGHLY)
+                change = rest + self.spread(closed_in)
+            forces, found = self._along(forces, rest, change, contact.pressed)
         raise _failed(what)
 
+    def _settled(self, forces: Array, contact: Contact, tolerance: float) -> Array | None:
+        """Return the forces of the half-space on the body as it is displaced, by Newton's method.
+
+        None where few iterations do not find them.
+
+        Args:
+            forces: The forces to start from.
+            contact: The contact.
+            tolerance: Difference of displacements that is allowed [mm].
+        """
+        found = self.spread(contact.held(self.at_samples(self.moved(forces))))
+        for _ in range(_MOST_HELD):
+            rest = found - forces
+            apart = self.moved(rest)
+            if np.abs(apart).max() <= tolerance:
+                return forces
+            step = _accelerated(self._remaining(apart, contact), apart, _NEARLY)[0]
+            change = rest + self.spread(contact.alone(-self.at_samples(step)))
+            forces, found = self._along(forces, rest, change, contact.held)
+        return None
+
     def _along(
-        self, forces: Array, rest: Array, change: Array, contact: Contact
+        self, forces: Array, rest: Array, change: Array, pressed: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
         """Return forces after a step, and those that the contact has then.
 
@@ -130,17 +169,23 @@ class OppositeHalfSpace:
             forces: The forces before it.
             rest: What they are less than those of the contact.
             change: The whole step.
-            contact: The contact.
+            pressed: Returns the pressures in gaps that are wider by so much.
         """
         moved, before, share = self.moved(change), self.moved(forces), 1.0
         start = float(np.vdot(rest, moved))
         for _ in range(_MOST_CUTS):
-            found = self.spread(contact.pressed(self.at_samples(before + share * moved)))
+            found = self.spread(pressed(self.at_samples(before + share * moved)))
             left = float(np.vdot(found - forces - share * change, moved))
             if not 0.0 < start * _OVERSHOT < -left:
                 break
             share *= start / (start - left)
         return forces + share * change, found
+
+    def _remaining(
+        self, rest: Array, contact: Contact, softer: float = 0.0
+    ) -> Callable[[Array], Array]:
+        """Return the residual of (1 + H P') x = r with the response P' without the mesh."""
+        return lambda x: rest - x + self.under(contact.alone(-self.at_samples(x), softer))
 
     def followed(self, rest: Array, contact: Contact, tolerance: float) -> Array:
         """Solve (1 + H P') x = r with the half-space H and the response P' of the contact.
@@ -153,10 +198,10 @@ class OppositeHalfSpace:
             contact: The contact on the other body.
             tolerance: Largest error of x that is allowed, relative to its largest value.
         """
-        way, closed_in = self.at_samples(rest), contact.closed_in
+        way = self.at_samples(rest)
         own = (
             self._work(way, way),
-            self._work(way, closed_in(way)),
+            self._work(way, contact.closed_in(way, _INNER * _NEARLY)),
             self._work(way, contact.alone(way)),
         )
         if not min(own) > 0.0:
@@ -164,13 +209,11 @@ class OppositeHalfSpace:
         softer = max(own[0] / own[1] - own[0] / own[2], 0.0)
 
         def nearly(left: Array) -> Array:
-            def remaining(x: Array) -> Array:
-                return left - x + self.under(contact.alone(-self.at_samples(x), softer))
-
-            return _accelerated(remaining, left, _NEARLY)[0]
+            return _accelerated(self._remaining(left, contact, softer), left, _NEARLY)[0]
 
         def remaining(x: Array) -> Array:
-            return nearly(rest - x + self.under(closed_in(-self.at_samples(x))))
+            closed_in = contact.closed_in(-self.at_samples(x), _INNER * tolerance)
+            return nearly(rest - x + self.under(closed_in))
 
         x, found = _accelerated(remaining, nearly(rest), tolerance)
         if not found:

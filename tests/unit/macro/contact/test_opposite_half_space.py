@@ -90,3 +90,21 @@ def test_a_soft_half_space_opens_the_middle_of_the_face():
     assert state.force == pytest.approx(2.0, rel=1e-9)
     assert state.sample_pressure.min() >= 0.0
     assert state.sample_pressure.max() > 3.0 * state.force  # of a flat punch, at its corners
+
+
+def test_a_stiff_body_is_solved_a_few_times_alone(monkeypatch):
+    """The half-space settles on the body as it is: Newton's method needs no responses of it."""
+    responses = []
+    whole = LawContactProblem._closed_in
+
+    def counted(problem, *arguments):
+        responses.append(whole(problem, *arguments)[1])
+        return whole(problem, *arguments)
+
+    monkeypatch.setattr(LawContactProblem, "_closed_in", counted)
+    for control in (Control(approach=APPROACH), Control(force=2.0, tilt=None)):
+        _, state = pressed(face_of(6, modulus=1e6), 5e3, control)
+        assert not responses
+        assert state.iterations <= 12
+    _, soft = pressed(face_of(6, modulus=1e2), 5e3, Control(approach=APPROACH))
+    assert soft.linear_iterations > sum(responses) > 0  # which are counted
