@@ -13,17 +13,17 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import bmat, csr_matrix, kron
+from scipy.sparse import csr_matrix
 
 from geometry.materials import Material
 from macro.compliance.cache import cached
 from macro.compliance.elements import Line, block_lines
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.collective import shared
 from support.errors import InputError
 
@@ -189,42 +189,54 @@ class ParityBlock:
             by_height: Return its derivative with respect to the block's height instead [N/mm²].
         """
         lame, shear = self.material.lame
-        blocks: list[list[Any]] = [[None] * 3 for _ in range(3)]
+        sizes = [math.prod(len(line.values) for line in lines) for lines in self._lines]
+        starts = np.cumsum([0, *sizes])
+        entries: list[tuple[Array, Indices, Indices]] = []
+
+        def add(row: int, column: int, slopes: tuple[int, int], weight: float) -> None:
+            values, at, other = self._product((row, column), slopes, by_height)
+            entry = weight * values, starts[row] + at, starts[column] + other
+            entries.append(entry)
+            if row != column:
+                entries.append((entry[0], entry[2], entry[1]))
+
         for row in range(3):
-            weights = [lame + 2.0 * shear if axis == row else shear for axis in range(3)]
-            blocks[row][row] = sum(
-                weight * self._product((row, row), (axis, axis), by_height)
-                for axis, weight in enumerate(weights)
-            )
+            for axis in range(3):
+                add(row, row, (axis, axis), lame + 2.0 * shear if axis == row else shear)
             for column in range(row):
-                first = self._product((row, column), (row, column), by_height)
-                second = self._product((row, column), (column, row), by_height)
-                blocks[row][column] = lame * first + shear * second
-                blocks[column][row] = blocks[row][column].T
-        return csr_matrix(bmat(blocks))
+                add(row, column, (row, column), lame)
+                add(row, column, (column, row), shear)
+        values, rows, columns = (np.concatenate(part) for part in zip(*entries, strict=True))
+        return csr_matrix((values, (rows, columns)), shape=(starts[-1], starts[-1]))
 
     def _product(
         self, components: tuple[int, int], slopes: tuple[int, int], by_height: bool
-    ) -> csr_matrix:
+    ) -> tuple[Array, Indices, Indices]:
         """Return the integrals of products of two components' slopes, or their derivative.
 
         Args:
             components: Component of the rows, and of the columns.
             slopes: Axis of the slopes of the rows' component, and of the columns'.
             by_height: Return the derivative with respect to the height instead.
+
+        Returns:
+            The integrals that are not zero, with their rows and columns, shape (n,) each.
         """
-        factors = []
+        # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
+        share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0
+        values, rows, columns = np.array([share]), np.zeros(1, np.intp), np.zeros(1, np.intp)
         for axis in range(3):
             one, other = (self._lines[component][axis] for component in components)
             left = one.slopes if axis == slopes[0] else one.values
             right = other.slopes if axis == slopes[1] else other.values
             matrix = (left * one.weights) @ right.T
             # smaller entries are the rounding of integrals that are zero
-            large = np.abs(matrix) > 1e-13 * np.abs(matrix).max(initial=0.0)
-            factors.append(csr_matrix(np.where(large, matrix, 0.0)))
-        # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
-        share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0
-        return share * reduce(kron, factors)
+            at, where = np.nonzero(np.abs(matrix) > 1e-13 * np.abs(matrix).max(initial=0.0))
+            # the Kronecker product
+            values = np.multiply.outer(values, matrix[at, where]).ravel()
+            rows = np.add.outer(rows * len(matrix), at).ravel()
+            columns = np.add.outer(columns * matrix.shape[1], where).ravel()
+        return values, rows, columns
 
 
 def _solution(stiffness: csr_matrix, right: Array) -> Array:

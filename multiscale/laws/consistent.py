@@ -211,9 +211,10 @@ class WholeSurface:
 
     def laws(self, rows: SolvedRows) -> list[PatchLaw]:
         """Return the laws of all patches through rows of increasing approaches, columns (m, N)."""
-        laws = []
+        laws, touched, open_rows = [], rows.pressure.any(axis=0), rows[:0, 0]
         for index, height in enumerate(self.mean_heights):
-            touching = rows[:, index].from_first_touch()
+            # most patches stay open
+            touching = rows[:, index].from_first_touch() if touched[index] else open_rows
             touch = touching.closure[0] if len(touching) else rows.closure[:, index].max()
             laws.append(PatchLaw.of(touching, touch, self.model.reference_height - height))
         return laws
