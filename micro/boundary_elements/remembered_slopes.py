@@ -74,7 +74,9 @@ class RememberedSlopes:
         loaded = self._loaded(pressure)
         size, parts = float(np.linalg.norm(loaded)), self._along(0, pressure)
         rest = size**2 - float(parts @ parts)
-        if rest > (_REST * size) ** 2 and self._known < _MOST:
+        if rest > (_REST * size) ** 2:
+            if self._known == _MOST:
+                self._known = 0  # forget all
             self._remember(loaded)
             parts = self._along(0, pressure)
         count = self._known

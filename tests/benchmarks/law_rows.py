@@ -50,6 +50,7 @@ COUNTED = {
     (ComplianceMatrix, "displacement"): "by a matrix",
     (ComplianceMatrix, "apply_compliance"): "by a matrix",
     (FiniteSlopes, "displacement"): "slopes",
+    (FiniteSlopes, "orders"): "slopes",
 }
 counts = Counter()
 

@@ -7,6 +7,7 @@ import pytest
 
 from geometry import Control, Material, Spectrum, synthesise
 from micro import FreeSides, HalfSpaceModel
+from micro.boundary_elements import remembered_slopes
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from micro.boundary_elements.side_cells import SideStresses
@@ -81,6 +82,17 @@ def test_a_path_of_loads_has_the_same_forces(slopes, hardness):
         assert state.patch_displacement == pytest.approx(exact.patch_displacement, rel=2e-8)
         slack = 1e-7 * exact.pressure.max()
         assert state.pressure == pytest.approx(exact.pressure, abs=slack)
+
+
+def test_a_full_memory_begins_anew(slopes, monkeypatch):
+    monkeypatch.setattr(remembered_slopes, "_MOST", 3)
+    model = model_with(slopes)
+    quick, start = model.quick_up_to(LARGEST), None
+    for part in (0.5, 0.7, 1.0):
+        control = replace(LARGEST, approach=part * LARGEST.approach)
+        state = quick.press(control, start=start)
+        start = state.guess
+        assert state.force == pytest.approx(model.press(control).force, rel=2e-8)
 
 
 def test_a_larger_load_than_foreseen_is_solved_all_the_same(slopes):
