@@ -27,6 +27,13 @@ class Counted:
     def __getattr__(self, name):
         return getattr(self.model, name)
 
+    def quick_up_to(self, control):
+        quick = self.model.quick_up_to(control)
+        if quick is None:
+            return None
+        self.model = quick
+        return self
+
     def press(self, *arguments, **more):
         self.solved += 1
         return self.model.press(*arguments, **more)
