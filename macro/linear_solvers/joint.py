@@ -24,6 +24,7 @@ from macro.linear_solvers.selection import (
     COMPRESSIBLE,
     FACTORISED,
     algebraic_options,
+    has_slow_modes,
     quadratic_options,
     vertex_transfer,
 )
@@ -50,13 +51,13 @@ def joint_solver(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffen
     quadratic = any(body.degree == 2 for body in bodies)
     if quadratic and not incompressible:
         solver = _two_grids(bodies, stiffness, stiffened)
-        grid, matrix = solver.pc.getMGCoarseSolve(), None
+        if has_slow_modes(solver):
+            solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), None, _slow_modes(bodies))
     else:
         options = DIRECT_DEFAULTS if incompressible else options
         solver = linear_solver(stiffness, preconditioner=options, whole=stiffened.assembled())
-        grid, matrix = solver, stiffened.product
-    if not incompressible and not PETSc.Options(PREFIX).hasName("pc_type"):
-        solver.solve_slow_modes(grid, matrix, _slow_modes(bodies))
+        if not incompressible and not PETSc.Options(PREFIX).hasName("pc_type"):
+            solver.solve_slow_modes(solver, stiffened.product, _slow_modes(bodies))
     return solver
 
 
@@ -69,7 +70,7 @@ def _two_grids(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened
     matrices = [body.linear.stiffness if body.degree == 2 else body.stiffness for body in bodies]
     grid = CoarserGrid(transfer, with_springs(matrices, springs))
     springs.destroy()
-    options = quadratic_options(_hardest(bodies))
+    options = quadratic_options(_hardest(bodies), grid.matrix)
     finest = stiffened.product, stiffened.block_diagonal()
     return linear_solver(stiffness, [grid], options, finest=finest)
 
@@ -85,13 +86,18 @@ def _from_vertices(body: Any) -> PETSc.Mat:
     return same
 
 
-def _slow_modes(bodies: Sequence[Any]) -> Array:
-    """Return this rank's rows of the modes that the bodies' own solvers solve for."""
+def _slow_modes(bodies: Sequence[Any]) -> Array | None:
+    """Return this rank's rows of the modes that the bodies' own solvers solve for.
+
+    None where the grid of a body was small enough for a factorisation, and that of all is not.
+    """
     modes = []
     for body in bodies:
         own = body.linear if body.degree == 2 else body
         modes.append(body.solver.modes)
         if modes[-1] is None:
+            if body.degree == 2 and body.lattice is None:
+                return None
             modes[-1] = np.zeros((own.owned_dofs, 0))
     return np.asarray(block_diag(*modes))
 

@@ -72,6 +72,11 @@ def has_hypre() -> bool:
     return bool(PETSc.Sys.hasExternalPackage("hypre"))
 
 
+def has_mumps() -> bool:
+    """Tell whether PETSc was built with MUMPS."""
+    return bool(PETSc.Sys.hasExternalPackage("mumps"))
+
+
 def users_options() -> tuple[tuple[str, str], ...]:
     """Return the user's PETSc options under `PREFIX`, sorted by name; results depend on them."""
     given = PETSc.Options(PREFIX).getAll()

@@ -10,8 +10,9 @@ other meshes, a factorisation is used where it fits into memory. Iterations to 1
     lattices        7 to 10 with tetrahedra; at ν = 0.49 13 (Q1), 14 (P1), 16 to 23 (Q2)
     other meshes    10 to 18 up to ν = 0.3 on cells of even lengths, 20 at 0.45, whatever the shape,
                     the supports and the jump of the moduli; with their slow modes solved for
-                    (`slow_modes`) 14 to 17 on flat tetrahedra, 16 to 18 on flat hexahedra, 26 to 31
-                    on a quadratic brake pad held at the rim of its piston
+                    (`slow_modes`) 14 to 17 on flat tetrahedra, 16 to 18 on flat hexahedra; 31
+                    to 36 on a quadratic brake pad held at the rim of its piston, and 20 where the
+                    grid of its vertices is factorised
     factorised      1 to 2; 10⁵ unknowns take 4 to 6 s and 1 GB, once
 
 Without a lattice hypre's BoomerAMG coarsens linear elements.
@@ -69,8 +70,9 @@ from macro.linear_solvers.options import (
     DIRECT_DEFAULTS,
     PREFIX,
     has_hypre,
+    has_mumps,
 )
-from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
+from macro.linear_solvers.solvers import MARGINS, CoarserGrid, LinearSolver, linear_solver
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -86,6 +88,16 @@ FACTORISED = 100_000
 """Largest number of unknowns for which a factorisation replaces multigrid when nearly
 incompressible. Larger systems keep multigrid and take twice the iterations for every factor of four
 in 1 − 2ν."""
+
+FACTORISED_VERTICES = 30_000
+"""Largest number of the vertices' unknowns whose matrix is factorised in place of a multigrid, on
+quadratic elements. Brake pads of 83,000 and 198,000 unknowns then take 20 iterations to 1e-8
+instead of 31 and 35, set-ups of half the time, and load steps under a law 0.78 and 0.67 of the CPU
+time (stiffer laws 0.83): factors of 12,000 and 28,000 unknowns are 0.7 and 3.9 Gflop once, 188 and
+283 entries an unknown. Flanges of 26,000 and 152,000 unknowns take the same in both ways."""
+
+_FACTORISED_GRID: Mapping[str, object] = {**DIRECT_DEFAULTS, "mat_mumps_icntl_14": MARGINS[1]}
+"""With room for pivots on several ranks, see `MARGINS`."""
 
 _DEGREES = (4, 8)
 """Smallest and largest degree of the smoothing polynomial."""
@@ -166,8 +178,9 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
         if stiffened is not None:
             springs, finest = stiffened.springs, (stiffened.product, stiffened.block_diagonal())
         grid = vertex_grid(body.space, body.linear, body.free, springs)
-        solver = linear_solver(matrix, grid, quadratic_options(mesh), finest=finest)
-        if not PETSc.Options(PREFIX).hasName("mg_coarse_pc_type"):
+        options = quadratic_options(mesh, grid[0].matrix)
+        solver = linear_solver(matrix, grid, options, finest=finest)
+        if has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
         return solver
     whole = None if stiffened is None else stiffened.assembled()
@@ -191,18 +204,31 @@ def algebraic_options(mesh: Any) -> Mapping[str, object]:
     return _BY_COMPONENTS if compat.is_hexahedral(mesh) else _BY_NODES
 
 
-def quadratic_options(mesh: Any) -> Mapping[str, object]:
+def quadratic_options(mesh: Any, vertices: PETSc.Mat) -> Mapping[str, object]:
     """Return PETSc's options of the two grids of `vertex_grid`.
 
     Args:
         mesh: dolfinx mesh of tetrahedra or hexahedra.
+        vertices: The matrix on the grid of the vertices.
 
     Note:
         Collective.
     """
-    algebraic = algebraic_options(mesh)
+    small = vertices.getSize()[0] <= FACTORISED_VERTICES and has_mumps()
+    coarse = _FACTORISED_GRID if small else algebraic_options(mesh)
     flat = _SMOOTHING_FLAT if _mostly_flat(mesh) else {}
-    return {**_SMOOTHING, **flat, **{f"mg_coarse_{key}": algebraic[key] for key in algebraic}}
+    return {**_SMOOTHING, **flat, **{f"mg_coarse_{key}": coarse[key] for key in coarse}}
+
+
+def has_slow_modes(solver: LinearSolver) -> bool:
+    """Tell whether the grid of the vertices has a multigrid of ours, which may miss some modes.
+
+    Args:
+        solver: Made with `quadratic_options`.
+    """
+    requested = PETSc.Options(PREFIX).hasName("mg_coarse_pc_type")
+    coarse = solver.pc.getMGCoarseSolve().pc.getType()
+    return not requested and coarse != _FACTORISED_GRID["pc_type"]
 
 
 def _mostly_flat(mesh: Any) -> bool:

