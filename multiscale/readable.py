@@ -32,7 +32,7 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
     ),
     "MPa/mm": (("TPa/mm", 1e6), ("GPa/mm", 1e3), ("MPa/mm", 1.0)),
     "mm²": (("mm²", 1.0), ("µm²", 1e-6), ("nm²", 1e-12)),
-    "N/mm": (("GN/m", 1e6), ("MN/m", 1e3), ("kN/m", 1.0), ("N/m", 1e-3)),
+    "N/mm": (("MN/mm", 1e6), ("kN/mm", 1e3), ("N/mm", 1.0), ("N/m", 1e-3)),
     "mJ": (("J", 1e3), ("mJ", 1.0), ("µJ", 1e-3), ("nJ", 1e-6), ("pJ", 1e-9)),
     "W/K": (("kW/K", 1e3), ("W/K", 1.0), ("mW/K", 1e-3), ("µW/K", 1e-6)),
     "S": (("MS", 1e6), ("kS", 1e3), ("S", 1.0), ("mS", 1e-3), ("µS", 1e-6)),
@@ -42,7 +42,7 @@ _PREFIXES: dict[str, tuple[tuple[str, float], ...]] = {
 SCALED_UNITS = frozenset(_PREFIXES)
 """Units that take prefixes."""
 
-_USUAL = {"mm": "µm", "N/mm": "kN/m"}
+_USUAL = {"mm": "µm"}
 """Units that columns and headlines keep as long as their numbers are of a handy size."""
 _HANDY = {"MPa": (0.1, 1e3), "mm²": (0.01, 1e6), "mm³/s": (1e-9, 1e6)}
 """Sizes of numbers that keep them, from the first on and below the second; else 0.1 and 1e4."""

@@ -72,6 +72,7 @@ def test_numbers_have_no_power_of_ten_of_code(value, text):
         ([2e5], "N", ("kN", 1e3)), ([5.9e-4], "mm", ("µm", 1e-3)), ([2e-5], "mm", ("nm", 1e-6)),
         ([math.nan, 0.0], "MPa", ("MPa", 1.0)),
         ([12.0, -30.0], "mm", ("mm", 1.0)), ([], "S", ("S", 1.0)),
+        ([0.06, 3e-6], "mm³/s", ("mm³/s", 1.0)), ([7.0e4], "N/mm", ("kN/mm", 1e3)),
     ],
 )  # fmt: skip
 def test_columns_have_one_unit_that_suits_their_largest_value(values, unit, found):
@@ -84,6 +85,8 @@ def test_columns_have_one_unit_that_suits_their_largest_value(values, unit, foun
         (5.8987e-4, 6.5e-7, "mm", "0.58987 ± 0.00065 µm"),
         (1.3e-3, 4e-6, "N", "1.3000 ± 0.0040 mN"),
         (2.5e-4, None, "N", "250 µN"), (20.0, 0.0, "N", "20 N"), (14100.0, None, "MPa", "14.1 GPa"),
+        (2.9e-6, 1.8e-6, "mm³/s", "(2.9 ± 1.8)·10⁻⁶ mm³/s"),
+        (9.8e-6, None, "mm³/s", "9.8·10⁻⁶ mm³/s"),
     ],
 )  # fmt: skip
 def test_measured_quantities_have_value_and_error_in_one_unit(value, error, unit, text):

@@ -13,7 +13,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from multiscale.output.provenance import provenance
-from multiscale.output.report import citations, filled, report_html, shown_contacts
+from multiscale.output.report import _parted, citations, filled, report_html, shown_contacts
 from multiscale.output.results import write_results
 from multiscale.readable import percent, quantity
 from multiscale.run import Run
@@ -242,3 +242,12 @@ def test_of_many_contacts_some_are_shown():
     assert {0, 777, 999} <= set(steps)
     assert shown_contacts(records[:1]) == []
     assert shown_contacts(records[:40]) == records[:40]
+
+
+def test_parts_of_a_table_are_about_as_wide():
+    headings = ["step", *"abcdefghi"]
+    rows = [[str(k) for k in range(10)]]
+    parts = list(_parted((headings, rows)))
+    assert [list(heading) for heading, _ in parts] == [["step", *"abcde"], ["step", *"fghi"]]
+    assert [list(row) for _, (row,) in parts] == [list("012345"), list("06789")]
+    assert list(_parted((["step"], [["1"]]))) == []
