@@ -14,6 +14,7 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from geometry.materials import Material
 from geometry.rigid_plane import Control, RigidPlane
 from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
@@ -101,8 +102,8 @@ class LawContactProblem:
             mesh, such as of a crowned face [mm]; None: none.
         friction: Friction of the face, whose sliders move on with every load step that converges;
             None: none. Tangents are unsymmetric with it, and GMRES solves for them.
-        opposite: (1 − ν²) / E of a half-space on the other side, which is displaced under the whole
-            face [1/MPa]; 0: a rigid plane.
+        opposite: Elastic constants of a half-space on the other side, which is displaced under the
+            whole face, sideways too where there is friction; None: a rigid plane.
 
     Raises:
         InputError: When there is not one law per patch, or no such mode.
@@ -119,7 +120,7 @@ class LawContactProblem:
         *,
         crown: Callable[[Array, Array], Array] | None = None,
         friction: Friction | None = None,
-        opposite: float = 0.0,
+        opposite: Material | None = None,
     ) -> None:
         if len(laws) != face.patches.count:
             raise InputError(
@@ -129,10 +130,11 @@ class LawContactProblem:
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
         self._flat_gap = self._undeformed_gap
-        self._opposite = (
-            OppositeHalfSpace(sampling, face.patches.lengths, opposite) if opposite else None
-        )
+        self._opposite = None
+        if opposite is not None:
+            self._opposite = OppositeHalfSpace(sampling, face.patches.lengths, opposite)
         self._preload: Array | None = None
+        self._flat_preload: Array = np.zeros((len(sampling.weight), 2))
         self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
@@ -171,9 +173,34 @@ class LawContactProblem:
         if self._opposite is None or control.force == 0.0:
             self.forces.gap = self._flat_gap
             return self._solved(control)
-        contact = _Pressed(self, control)
-        self._opposite.follow(contact, f"the half-space at {control}")
+        contact, what = _Pressed(self, control), f"the half-space at {control}"
+        if isinstance(self.forces, FrictionalForces):
+            self._shear(self._opposite, contact, self.forces, what)
+        else:
+            self._opposite.follow(contact, what)
         return contact.state
+
+    def _shear(
+        self,
+        opposite: OppositeHalfSpace,
+        contact: _Pressed,
+        forces: FrictionalForces,
+        what: str,
+    ) -> None:
+        """Find the equilibrium beside a half-space that shear stresses displace as well."""
+        preload = self._flat_preload
+
+        def remaining(sheared: Array) -> Array:
+            along_x, along_y, wider = (opposite.at_samples(part) for part in sheared)
+            forces.preload = preload + np.stack([along_x, along_y], axis=1)
+            contact.wider = wider
+            opposite.follow(contact, what)
+            state = contact.latest
+            assert state.shear is not None
+            found = opposite.by_shear(state.shear.sample_stress, state.sample_pressure)
+            return found - sheared
+
+        opposite.shear(remaining, what)
 
     def _solved(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium in the gap as it is; see `solve`."""
@@ -258,7 +285,7 @@ class LawContactProblem:
             NotConverged: When the linear solve fails.
 
         Note:
-            Collective; one linear solve.
+            Collective; one linear solve, or some against a half-space.
         """
         forces, equilibrium = self.forces, self.equilibrium
         assert isinstance(forces, FrictionalForces)
@@ -266,15 +293,23 @@ class LawContactProblem:
         forces.linearise_sticking(forces.stiffness(self._closure), stuck)
         self._preconditioner.update()
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        stress = stuck[:, None] * ahead
-        forces.write_stresses(np.zeros(len(stress)), stress, load)
-        solver = self.newton.snes.ksp
+        solver, iterations = self.newton.snes.ksp, 0
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_STIFFNESS)
-        iterations = solve_linear(solver, load, moved) if load.norm() else 0
-        relaxed = stuck[:, None] * forces.along(moved)
+
+        def stresses(way: Array) -> Array:
+            nonlocal iterations
+            stress = stuck[:, None] * way
+            forces.write_stresses(np.zeros(len(stress)), stress, load)
+            iterations += solve_linear(solver, load, moved) if load.norm() else 0
+            return np.asarray(stress - stuck[:, None] * forces.along(moved))
+
+        way = np.broadcast_to(ahead, (len(stuck), 2))
+        if self._opposite is not None:
+            way = way - self._opposite.moved_along(lambda part: stresses(way - part))
+        total = float(forces.total(stresses(way)) @ ahead)
         compat.collect_garbage(load.comm)
-        return float(forces.total(stress - relaxed) @ ahead), iterations
+        return total, iterations
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -375,7 +410,7 @@ class LawContactProblem:
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
             self._flat_gap = self.forces.gap
             if isinstance(self.forces, FrictionalForces):
-                self.forces.preload = self.forces.along(moved)
+                self._flat_preload = self.forces.preload = self.forces.along(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""
@@ -443,12 +478,18 @@ class _Pressed:
         self._found: list[FaceEquilibrium] = []
         self._sunk: Array = np.zeros_like(problem._flat_gap)
         self._iterations = 0
+        self.wider: Array | float = 0.0  # gaps of samples, by shear stresses [mm]
+
+    @property
+    def latest(self) -> FaceEquilibrium:
+        """The latest state alone."""
+        return self._found[-1]
 
     def pressed(self, moved: Array) -> Array:
         """Solve the load step anew, from what friction left behind before it."""
         problem, forces = self._problem, self._problem.forces
         problem.memory = self._memory
-        forces.gap = problem._flat_gap + moved
+        forces.gap = problem._flat_gap + moved + self.wider
         state = problem._solved(self._control)
         self._sunk = forces.levers.matrix @ problem._plane - forces.gap - state.sample_closure
         self._found.append(state)
@@ -457,7 +498,7 @@ class _Pressed:
     def held(self, moved: Array) -> Array:
         """Return the pressures on the body as it is displaced now."""
         forces = self._problem.forces
-        forces.gap = self._problem._flat_gap + moved
+        forces.gap = self._problem._flat_gap + moved + self.wider
         closure = forces.closure_of(self._sunk)
         forces.linearise(forces.stiffness(closure))
         return forces.pressure(closure)

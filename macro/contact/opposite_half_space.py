@@ -2,9 +2,10 @@
 
 Pressures at the samples of the face are spread over a grid of squares, whose displacements are
 those of uniform pressures on squares (Love). The displacements of the samples are interpolated by
-the same weights, so that the compliance is symmetric.
+the same weights, so that the compliance is symmetric. With friction shear stresses are spread
+likewise (Cerruti), and pressures and shear stresses see each other.
 
-Theory: section 11 of ``docs/theory.md``.
+Theory: sections 11 and 15 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from scipy.signal import fftconvolve
 from scipy.sparse import csr_matrix
 
+from geometry.materials import Material
 from macro.contact.sampling import Sampling
 from support.arrays import Array
 from support.errors import NotConverged
@@ -64,23 +66,27 @@ class OppositeHalfSpace:
     Args:
         sampling: Samples of this rank.
         lengths: Sides of the rectangle around the face, from the origin of its frame [mm].
-        compliance: (1 − ν²) / E of the half-space [1/MPa].
+        material: Elastic constants of the half-space.
 
     Attributes:
         forces: Forces on the grid at the latest load step, shape (nx, ny) [N].
+        sheared: What shear stresses displaced at the latest load step, see `by_shear` [mm].
 
     Note:
         Construction and every method are collective, and the grid is the same on every rank.
     """
 
-    def __init__(self, sampling: Sampling, lengths: tuple[float, float], compliance: float) -> None:
-        self._sampling, self._compliance = sampling, compliance
+    def __init__(
+        self, sampling: Sampling, lengths: tuple[float, float], material: Material
+    ) -> None:
+        self._sampling, self._material = sampling, material
         self._comm: Any = sampling.operator.comm.tompi4py()
         weights = np.array([len(sampling.weight), sampling.weight.sum()])
         count, area = self._comm.allreduce(weights)
         self._side = _COARSER * float(np.sqrt(area / count))
         x, y = (int(np.ceil(length / self._side)) + 1 for length in lengths)
         self.forces: Array = np.zeros((x, y))
+        self.sheared: Array = np.zeros((3, x, y))
 
     def spread(self, pressure: Array) -> Array:
         """Return the forces on the grid by pressures of this rank's samples, shape (nx, ny) [N].
@@ -102,6 +108,85 @@ class OppositeHalfSpace:
     def at_samples(self, moved: Array) -> Array:
         """Return displacements of the grid at this rank's samples, shape (n,) [mm]."""
         return np.asarray(self._spread @ moved.ravel())
+
+    def by_shear(self, stress: Array, pressure: Array | None = None) -> Array:
+        """Return what shear stresses displace, and pressures sideways.
+
+        The half-space bears the opposite of the stresses on the body. What is returned is what
+        takes slip away from the samples, along the axes of the face, and what widens their gaps.
+
+        Args:
+            stress: Shear stresses on the body at this rank's samples, shape (n, 2) [MPa].
+            pressure: Pressures there, shape (n,); None leaves out what both do to each other [MPa].
+
+        Returns:
+            On the grid, along x, along y and into the half-space, shape (3, nx, ny) [mm].
+
+        Source:
+            Johnson, Contact Mechanics (1985), eqs. 3.19 and 3.75.
+        """
+        along = [self.spread(part) for part in stress.T]
+        xx, yy, xy, *cross = self._shear_kernels
+
+        def moved(forces: Array, kernel: Array) -> Array:
+            return np.asarray(fftconvolve(forces, kernel, mode="valid"))
+
+        total = np.zeros_like(self.sheared)
+        total[0] = moved(along[0], xx) + moved(along[1], xy)
+        total[1] = moved(along[0], xy) + moved(along[1], yy)
+        if pressure is not None:
+            forces = self.spread(pressure)
+            for axis, kernel in enumerate(cross):
+                total[axis] += moved(forces, kernel)
+                total[2] -= moved(along[axis], kernel)
+        return total
+
+    def shear(self, remaining: Callable[[Array], Array], what: str) -> None:
+        """Find what shear stresses displace where nothing remains, from that at the last load step.
+
+        Args:
+            remaining: What displacements differ by from those that they lead to.
+            what: What is looked for, for an error.
+
+        Raises:
+            NotConverged: When that many iterations do not find it.
+        """
+        _, found = _accelerated(self._kept(remaining), self.sheared, _TOLERANCE)
+        if not found:
+            raise _failed(what)
+
+    def moved_along(self, stresses: Callable[[Array], Array]) -> Array:
+        """Return the displacements along the face that shear stresses make which depend on them.
+
+        Args:
+            stresses: Returns shear stresses of samples that so far give way, (n, 2) [mm] to [MPa].
+
+        Returns:
+            At this rank's samples, shape (n, 2) [mm].
+
+        Raises:
+            NotConverged: When they are not found.
+        """
+
+        def at_samples(moved: Array) -> Array:
+            return np.stack([self.at_samples(part) for part in moved[:2]], axis=1)
+
+        def remaining(moved: Array) -> Array:
+            return self.by_shear(stresses(at_samples(moved))) - moved
+
+        moved, found = _accelerated(remaining, np.zeros_like(self.sheared), _TOLERANCE)
+        if not found:
+            raise _failed("the tangential stiffness beside the half-space on the other side")
+        return at_samples(moved)
+
+    def _kept(self, remaining: Callable[[Array], Array]) -> Callable[[Array], Array]:
+        """Return a function that keeps the displacements it was evaluated at last."""
+
+        def evaluated(x: Array) -> Array:
+            self.sheared = x
+            return remaining(x)
+
+        return evaluated
 
     def follow(self, contact: Contact, what: str) -> None:
         """Bring the half-space into equilibrium with a contact.
@@ -245,14 +330,42 @@ class OppositeHalfSpace:
             Love, Phil. Trans. R. Soc. A 228 (1929), 377; Johnson, Contact Mechanics (1985), eq.
             3.25.
         """
+        along_x, along_y = self._over_squares[:2]
+        return along_x + along_y
+
+    @cached_property
+    def _shear_kernels(self) -> tuple[Array, ...]:
+        """Displacements by unit forces on a square, (2 nx − 1, 2 ny − 1) each [mm/N].
+
+        Along x by forces along x, along y by y, along x by y; and against the pull of pressures,
+        along x and y.
+        """
+        nu = self._material.poisson_ratio
+        kappa, beta = nu / (1.0 - nu), (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu))
+        along_x, along_y, mixed, pull_x, pull_y = self._over_squares
+        both = along_x + along_y
+        xx, yy = both + kappa * along_x, both + kappa * along_y
+        return xx, yy, kappa * mixed, beta * pull_x, beta * pull_y
+
+    @cached_property
+    def _over_squares(self) -> tuple[Array, ...]:
+        """Integrals over a square of x²/ρ³, y²/ρ³, x y/ρ³, x/ρ² and y/ρ², times 1/(π E*)."""
         nx, ny = self.forces.shape
-        x, y = (np.arange(n + 1.0) - 0.5 for n in (nx, ny))
+        x, y = (np.arange(-n, n) + 0.5 for n in (nx, ny))
         u, v = np.meshgrid(x, y, indexing="ij")
-        corners = u * np.arcsinh(v / np.abs(u)) + v * np.arcsinh(u / np.abs(v))
-        quarter = np.diff(np.diff(corners, axis=0), axis=1)
-        half = np.concatenate([quarter[:0:-1], quarter])
-        whole = np.concatenate([half[:, :0:-1], half], axis=1)
-        return np.asarray(whole * self._compliance / (np.pi * self._side))
+        distance = np.hypot(u, v)
+        log = np.log(distance)
+        corners = np.stack(
+            [
+                v * np.arcsinh(u / np.abs(v)),
+                u * np.arcsinh(v / np.abs(u)),
+                -distance,
+                v * log + u * np.arctan(v / u),
+                u * log + v * np.arctan(u / v),
+            ]
+        )
+        whole = np.diff(np.diff(corners, axis=1), axis=2)
+        return tuple(whole * self._material.surface_compliance / (np.pi * self._side))
 
 
 def _accelerated(

@@ -345,7 +345,7 @@ class RepresentativeCoupling(LawCoupling):
             mode="pointwise",
             crown=crown,
             friction=friction,
-            opposite=0.0 if second is None else second.surface_compliance,
+            opposite=second,
         )
 
     def _longer(self, table: LawTable) -> LawTable | None:

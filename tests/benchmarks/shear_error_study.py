@@ -132,12 +132,13 @@ def judged(number, random, *, laws):
 
 def main():
     parser = argparse.ArgumentParser()
+    parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--laws", action="store_true", help="patch laws in place of cells")
     given = parser.parse_args()
     found = {"cells": [], "coupling": []}
-    for number in range(given.scenes):
+    for number in range(given.first, given.first + given.scenes):
         try:
             random = np.random.default_rng([given.seed, number])
             rows = judged(number, random, laws=given.laws)

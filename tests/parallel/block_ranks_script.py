@@ -11,9 +11,11 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
+from geometry import Friction, Material, ShearControl
 from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, block_mesh
+from macro import LawContactProblem, LoadedFace, block_mesh
+from macro.mesh.contact_face import top_facets
 from support.errors import InputError, NotConverged
 
 COMM = MPI.COMM_WORLD
@@ -55,6 +57,29 @@ def run(case, mode):
         "points_of_ranks": [int(count.sum()) for count in points],
         "patches_missing_on_ranks": [int((count == 0).sum()) for count in points],
     }
+
+
+class Springs(PowerLaw):
+    """A law that friction takes for a bed of springs."""
+
+    range = (0.0, 0.05)
+
+
+def shear_beside_half_space():
+    """Shear a block on an elastic half-space and return what must not depend on the ranks."""
+    block = block_of(comm=COMM, element="Q1", cells=(4, 4, 3))
+    face = LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
+    pressed = LawContactProblem(
+        face,
+        [Springs(2e4)],
+        "pointwise",
+        friction=Friction(coefficient=0.3, poisson_ratio=0.2),
+        opposite=Material(young_modulus=3e3, poisson_ratio=0.3),
+    )
+    for shift in ((0.0, 0.0), (1e-3, 4e-4)):
+        state = pressed.solve(Control(approach=8e-3, shear=ShearControl(shift=shift)))
+    stiffness, _ = pressed.tangential_stiffness()
+    return [state.force, *state.shear.force, state.shear.dissipated, stiffness]
 
 
 class Unmeshable(RefinedShape):
@@ -123,5 +148,6 @@ if __name__ == "__main__":
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
+    result |= {"half-space": shear_beside_half_space()}
     if COMM.rank == 0:
         print(json.dumps(result))

@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 from helpers.block_cases import block_of
 
-from geometry import Control, PatchGrid
+from geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
 from macro import LawContactProblem, LoadedFace
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
+from micro.friction.goodman import CrossCompliance
+from micro.friction.tangential_grid import cerruti_kernels
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
+NU = 0.3
 APPROACH = 0.01
 
 
@@ -27,6 +30,10 @@ class Line:
         return self._stiffness * (closure > 0.0)
 
 
+def half_space_of(compliance):
+    return Material(young_modulus=(1.0 - NU**2) / compliance, poisson_ratio=NU)
+
+
 def face_of(cells, modulus=1e9):
     """Return the whole top of a block as one region."""
     block = block_of(element="Q1", cells=(cells, cells, 3), young_modulus=modulus)
@@ -34,13 +41,14 @@ def face_of(cells, modulus=1e9):
 
 
 def pressed(face, stiffness, control, opposite=COMPLIANCE):
-    problem = LawContactProblem(face, [Line(stiffness)], "pointwise", opposite=opposite)
+    other = half_space_of(opposite) if opposite else None
+    problem = LawContactProblem(face, [Line(stiffness)], "pointwise", opposite=other)
     return problem, problem.solve(control)
 
 
 def test_uniform_pressure_moves_a_square_as_love_says():
     sampling = face_of(16).pointwise
-    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), COMPLIANCE)
+    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE))
     moved = half_space.at_samples(half_space.under(np.full(len(sampling.weight), 5.0)))
     mean = sampling.weight @ moved / sampling.weight.sum()
     assert mean == pytest.approx(0.9464 * 5.0 * COMPLIANCE, rel=3e-3)  # of 38 squares a side
@@ -48,7 +56,7 @@ def test_uniform_pressure_moves_a_square_as_love_says():
 
 def test_its_compliance_is_symmetric():
     sampling, rng = face_of(5).pointwise, np.random.default_rng(2)
-    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), COMPLIANCE)
+    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE))
     one, other = rng.random((2, len(sampling.weight)))
     works = [
         sampling.weight * left @ half_space.at_samples(half_space.under(right))
@@ -108,3 +116,81 @@ def test_a_stiff_body_is_solved_a_few_times_alone(monkeypatch):
         assert state.iterations <= 12
     _, soft = pressed(face_of(6, modulus=1e2), 5e3, Control(approach=APPROACH))
     assert soft.linear_iterations > sum(responses) > 0  # which are counted
+
+
+# --- with friction
+
+SHIFT, STIFF, RATIO = 1e-3, 500.0, 1.7 / 1.4
+"""Shift [mm], stiffness of the springs [MPa/mm] and Mindlin's ratio at ν = 0.3."""
+
+
+class Springs(Line):
+    """A line that friction takes for a bed of springs."""
+
+    range = (0.0, 0.1)
+
+
+def rubbed(face, control, *, opposite=COMPLIANCE, nu=NU, friction=10.0):
+    """Return a problem on springs with friction, its state, and the tangential stiffness."""
+    modulus = (1.0 - nu**2) / opposite if opposite else 1.0
+    other = Material(young_modulus=modulus, poisson_ratio=nu) if opposite else None
+    rubs = Friction(coefficient=friction, poisson_ratio=NU)
+    problem = LawContactProblem(face, [Springs(STIFF)], "pointwise", friction=rubs, opposite=other)
+    state = problem.solve(Control(approach=APPROACH))
+    state = problem.solve(control)
+    return state, problem.tangential_stiffness()[0]
+
+
+def rigid_square_on_springs(nu, n=24):
+    """Return normal and shear force of a rigid square on springs on a half-space, by squares.
+
+    Pressures and tractions in turn until they agree, each by a dense matrix.
+    """
+    material = Material(young_modulus=(1.0 - nu**2) / COMPLIANCE, poisson_ratio=nu)
+    pair, spacing = MaterialPair(first=material), (1.0 / n, 1.0 / n)
+    patches = PatchGrid(grid=(n, n), lengths=(1.0, 1.0))
+    normal = influence_matrix(patches) * COMPLIANCE / np.pi + np.eye(n * n) / STIFF
+    kernels = cerruti_kernels((n, n), spacing, nu) * COMPLIANCE
+    i, j = (index.ravel() for index in np.indices((n, n)))
+    di, dj = (np.subtract.outer(one, one) for one in (i, j))
+    xx, yy, xy = (kernel[np.abs(di), np.abs(dj)] for kernel in kernels)
+    xy = xy * np.sign(di) * np.sign(dj)
+    along = np.block([[xx, xy], [xy, yy]]) + RATIO / STIFF * np.eye(2 * n * n)
+    cross = CrossCompliance((n, n), spacing, pair, periodic=False)
+    traction = np.zeros((2, n, n))
+    for _ in range(12):
+        # the half-space bears the opposite traction, and its sideways displacement adds to the slip
+        across = -cross.across(traction).ravel()
+        pressure = np.linalg.solve(normal, APPROACH - across).reshape(n, n)
+        slip = np.array([SHIFT, 0.0])[:, None, None] + cross.sideways(pressure)
+        traction = np.linalg.solve(along, slip.ravel()).reshape(2, n, n)
+    return pressure.mean(), traction[0].mean()
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+def test_a_rigid_body_shears_a_half_space_as_dense_matrices_say(nu):
+    control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
+    state, stiffness = rubbed(face_of(8), control, nu=nu)
+    force, shear = rigid_square_on_springs(nu)
+    assert state.force == pytest.approx(force, rel=3e-3)  # of 8 linear cells a side
+    assert state.shear.force[0] == pytest.approx(shear, rel=3e-3)
+    assert state.shear.force[1] == pytest.approx(0.0, abs=1e-4 * shear)
+    # everything sticks; the stiffness leaves out that shear lifts the half-space, 0.2 % at ν = 0
+    assert stiffness == pytest.approx(state.shear.force[0] / SHIFT, rel=3e-3)
+    _, rigid = rubbed(face_of(8), control, opposite=None)
+    assert stiffness < 0.9 * rigid
+
+
+def test_a_shear_force_finds_the_shift_that_makes_it_and_sliding_is_the_coefficient():
+    face = face_of(4)
+    control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 2e-4)))
+    state, _ = rubbed(face, control, friction=0.3)
+    again, _ = rubbed(
+        face, Control(approach=APPROACH, shear=ShearControl(force=state.shear.force)), friction=0.3
+    )
+    assert again.shear.shift == pytest.approx((SHIFT, 2e-4), rel=1e-6)
+    far = Control(approach=APPROACH, shear=ShearControl(shift=(0.1, 0.0)))
+    state, stiffness = rubbed(face, far, friction=0.3)
+    # directions differ by what pressures pull sideways, a hundredth of the shift
+    assert state.shear.force[0] == pytest.approx(0.3 * state.force, rel=1e-4)
+    assert stiffness == 0.0
