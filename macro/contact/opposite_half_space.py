@@ -330,8 +330,14 @@ class OppositeHalfSpace:
             Love, Phil. Trans. R. Soc. A 228 (1929), 377; Johnson, Contact Mechanics (1985), eq.
             3.25.
         """
-        along_x, along_y = self._over_squares[:2]
-        return along_x + along_y
+        nx, ny = self.forces.shape
+        x, y = (np.arange(n + 1.0) - 0.5 for n in (nx, ny))
+        u, v = np.meshgrid(x, y, indexing="ij")
+        corners = u * np.arcsinh(v / np.abs(u)) + v * np.arcsinh(u / np.abs(v))
+        quarter = np.diff(np.diff(corners, axis=0), axis=1)
+        half = np.concatenate([quarter[:0:-1], quarter])  # alike on both sides to the last digit
+        whole = np.concatenate([half[:, :0:-1], half], axis=1)
+        return np.asarray(whole * self._material.surface_compliance / (np.pi * self._side))
 
     @cached_property
     def _shear_kernels(self) -> tuple[Array, ...]:
@@ -343,8 +349,7 @@ class OppositeHalfSpace:
         nu = self._material.poisson_ratio
         kappa, beta = nu / (1.0 - nu), (1.0 - 2.0 * nu) / (2.0 * (1.0 - nu))
         along_x, along_y, mixed, pull_x, pull_y = self._over_squares
-        both = along_x + along_y
-        xx, yy = both + kappa * along_x, both + kappa * along_y
+        xx, yy = self._kernel + kappa * along_x, self._kernel + kappa * along_y
         return xx, yy, kappa * mixed, beta * pull_x, beta * pull_y
 
     @cached_property
