@@ -302,13 +302,12 @@ def motion_units(half: float) -> Array:
     return np.array([1.0, 1.0 / half, 1.0 / half])
 
 
-def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConverged:
+def plane_failure(control: Control, reason: str) -> NotConverged:
     """Return the error of a plane that finds no equilibrium.
 
     Args:
         control: What is prescribed of it.
         reason: The name of the reason.
-        iterations: Iterations spent.
     """
     remedies = {
         "NO_CONTACT": "no patch can be touched",
@@ -320,7 +319,7 @@ def plane_failure(control: Control, reason: str, iterations: int = 0) -> NotConv
     return NotConverged(
         f"the equilibrium of the plane at {control}",
         reason=reason,
-        iterations=iterations,
+        iterations=0,
         remedy=remedies.get(reason, usual),
     )
 

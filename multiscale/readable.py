@@ -131,19 +131,18 @@ def with_error(value: float, error: float | None = None, digits: int = 5) -> str
     return f"{value:.{places}f} ± {error:.{places}f}"
 
 
-def span(values: Iterable[float], unit: str, digits: int = 4) -> str:
+def span(values: Iterable[float], unit: str) -> str:
     """Return the range of a quantity in one unit, such as ``5 to 20 N``.
 
     Args:
         values: The magnitudes in ``unit``; those that are not finite do not count.
         unit: A key of the prefixes, such as mm, N or MPa.
-        digits: Significant digits.
     """
     known = [value for value in values if math.isfinite(value)]
     if not known:
         return "unknown"
     name, size = usual_unit(known, unit)
-    ends = dict.fromkeys(number(end / size, digits) for end in (min(known), max(known)))
+    ends = dict.fromkeys(number(end / size) for end in (min(known), max(known)))
     return f"{' to '.join(ends)} {name}"
 
 

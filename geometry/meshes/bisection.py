@@ -21,6 +21,9 @@ _PAIRS = {
 }
 """Corners at the ends of the edges of triangles and of tetrahedra."""
 
+_HOLLOW = np.radians(20.0)
+"""Least angle between the planes of two facets at which an edge counts as hollow."""
+
 _FACES = np.array([(0, 1, 3), (0, 2, 4), (1, 2, 5), (3, 4, 5)])
 """Edges of the facets of a tetrahedron."""
 
@@ -222,12 +225,11 @@ def _around(squares: Table, middle: Table) -> Table:
     return np.concatenate([pairs, hub], axis=2).reshape(-1, 3)
 
 
-def reentrant_edges(mesh: Tetrahedra, angle: float = 20.0) -> Array:
+def reentrant_edges(mesh: Tetrahedra) -> Array:
     """Return the edges of the surface where the body is hollow, whose stresses are singular.
 
     Args:
         mesh: A mesh whose marked facets are all of its surface.
-        angle: Least angle between the two facets' planes [degrees].
 
     Returns:
         Their ends, shape (n, 2, 3).
@@ -245,7 +247,7 @@ def reentrant_edges(mesh: Tetrahedra, angle: float = 20.0) -> Array:
     middle = corners[other].mean(axis=1) - start
     rise = np.einsum("ni,ni->n", outward[one], middle)
     between = np.einsum("ni,ni->n", outward[one], outward[other])
-    hollow = (rise > 0.0) & (between < np.cos(np.radians(angle)))
+    hollow = (rise > 0.0) & (between < np.cos(_HOLLOW))
     return mesh.points[pairs[first[hollow]]]
 
 

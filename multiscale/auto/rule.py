@@ -78,25 +78,24 @@ class Tally:
     """Counts what a choice takes."""
 
     def __init__(self) -> None:
-        self._trials, self._work = 0, list[Work]()
+        self._work = list[Work]()
 
-    def add(self, *, trials: int = 1, **counted: float) -> None:
-        """Count trials.
+    def add(self, **counted: float) -> None:
+        """Count a trial.
 
         Args:
-            trials: How many.
-            counted: Their work, attributes of `Work`.
+            counted: Its work, attributes of `Work`.
         """
-        self._trials += trials
         self._work.append(Work(**counted))  # type: ignore[arg-type]
 
     @property
     def sentence(self) -> str:
         """The trials and what they took; empty without any."""
-        if not self._trials:
+        trials = len(self._work)
+        if not trials:
             return ""
         problems = sum(one.solutions for one in self._work if one.size)
-        found = [f"{self._trials} trial{'s' * (self._trials > 1)}"]
+        found = [f"{trials} trial{'s' * (trials > 1)}"]
         if problems:
             products = 1e-6 * sum(one.products for one in self._work)
             found.append(

@@ -100,7 +100,7 @@ def test_cells_lifted_into_contact_are_found(control, lower):
 
 
 @pytest.mark.parametrize("matrix_work", [0.0, 2e5], ids=["boxes", "few cells"])
-@pytest.mark.parametrize("seed", [36, 56, 58, 71])
+@pytest.mark.parametrize("seed", [36, 71])
 def test_cells_that_are_solved_on_only_grow(seed, matrix_work, monkeypatch):
     """What touched once may touch again: dropping it might go on for ever."""
     places, solve_on = [], solver._solve_on
