@@ -12,8 +12,11 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.parametrize(
     "command",
-    [("ruff", "check", "."), ("ruff", "format", "--check", "."), ("mypy",)],
-    ids=" ".join,
+    [
+        pytest.param(("ruff", "check", "."), id="ruff check ."),
+        pytest.param(("ruff", "format", "--check", "."), id="ruff format --check ."),
+        pytest.param(("mypy",), id="mypy", marks=pytest.mark.long),  # 16 s in a new clone
+    ],
 )
 def test_tool_has_no_complaint(command):
     if command == ("mypy",) and np.lib.NumpyVersion(np.__version__) >= "2.0.0":

@@ -15,6 +15,7 @@ def script():
     return runpy.run_path(str(DOCS / "what_works.py"))
 
 
+@pytest.mark.long  # 10 s
 def test_page_says_what_is_refused(script):
     found = script["page"](pairs=False)
     tables, _, reasons = found.partition("## Reasons\n")

