@@ -26,13 +26,13 @@ TABLE = ROOT / "demos" / "data" / "compare_paper.csv"
 SCENE = "demos/scenes/my_surface.toml"
 
 ROWS = {
-    "circular asperities with interaction, no block": ("analytic, circular",),
+    "circular asperities, no block": ("analytic, circular",),
     "`concurrent`, 64² and 128² heights": (
         "concurrent, half-space 64 × 64",
         "concurrent, half-space 128 × 128",
     ),
     "`consistent`, 128² heights, 16 patches": ("consistent, 4 × 4 patches, half-space 128 × 128",),
-    "`isolated`, 16 patches on 40 000 hexahedra, as in the paper": (
+    "`isolated`, 16 patches, 40 000 hexahedra": (
         "the scene as it is: isolated, 4 × 4 patches, circular, 40 × 40 × 25 elements",
     ),
     "reference, one mesh of 78 000 unknowns": ("reference, 1 mesh, 10.4 µm",),
