@@ -6,10 +6,10 @@ tractions that see each other where the run neglects that. Where the approach is
 errors of the normal force by other causes than the grid change the shear force in proportion, as
 tangential stiffness and friction both grow with it.
 
-On 66 half-spaces and blocks drawn for this (48² and 64² cells, μ 0.1 to 0.8, ν up to 0.45, one leg
-or two, shift or shear force prescribed) the errors by grid and body were within 1.5 × the stated
-ones on all, against four times as many cells a side. With the coupling they were on 29 of 30,
-against coupled runs on twice as many.
+Laws are compared with the cells behind them, whose pressures and tractions see each other.
+
+How far that can be trusted: docs/accuracy.md, measured errors, and
+tests/benchmarks/shear_error_study.py.
 
 Theory: docs/theory.md, sections 13 and 15.
 """

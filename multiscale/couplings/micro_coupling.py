@@ -36,6 +36,14 @@ from support.arrays import Array
 from support.collective import on_root_alone
 
 
+_TRACTIONS = 12.0
+"""Solutions of a meshed face under tractions, of 3 × 16² modes, over those under pressures, of 8²."""
+_CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
+"""Contact problems on the cells of the run, by processor time, that a point of the path is worth
+in measuring the errors of the shear. On 64² and 96² cells with two points: 1.4 on a half-space,
+3 on a block, 25 for laws, whose path is gone on all cells with pressures and tractions in turn."""
+
+
 @dataclass(kw_only=True, eq=False)
 class MicroCoupling(PressedSurface):
     """A micro model of the whole surface, on the body of the scene."""
@@ -209,9 +217,11 @@ class MicroCoupling(PressedSurface):
                 # where the error of the grid is not outweighed.
                 refines = self.finite_slopes and 4 * size <= MOST_CHECKED_CELLS
                 each, finer = (6.0, 4.0) if refines else (2.0, 1.0)
+                each += self._shear_solutions
                 solutions += each * (steps if output.check == "all" else 1)
         unknowns = sum(facts.unknowns for facts in self.meshes) if self.has_body else 0
-        cycles = FACE_CYCLES * unknowns
+        faces = 1.0 if self.scene.friction is None else 1.0 + _TRACTIONS
+        cycles = faces * FACE_CYCLES * unknowns
         if self.scene.on_mesh:
             unknowns = unknowns or self.body.unknowns
             cycles += unknowns * (SET_UP_CYCLES + self._law_cycles(steps, rows))
@@ -226,6 +236,14 @@ class MicroCoupling(PressedSurface):
             ranks=ranks,
             of_pairs=self.cells is None,
         )
+
+    @property
+    def _shear_solutions(self) -> float:
+        """Contact problems that measuring the errors of the shear of a load step is worth."""
+        if self.scene.friction is None:
+            return 0.0
+        each = _CHECK_OF_LAWS if self.has_laws else _CHECK_OF_CELLS
+        return each * (len(self.load_history.shear_points) + 1)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""

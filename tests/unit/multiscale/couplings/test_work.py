@@ -13,7 +13,7 @@ from micro import HalfSpaceModel
 from micro.complementarity import solver
 from multiscale import Run, Scene, make_setup
 from multiscale.console import Pace
-from multiscale.couplings import cost, patch_laws
+from multiscale.couplings import cost, micro_coupling, patch_laws
 from multiscale.couplings.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
@@ -122,6 +122,15 @@ def test_work_grows_with_what_is_asked():
     assert counted(grid=128).products == 4.0 * few.products
     assert counted(micro={"finite_slopes": False}).products < few.products
     assert counted(output={"check": "last"}).solutions > few.solutions
+    rubs = {"friction": {"coefficient": 0.3}, "output": {"check": "last"}}
+    shear = {"approach": 0.008, "steps": 4, "shear": [[1e-3, 0.0]]}
+    there = counted(load=shear, **rubs).solutions
+    again = counted(load=shear | {"shear": [[1e-3, 0.0], [0.0, 0.0]]}, **rubs)
+    unchecked = counted(load=shear, friction=rubs["friction"], output={"check": "none"}).solutions
+    normal = counted(load={"approach": 0.008, "steps": 4}, output={"check": "last"}).solutions
+    # a path of two points, then of three, which has four load steps more
+    assert there - unchecked == normal - 4.0 + 2 * micro_coupling._CHECK_OF_CELLS
+    assert again.solutions - there == 4.0 + micro_coupling._CHECK_OF_CELLS
     meshes = [{"mesh": "hexahedra", "cells": [n, n, n // 2]} for n in (16, 32)]
     coarse, fine = (counted(kind="reference", reference=mesh) for mesh in meshes)
     assert coarse.cycles < fine.cycles and coarse.products == 0.0
