@@ -35,7 +35,6 @@ from multiscale.shear_errors import shear_errors, with_shear_errors
 from support.arrays import Array
 from support.collective import on_root_alone
 
-
 _TRACTIONS = 12.0
 """Solutions of a meshed face under tractions, of 3 × 16² modes, over those under pressures, of 8²."""
 _CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
