@@ -36,7 +36,7 @@ from support.arrays import Array
 from support.collective import on_root_alone
 
 _TRACTIONS = 12.0
-"""Solutions of a meshed face under tractions, of 3 × 16² modes, over those under pressures, of 8²."""
+"""Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
 _CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
 """Contact problems on the cells of the run, by processor time, that a point of the path is worth
 in measuring the errors of the shear. On 64² and 96² cells with two points: 1.4 on a half-space,
