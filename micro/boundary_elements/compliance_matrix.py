@@ -36,6 +36,10 @@ class ComplianceMatrix:
         """Size of the matrix [B]."""
         return self._matrix.nbytes
 
+    def first(self, count: int) -> ComplianceMatrix:
+        """Return the compliance of the first of these cells, by the same memory."""
+        return ComplianceMatrix(self._matrix[:count, :count])
+
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
 

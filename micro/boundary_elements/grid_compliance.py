@@ -196,8 +196,8 @@ class Compliance:
         terms: What else than the half-space is compliant.
         slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
             grids has to take them into account (`micro.complementarity.slope_iteration`).
-        few: Flat indices of the few cells that are loaded mostly, ascending, shape (n,). Finite
-            slopes then remember what they do with pressures on these cells.
+        few: Flat indices of the few cells that are loaded mostly, those first that touch first,
+            shape (n,). Finite slopes then remember what they do with pressures on these cells.
     """
 
     periodic: bool
@@ -248,10 +248,14 @@ class Compliance:
         """Return the compliance of few cells of the surface as a matrix; the last few are cached.
 
         Args:
-            cells: Their flat indices, ascending, shape (n,).
+            cells: Their flat indices, shape (n,); ascending, or the first of ``few``.
             grid: Numbers of cells of the surface.
             spacing: Sides of a cell [mm].
         """
+        count = len(cells)
+        if self.few is not None and count < len(self.few):
+            if np.array_equal(cells, self.few[:count]):
+                return self.matrix_on(self.few, grid, spacing).first(count)
         key = cells.tobytes()
         found = self._matrices.pop(key, None) or self.on_grid(grid, spacing).matrix(cells, grid[1])
         self._matrices[key] = found
@@ -299,10 +303,10 @@ class Compliance:
         return tuple(RememberedSlopes(each, self.few) for each in self.slopes)
 
     def slopes_on_few(self, pressure: Array) -> Array:
-        """Return what finite slopes add to the displacements of few cells, shape (n, 1) [mm].
+        """Return what finite slopes add to the displacements of few cells, shape (k, 1) [mm].
 
         Args:
-            pressure: Pressures / E* on these cells, which alone are loaded, shape (n, 1).
+            pressure: Pressures / E* on the first k of these cells, which alone are loaded, (k, 1).
         """
         loaded = pressure.ravel() * self.modulus
         return np.sum([each.on_cells(loaded) for each in self._remembering], axis=0)[:, None]

@@ -34,7 +34,7 @@ class RememberedSlopes:
 
     Args:
         slopes: The finite slopes.
-        cells: Flat indices of the cells that may be loaded, ascending, shape (n,).
+        cells: Flat indices of the cells that may be loaded, shape (n,).
     """
 
     def __init__(self, slopes: FiniteSlopes, cells: Indices) -> None:
@@ -50,12 +50,12 @@ class RememberedSlopes:
         self._forms = np.zeros((3, _MOST, _MOST))
 
     def on_cells(self, pressure: Array) -> Array:
-        """Return what is added to the displacements of the cells, shape (n,) [mm].
+        """Return what is added to the displacements of the first k cells, shape (k,) [mm].
 
         Args:
-            pressure: Pressures on them, shape (n,) [MPa].
+            pressure: Pressures on them; the others have none, shape (k,) [MPa].
         """
-        return self._combined(self._few, pressure)
+        return self._combined(self._few[:, :, : len(pressure)], pressure)
 
     def displacement(self, pressure: Array) -> Array:
         """Return what is added to the displacements of all cells, shape (nx, ny) [mm].
@@ -92,12 +92,13 @@ class RememberedSlopes:
     def _loaded(self, pressure: Array) -> Array:
         """Return pressures on the coarse cells by those on the few, flat."""
         everywhere = np.zeros(self._slopes.surface.grid)
-        everywhere.ravel()[self._cells] = pressure
+        everywhere.ravel()[self._cells[: len(pressure)]] = pressure
         return self._slopes.coarsened(everywhere).ravel()
 
     def _along(self, what: int, pressure: Array) -> Array:
         """Return products of pressures with directions or displacements by them, shape (m,)."""
-        return np.asarray(self._few[what, : self._known] @ pressure / self._per_coarse)
+        known = self._few[what, : self._known, : len(pressure)]
+        return np.asarray(known @ pressure / self._per_coarse)
 
     def _remember(self, loaded: Array) -> None:
         """Work out the orders for the direction that pressures on the coarse cells add."""

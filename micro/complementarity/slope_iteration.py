@@ -133,17 +133,18 @@ def _solved_on_few(
 
     Returns:
         The problem of all cells without finite slopes, the few cells, and the solution; None where
-        others can touch, too, or finite slopes do not remember.
+        none can touch, or others, or finite slopes do not remember.
     """
     compliance, shape = problem.compliance, problem.interference.shape
     if problem.motions.count or compliance.few is None:
         return None
-    row, column = np.unravel_index(compliance.few, shape)
-    place = row[:, None], column[:, None]
-    few = on_place(problem, place)
-    if np.count_nonzero(few.interference > 0.0) < np.count_nonzero(problem.interference > 0.0):
+    touchable = problem.interference > 0.0
+    cells = compliance.few[: np.count_nonzero(touchable)]
+    if not len(cells) or not touchable.ravel()[cells].all() or len(cells) < touchable.sum():
         return None
-    start = None if start is None else start.among(place)
+    row, column = np.unravel_index(cells, shape)
+    place = row[:, None], column[:, None]
+    few, start = on_place(problem, place), None if start is None else start.among(place)
     found = _solved(_SlopeIteration(few, start, solve_few, compliance.slopes_on_few))
     pressure = np.zeros(shape)
     pressure[place] = found.pressure

@@ -73,8 +73,8 @@ class HalfSpaceModel:
             cells of the surface; the theory of small slopes when not given.
         hardness: Hardness of the softer body, the largest pressure [MPa]; contacts are elastic
             when not given. The interference left where cells carry it is plastic depth.
-        few: Flat indices of the few cells that can touch, see `quick_up_to`; not known when not
-            given.
+        few: Flat indices of the few cells that can touch, those first that touch first, see
+            `quick_up_to`; not known when not given.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -261,7 +261,8 @@ class HalfSpaceModel:
         )
         if not touches_few_cells(self._problem(interference, control.free, control.loads)):
             return None
-        return replace(self, few=np.flatnonzero(interference > 0.0))
+        count = np.count_nonzero(interference > 0.0)
+        return replace(self, few=np.argsort(-interference, axis=None, kind="stable")[:count])
 
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
