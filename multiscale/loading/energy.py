@@ -132,11 +132,13 @@ def _strength_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
     )
 
 
-def energy_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
+def energy_notes(steps: Sequence[LoadStep], *, conservative: bool = True) -> Iterator[str]:
     """Yield the energies at the last load step, and a warning where they are not balanced.
 
     Args:
         steps: The load steps.
+        conservative: Whether the forces are the gradient of these energies. They are not where
+            tractions displace the surface across: these store energy too, and friction loses some.
     """
     known = [step for step in steps if step.elastic_energy_mJ is not None]
     if not known:
@@ -150,7 +152,7 @@ def energy_notes(steps: Sequence[LoadStep]) -> Iterator[str]:
         f"energies at load step {last.step}: elastic {quantity(elastic, 'mJ')}{plastic}"
         f"{work} (trapezoidal rule between load steps)"
     )
-    missing = missing_energy(known)
+    missing = missing_energy(known) if conservative else 0.0
     if missing > BALANCE:
         yield Caution(
             f"warning: energies are not balanced: {percent(missing)} of the largest is missing "

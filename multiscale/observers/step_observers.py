@@ -108,7 +108,9 @@ class EnergyObserver(StepObserver):
         hardness = self._coupling.scene.micro.hardness
         if hardness is not None or self._coupling.regions is None:  # whose peaks are those of means
             yield from yielding_notes(steps, hardness)
-        yield from energy_notes(steps)
+        friction = self._coupling.scene.friction
+        coupled = friction is not None and friction.coupled
+        yield from energy_notes(steps, conservative=not coupled)
 
 
 class StiffnessObserver(StepObserver):
