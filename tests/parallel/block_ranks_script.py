@@ -11,11 +11,24 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.block_cases import PowerLaw, block_of, interface_of, uneven_laws
 
-from geometry import Friction, Material, ShearControl
+from geometry import BlockShape, Friction, Material, PatchGrid, ShearControl
+from geometry.face_frame import UPWARD
 from geometry.meshes.refined_block import RefinedShape
 from geometry.rigid_plane import Control
-from macro import LawContactProblem, LoadedFace, block_mesh
+from macro import (
+    BOTTOM,
+    TOP,
+    LawContactProblem,
+    LoadedFace,
+    MeshedBody,
+    Support,
+    TaggedMesh,
+    block_mesh,
+    contact_facets,
+)
+from macro.compliance.mesh_face import mesh_face_tractions
 from macro.mesh.contact_face import top_facets
+from micro import RectangleFields
 from support.errors import InputError, NotConverged
 
 COMM = MPI.COMM_WORLD
@@ -80,6 +93,24 @@ def shear_beside_half_space():
         state = pressed.solve(Control(approach=8e-3, shear=ShearControl(shift=shift)))
     stiffness, _ = pressed.tangential_stiffness()
     return [state.force, *state.shear.force, state.shear.dissipated, stiffness]
+
+
+def tractions_on_mesh():
+    """Return norms of the displacements of a cube on a mesh by modes of traction, (3, 3)."""
+    mesh = block_mesh(BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 3)), COMM)
+    tagged = TaggedMesh(mesh=mesh.mesh, facet_tags=mesh.facet_tags, cell_tags=None)
+    material = Material(young_modulus=4e3, poisson_ratio=0.2)
+    body = MeshedBody(tagged, material, (Support(tag=BOTTOM),))
+    facets = contact_facets(mesh.mesh, mesh.facet_tags.find(TOP), UPWARD)
+    rectangle = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
+    fields = [
+        RectangleFields(
+            lengths=(1.0, 1.0), count=2, material=material, extended=(True,) * 4, axis=axis
+        )
+        for axis in range(3)
+    ]
+    found = mesh_face_tractions(body, facets, rectangle, material, 2, fields)
+    return np.linalg.norm(found, axis=(2, 3)).tolist()
 
 
 class Unmeshable(RefinedShape):
@@ -148,6 +179,6 @@ if __name__ == "__main__":
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
-    result |= {"half-space": shear_beside_half_space()}
+    result |= {"half-space": shear_beside_half_space(), "tractions": tractions_on_mesh()}
     if COMM.rank == 0:
         print(json.dumps(result))
