@@ -20,7 +20,7 @@ from macro import compat
 from macro.linear_solvers.multigrid import Lattice
 from macro.linear_solvers.node_matrices import Stiffened
 from macro.linear_solvers.options import PREFIX
-from macro.linear_solvers.selection import body_solver
+from macro.linear_solvers.selection import body_solver, vertex_transfer
 from macro.linear_solvers.solvers import solve_linear
 from macro.mesh.supports import Loads, Traction
 from support.arrays import Array
@@ -259,6 +259,11 @@ class ElasticBody:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         _ = self._held_row  # needs 70 bytes an unknown for a moment, which are free as yet
         return self.solver_of()
+
+    @cached_property
+    def from_vertices(self) -> PETSc.Mat:
+        """Interpolation of quadratic displacements from those of the vertices."""
+        return vertex_transfer(self.space, self.linear.space, self.free)
 
     def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
         """Return a linear solver for the stiffness, and for what else holds the body.

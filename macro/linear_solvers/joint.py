@@ -26,7 +26,6 @@ from macro.linear_solvers.selection import (
     algebraic_options,
     has_slow_modes,
     quadratic_options,
-    vertex_transfer,
 )
 from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
 
@@ -78,7 +77,7 @@ def _two_grids(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened
 def _from_vertices(body: Any) -> PETSc.Mat:
     """Return the interpolation of a body's displacements from its vertices."""
     if body.degree == 2:
-        return vertex_transfer(body.space, body.linear.space, body.free)
+        return body.from_vertices
     sizes = body.stiffness.getSizes()
     same = PETSc.Mat().createAIJ(sizes, nnz=1, comm=body.stiffness.comm)
     same.setDiagonal(body.free.duplicate())  # inserts the entries

@@ -177,7 +177,7 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
         springs, finest = None, (matrix, block_diagonal(diagonal_blocks(matrix), matrix.comm))
         if stiffened is not None:
             springs, finest = stiffened.springs, (stiffened.product, stiffened.block_diagonal())
-        grid = vertex_grid(body.space, body.linear, body.free, springs)
+        grid = vertex_grid(body, springs)
         options = quadratic_options(mesh, grid[0].matrix)
         solver = linear_solver(matrix, grid, options, finest=finest)
         if has_slow_modes(solver):
@@ -268,21 +268,17 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 
-def vertex_grid(
-    space: Any, linear: Any, free: PETSc.Vec, springs: PETSc.Mat | None = None
-) -> list[CoarserGrid]:
+def vertex_grid(body: Any, springs: PETSc.Mat | None = None) -> list[CoarserGrid]:
     """Return the one coarser grid of displacements of degree 2: that of the vertices.
 
     Args:
-        space: Vector space of degree 2.
-        linear: The same body with linear displacements, its stiffness of type ``aij``.
-        free: 1 for unknowns that are free, 0 for constrained ones.
+        body: The `ElasticBody`, of degree 2.
         springs: Stiffness besides that of the body, such as that of contact laws.
 
     Note:
         Collective.
     """
-    transfer, matrix = vertex_transfer(space, linear.space, free), linear.stiffness
+    transfer, matrix = body.from_vertices, body.linear.stiffness
     if springs is not None:
         there = springs.ptap(transfer)
         matrix = with_springs([matrix], there)
