@@ -24,7 +24,8 @@ from scaling_model import Machine
 HERE = Path(__file__).parent
 AT = 1.6e4
 """Unknowns of the pad with the cells of `body_solvers.py` at a scale of 0.6, about."""
-MANY = 256
+MANY, NEIGHBOURS = 256, 14
+"""Ranks of the plan, and the neighbours that a part of an unstructured mesh has, about."""
 EXCHANGES = 2
 """Of a product: half of a symmetric matrix needs the ghosts' numbers, and sends theirs back."""
 
@@ -140,7 +141,6 @@ def plan(facts, on=Machine()):  # noqa: B008
     """Print the time of an iteration on many ranks."""
     work = facts[0]["cpu"] / facts[0]["iterations"]
     cut = max(one["cut"] for one in facts)
-    neighbours = max(one.get("messages", 0.0) for one in facts) / EXCHANGES
     products = 5  # of an iteration: one of conjugate gradients, four of the cycle
     print(
         f"plan for {MANY} ranks: {1e6 * work:.2f} µs per unknown and iteration, {cut:.1f} n^(2/3)"
@@ -151,13 +151,12 @@ def plan(facts, on=Machine()):  # noqa: B008
         nodes = each / 3.0
         ghosts = cut * nodes ** (2.0 / 3.0)
         sent = EXCHANGES * 24.0 * ghosts
-        exchange = EXCHANGES * (on.latency + 14 * on.overhead)
+        exchange = EXCHANGES * (on.latency + NEIGHBOURS * on.overhead)
         waits = products * (exchange + sent / on.network) + 3 * on.latency * 8
         print(
             f"{each:8.0f} {ghosts / nodes:6.1%} {sent / 1e3:7.1f} {1e3 * each * work:7.2f} "
             f"{1e3 * waits:7.2f} {each * work / (each * work + waits):6.0%}"
         )
-    print(f"neighbours seen: {neighbours:.0f}")
 
 
 def main():
