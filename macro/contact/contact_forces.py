@@ -28,8 +28,12 @@ _FIRST, _FARTHEST = 1e-6, 1e3
 """First and last approach that first touch is looked for at, in halves of the diagonal."""
 
 
-_MOVED = 0.5
-"""Change of the slopes, relative to the largest, that a preconditioner does not overlook."""
+_MOVED, _SMOOTH = 1.5, 1.0 / 30.0
+"""Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and
+stiffness of the body over that of its elements: against pressures that change over several of
+them. With the whole stiffness laws of 1 µm on a pad took 358 linear iterations for four load steps,
+with a tenth 200; compared by the largest alone, stiff laws on a pad of ν = 0.45 took 22 to 32
+iterations a solve, in place of 5 to 10."""
 
 _MATRIX = "patchlaw matrix"
 
@@ -298,12 +302,18 @@ class ContactForces:
         self.slope = stiffness / self._sampling.weight
         self._border = self.border(stiffness)
 
-    def moved_from(self, slope: Array) -> bool:
-        """Return whether the slopes differ from earlier ones by half of the largest or more."""
-        own = np.array([np.abs(self.slope - slope).max(initial=0.0), self.slope.max(initial=0.0)])
-        both = np.empty(2)
-        self.comm.Allreduce(own, both, op=MPI.MAX)
-        return bool(both[0] > _MOVED * both[1])
+    def moved_from(self, slope: Array, elements: float) -> bool:
+        """Return whether the stiffness of laws and elements has changed since earlier slopes.
+
+        Args:
+            slope: The earlier ones, as `slope`.
+            elements: Stiffness of the elements at the face [MPa/mm].
+        """
+        areas = np.repeat(self.weight, len(slope) // max(len(self.weight), 1))
+        body = _SMOOTH * elements
+        ratio = (areas * self.slope + body) / (areas * slope + body)
+        most = float(np.maximum(ratio, 1.0 / ratio).max(initial=1.0))
+        return bool(self.comm.allreduce(most, op=MPI.MAX) > _MOVED)
 
     @property
     def weight(self) -> Array:
@@ -334,6 +344,18 @@ class ContactForces:
         operator.multTranspose(x, samples)
         samples.array[:] = self._change(samples.array_r, slope, border)
         operator.multAdd(samples, y, y)
+
+    @property
+    def loads_of_motions(self) -> Array:
+        """B E: this rank's rows of nodal loads by free motions of the plane, shape (m, k')."""
+        operator, samples = self._sampling.operator, self._sampling.values
+        load = operator.createVecLeft()
+        loads = np.empty((load.local_size, self._border.shape[1]))
+        for k, column in enumerate(self._border.T):
+            samples.array[:] = column
+            operator.mult(samples, load)
+            loads[:, k] = load.array_r
+        return loads
 
     def pressure_change(self, stretch: Array) -> Array:
         """Return the change of pressures where samples close in, the plane following them.

@@ -87,6 +87,7 @@ class KeptSprings:
     def __init__(self, interface: Interface) -> None:
         self._interface = interface
         self._slope = np.zeros_like(interface.forces.slope)
+        self._elements: float | None = None
 
     def keep_in(self, matrix: PETSc.Mat, *, fresh: bool) -> None:
         """Let the springs in a matrix follow the tangent.
@@ -100,8 +101,12 @@ class KeptSprings:
         """
         if fresh:
             self._slope = np.zeros_like(self._slope)
+        if self._interface.mode != "pointwise":
+            return
         forces = self._interface.forces
-        if self._interface.mode == "pointwise" and forces.moved_from(self._slope):
+        if fresh or self._elements is None:  # no springs in the matrix yet
+            self._elements = self._interface.sampling.stiffness_of_elements(matrix)
+        if forces.moved_from(self._slope, self._elements):
             self._interface.add_springs(forces.slope - self._slope, matrix)
             self._slope = forces.slope.copy()
 

@@ -60,15 +60,8 @@ class FaceLayer:
 
     @cached_property
     def stiffness(self) -> float:
-        """Stiffness of the body against pressures that change from element to element [MPa/mm]."""
-        equilibrium, sampling = self._equilibrium, self._sampling
-        rough, forces = equilibrium.matrix.createVecs()
-        sampling.values.array[:] = np.random.default_rng(1).choice([-1.0, 1.0], sampling.x.shape)
-        sampling.operator.mult(sampling.values, rough)
-        moved = sampling.displacements(rough)
-        equilibrium.matrix.mult(rough, forces)
-        square = forces.comm.tompi4py().allreduce(float(sampling.weight @ moved**2))
-        return float(forces.dot(rough)) / square
+        """Stiffness of the elements against pressures that change between them [MPa/mm]."""
+        return self._sampling.stiffness_of_elements(self._equilibrium.matrix)
 
     def lines(self, displaced: Array, closure: Array, pressure: Array, stiffness: float) -> Lines:
         """Linearise the laws where samples reach their curves along the body's stiffness.

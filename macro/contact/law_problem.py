@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
@@ -20,6 +19,7 @@ from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.contact_forces import ContactLaw, ContactLaws
+from macro.contact.contact_preconditioner import ContactPreconditioner
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_layer import FaceLayer
@@ -30,7 +30,6 @@ from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.contact.sampling import Sampling
-from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
 from support.collective import together
@@ -49,7 +48,7 @@ _RESPONSE = 1e-6
 _STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
 
-_ROUGHLY = 1e-3
+_ROUGHLY = 0.1
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
 
@@ -138,7 +137,7 @@ class LawContactProblem:
         self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
-            self.equilibrium, face if mode == "pointwise" else None, body.solver
+            self.equilibrium, face if mode == "pointwise" else None, sampling, body.solver
         )
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)
@@ -528,54 +527,3 @@ class _Pressed:
             iterations=sum(one.iterations for one in self._found),
             linear_iterations=self._iterations + sum(one.linear_iterations for one in self._found),
         )
-
-
-class ContactPreconditioner:
-    """The preconditioner of a body's tangents, with the stiffness of laws at points.
-
-    Laws hold the nodes of the face, which the preconditioner of the body alone knows nothing of:
-    iterations grow with the root of the laws' stiffness over the elements'. Laws at points couple
-    no other nodes than the elements do, so that their stiffness fits into the matrix, and multigrid
-    is set up with it. On quadratic elements that takes no second matrix: only the coarser grid has
-    the sum's entries.
-
-    Args:
-        equilibrium: The equations.
-        face: The contact face that laws stand on at points; None for other laws. On a lattice,
-            whose multigrid is geometric, laws do not enter the matrix.
-        solver: Linear solver of the body alone.
-
-    Note:
-        Everything is collective.
-    """
-
-    def __init__(self, equilibrium: Equilibrium, face: Any, solver: PETSc.KSP) -> None:
-        self._equilibrium, self._face, self._alone = equilibrium, face, solver
-        self._knows_laws = face is not None and equilibrium.body.lattice is None
-        self._rubs = isinstance(equilibrium.forces, FrictionalForces)
-        self._with_laws: PETSc.KSP | None = None
-        self._stiffened: Stiffened | None = None
-        self._slope = np.zeros_like(equilibrium.forces.slope)
-
-    def update(self) -> None:
-        """Follow the tangent."""
-        if not self._knows_laws:
-            return
-        body, forces = self._equilibrium.body, self._equilibrium.forces
-        if not forces.moved_from(self._slope):
-            return
-        slope = self._slope = forces.slope.copy()
-        if self._with_laws is not None:
-            self._with_laws.destroy()
-            self._with_laws = self._stiffened = None
-        if forces.comm.allreduce(slope.any(), op=MPI.LOR):
-            face = self._face
-            points = face.points_in_all_directions if self._rubs else face.points_by_dofs
-            springs = springs_at(points, slope)
-            self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
-            self._with_laws = body.solver_of(self._stiffened)
-        compat.collect_garbage(body.stiffness.comm)
-
-    def apply(self, _pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Write y for x; PETSc calls this."""
-        (self._with_laws or self._alone).pc.apply(x, y)

@@ -71,6 +71,22 @@ class Sampling:
         """Work space for a value of every sample; PETSc would keep one of every product."""
         return self.operator.createVecRight()
 
+    def stiffness_of_elements(self, matrix: PETSc.Mat) -> float:
+        """Return the stiffness against pressures that change from element to element [MPa/mm].
+
+        Args:
+            matrix: Stiffness of the bodies.
+
+        Note:
+            Collective.
+        """
+        rough, forces = matrix.createVecs()
+        self.values.array[:] = np.random.default_rng(1).choice([-1.0, 1.0], self.x.shape)
+        self.operator.mult(self.values, rough)
+        square = float(self.weight @ self.displacements(rough) ** 2)
+        matrix.mult(rough, forces)
+        return float(forces.dot(rough)) / float(matrix.comm.tompi4py().allreduce(square))
+
     def patch_sums(self, values: Array) -> Array:
         """Return the integrals of sampled values over every patch, shape (N,); collective."""
         local = np.bincount(self.patch, weights=self.weight * values, minlength=self.count)

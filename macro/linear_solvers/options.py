@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+import numpy as np
 from petsc4py import PETSc
 
 from macro.compat import call
@@ -65,6 +66,8 @@ DIRECT_DEFAULTS = {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"}
 
 
 _MOST_ITERATIONS = 1000
+_MOST_VALUES = 1000
+"""Eigenvalues that PETSc's estimates are asked for at most."""
 
 
 def has_hypre() -> bool:
@@ -138,6 +141,28 @@ def iterating(solver: PETSc.KSP, method: str = "cg") -> None:
     """
     if solver.getType() == "preonly":
         solver.setType(method)
+
+
+def largest_eigenvalue(smoother: PETSc.KSP) -> float:
+    """Return the largest eigenvalue that a Chebyshev smoother estimated of its matrix.
+
+    Args:
+        smoother: The smoother, set up.
+
+    Returns:
+        That of the matrix after its preconditioner; 0 where nothing was estimated.
+
+    Note:
+        Collective.
+    """
+    estimate, found = ctypes.c_void_p(), ctypes.c_int()
+    call("KSPChebyshevEstEigGetKSP", ctypes.c_void_p(smoother.handle), ctypes.byref(estimate))
+    if not estimate:
+        return 0.0
+    real, imaginary = np.zeros(_MOST_VALUES), np.zeros(_MOST_VALUES)
+    parts = (ctypes.c_void_p(part.ctypes.data) for part in (real, imaginary))
+    call("KSPComputeEigenvalues", estimate, _MOST_VALUES, *parts, ctypes.byref(found))
+    return float(real[: found.value].max(initial=0.0))
 
 
 def set_own_preconditioner(solver: PETSc.KSP, preconditioner: Any) -> None:
