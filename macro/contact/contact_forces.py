@@ -260,6 +260,7 @@ class ContactForces:
         stiffness: Array,
         load: PETSc.Vec,
         *,
+        body: float,
         first: bool,
     ) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
@@ -270,6 +271,7 @@ class ContactForces:
             pressure: Their pressures on the lines [MPa].
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
+            body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
             first: Whether these are the first lines of a load step, which friction tells apart.
         """
         samples = self._sampling.values

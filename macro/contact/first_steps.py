@@ -82,7 +82,7 @@ class FirstSteps:
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
             first = len(residuals) == 1 and residuals[0] > _FAR
             lines = self._lines(displacement, *predicted, basis.stiffness, layer)
-            self._linearise(displacement, lines, first=first)
+            self._linearise(displacement, lines, basis.stiffness, first=first)
             self._follow()
             solver.setTolerances(rtol=tolerance)
             solver.solve(self._residual, step)
@@ -125,11 +125,14 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _linearise(self, displacement: PETSc.Vec, lines: Lines, *, first: bool) -> None:
+    def _linearise(
+        self, displacement: PETSc.Vec, lines: Lines, body: float, *, first: bool
+    ) -> None:
         """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
         matrix, forces = self._equilibrium.matrix, self._forces
         closure = self._closure_on(lines, displacement)
         pressure, stiffness = lines.at(closure), lines.stiffness
-        forces.write_lines(displacement, closure, pressure, stiffness, self._load, first=first)
+        at = displacement, closure, pressure, stiffness
+        forces.write_lines(*at, self._load, body=body, first=first)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

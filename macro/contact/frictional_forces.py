@@ -6,6 +6,7 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws, StickingFrom
 from macro.contact.face_equilibrium import FaceShear
 from macro.contact.loaded_face import ContactFace, Mode
+from macro.contact.shear_lines import ShearLines, shear_lines
 from support.arrays import Array
 from support.collective import together
 from support.errors import InputError, NotConverged
@@ -103,6 +105,7 @@ class FrictionalForces(ContactForces):
             self.sliders.at_rest, np.zeros((n, 2)), np.zeros(2), np.array([1.0, 0.0]), 0.0
         )
         self._shear = _HELD
+        self._lines: ShearLines | None = None
         self._shift: Array = np.zeros(2)
         self._tangent: Array = np.zeros((n, 3, 3))
         self._closes: Array = np.zeros(n)
@@ -117,6 +120,7 @@ class FrictionalForces(ContactForces):
             plane: Where the plane is now, shape (3,).
         """
         super().prescribe(control, plane)
+        self._lines = None
         self._shear = control.shear or _HELD
         self._shift = self.memory.shift.copy()
         if self._shear.shift is not None:
@@ -159,13 +163,11 @@ class FrictionalForces(ContactForces):
             rate: Their derivatives by the closure, shape (n,) [MPa/mm].
             sticks: Whether springs stick whatever they bear.
         """
-        moved = self.along(displacement)
+        moved, pressed = self.along(displacement), np.maximum(pressure, 0.0)
 
         def respond(shift: Array) -> SliderResponse:
             slip = shift - self.preload - moved
-            pressed = np.maximum(pressure, 0.0)
-            before = self.memory.sliders
-            return self.sliders.respond(before, closure, slip, pressed, rate, sticks=sticks)
+            return self._sliders_at(closure, pressed, rate, slip, sticks=sticks)
 
         if not self._shifts:
             return respond(self._shift)
@@ -262,15 +264,30 @@ class FrictionalForces(ContactForces):
         stiffness: Array,
         load: PETSc.Vec,
         *,
+        body: float,
         first: bool,
     ) -> None:
         """Write the forces on laws that are lines; see `ContactForces.write_lines`.
 
         First all springs stick: where slip is softer than sticking, later steps do not go too far.
         """
-        found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
-        self.write_stresses(pressure, found.stress, load)
-        self.linearise_shear(stiffness, found)
+        lines = None if first else self._lines
+        if lines is None or self._shifts:
+            found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
+            lines = ShearLines(found.after.slip, closure, found.stress, found)
+        else:
+            slip = self._shift - self.preload - self.along(displacement)
+            respond = partial(self._sliders_at, closure, np.maximum(pressure, 0.0), stiffness)
+            lines = shear_lines(respond, slip, closure, lines.at(slip, closure), body)
+        self._lines = lines
+        self.write_stresses(pressure, lines.stress, load)
+        self.linearise_shear(stiffness, lines.response)
+
+    def _sliders_at(
+        self, closure: Array, pressure: Array, rate: Array, slip: Array, *, sticks: bool = False
+    ) -> SliderResponse:
+        before = self.memory.sliders
+        return self.sliders.respond(before, closure, slip, pressure, rate, sticks=sticks)
 
     def sticking_from_last(self) -> StickingFrom | None:
         """Return what springs that stick bear; unchanged where the shift is not known yet."""
