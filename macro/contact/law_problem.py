@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +48,7 @@ _RESPONSE = 1e-6
 _STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
 
-_ROUGHLY = 0.1
+_ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
 
 
