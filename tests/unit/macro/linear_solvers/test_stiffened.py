@@ -4,10 +4,12 @@ import numpy as np
 import pytest
 from helpers.body_meshes import box, standing
 from petsc4py import PETSc
+from scipy.linalg import eigh
 
 from geometry.patches import PatchGrid
 from macro import Material
 from macro.linear_solvers.node_matrices import Stiffened
+from macro.linear_solvers.options import largest_eigenvalue
 
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -43,3 +45,24 @@ def test_diagonal_blocks_are_those_of_the_sum(stiffened):
     )
     same_node = every[:, None] // 3 == every // 3
     np.testing.assert_allclose(blocks, np.where(same_node, whole, 0.0), atol=1e-11 * whole.max())
+
+
+@pytest.mark.parametrize("cell", ["tetrahedron", "hexahedron"])
+def test_springs_at_points_do_not_raise_the_largest_smoothed_eigenvalue(cell):
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (4, 4, 2), cell), SOFT, WHOLE, 2)
+    body, scaled = face.body, face.points_by_dofs.copy()
+    factors = scaled.createVecLeft()
+    factors.array[:] = np.random.default_rng(4).uniform(0.0, 1.0, factors.local_size)
+    scaled.diagonalScale(L=factors)
+    springs = scaled.transposeMatMult(scaled)
+    springs.scale(1e8)
+    largest = []
+    for stiffened in (None, Stiffened(body.stiffness, body.stiffnesses, springs)):
+        matrix = body.stiffness.convert("aij", PETSc.Mat())
+        whole = matrix if stiffened is None else stiffened.assembled().convert("aij", PETSc.Mat())
+        dense = whole.convert("dense", PETSc.Mat()).getDenseArray()
+        blocks = np.kron(np.eye(len(dense) // 3), np.ones((3, 3))) * dense
+        largest.append(float(eigh(dense, blocks, eigvals_only=True)[-1]))
+    estimate = largest_eigenvalue(body.solver.pc.getMGSmoother(1))
+    assert largest[1] <= 1.001 * largest[0]
+    assert 0.95 * largest[0] <= estimate <= largest[0] * (1 + 1e-9)  # the smoother adds a tenth
