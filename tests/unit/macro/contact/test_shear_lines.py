@@ -35,9 +35,11 @@ def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
     slip = rng.normal(0.0, 2e-3, (n, 2))  # far beyond full slip at most samples
     stress = rng.normal(0.0, 3.0, (n, 2))
     lines = shear_lines(respond, slip, closure, stress, along)
-    left = lambda at: (
-        (respond(at.reshape(n, 2)).stress - stress).ravel() + along * (at - slip.ravel())
-    )
+
+    def left(at):
+        found = respond(at.reshape(n, 2)).stress
+        return (found - stress).ravel() + along * (at - slip.ravel())
+
     exact = root(left, np.zeros(2 * n), method="df-sane", options={"maxfev": 20000}).x.reshape(n, 2)
     assert np.abs(left(exact.ravel())).max() < 1e-6
     there = respond(exact)
