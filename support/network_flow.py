@@ -131,6 +131,8 @@ def _solved(
     potential = np.full(network.count + 2, np.nan)
     potential[nodes], potential[network.inlet], potential[network.outlet] = 0.0, 1.0, 0.0
     flow = network.flow(potential)
+    if not len(nodes):  # all links join the terminals, as those of a ring one element wide
+        return potential, flow, 0
     solve = preconditioner(_matrix(network, nodes))
     change, direction, before = np.zeros(network.count + 2), None, 1.0
     for iteration in range(_MOST_ITERATIONS):

@@ -62,7 +62,7 @@ class TriangleFace:
     """
 
     def __init__(self, corners: Array, inlet: Array, outlet: Array) -> None:
-        self.corners = corners
+        self.corners, self._ends = corners, (inlet, outlet)
         edges = np.roll(corners, -1, axis=1) - corners
         near = _SAME * float(np.linalg.norm(edges, axis=2).mean())
         places = corners.reshape(-1, 2)
@@ -80,12 +80,33 @@ class TriangleFace:
         self._count = count = len(nodes)
         name_of = np.select(ends, [count, count + 1], np.arange(count))
         self._node = name_of[node.reshape(-1, 3)]
+        self._own_node = node.reshape(-1, 3)
         # gradients of the three shape functions, turned sides over twice the area
         opposite = np.roll(edges, -1, axis=1)
         twice = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
         self._area = 0.5 * np.abs(twice)
         turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
         self._gradient = turned / twice[:, None, None]
+
+    def quartered(self) -> TriangleFace:
+        """Return the face with every triangle cut into four, between the same edges."""
+        a, b, c = (self.corners[:, k] for k in range(3))
+        middles = np.stack([0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)], axis=1)
+        ab, bc, ca = (middles[:, k] for k in range(3))
+        parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+        corners = np.stack([np.stack(part, axis=1) for part in parts], axis=1)
+        # sides on the border of the face, both ends of which lie on an edge
+        sides = np.sort(np.stack([self._own_node, np.roll(self._own_node, -1, axis=1)], -1), -1)
+        _, side, times = np.unique(
+            sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+        )
+        on_border = (times[side] == 1).reshape(-1, 3)
+        at = np.stack([self._node, np.roll(self._node, -1, axis=1)], axis=-1)
+        ends = []
+        for k, known in enumerate(self._ends):
+            on_edge = on_border & (at == self._count + k).all(axis=-1)
+            ends.append(np.concatenate([known, middles[on_edge]]))
+        return TriangleFace(corners.reshape(-1, 3, 2), *ends)
 
     def flow(self, transmissivity: Array) -> FaceFlow:
         """Solve for the flow over the face.

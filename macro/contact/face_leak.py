@@ -108,13 +108,16 @@ class LeakingFace:
             frame.in_plane(found[np.abs(frame.height(found)) < _ON_FACE * max(spans)])
         )
 
-    def flow(self, transmissivity: Array, *, harmonic: bool = False) -> FaceFlow:
+    def flow(
+        self, transmissivity: Array, *, harmonic: bool = False, quartered: bool = False
+    ) -> FaceFlow:
         """Solve for the flow.
 
         Args:
             transmissivity: T along x and y of the face at this rank's points, (n, 2) [mm³].
             harmonic: Whether a facet has the harmonic mean over its points, as where T varies along
                 the flow, instead of the mean, as where it varies across.
+            quartered: Whether every triangle is cut into four, with its transmissivity.
 
         Returns:
             The flow, on every rank, with the pressures at the corners of the triangles of all
@@ -130,6 +133,9 @@ class LeakingFace:
             own = np.stack(sums, axis=1) / self._area[:, None]
             own = 1.0 / own if harmonic else own
         whole = np.concatenate(self.comm.allgather(own))[self._triangle_facet]
+        if quartered:
+            fourfold = np.repeat(whole, 4, axis=0)
+            return on_root(self.comm, lambda: self._face.quartered().flow(fourfold))
         return on_root(self.comm, lambda: self._face.flow(whole))
 
     def pressure(self, flow: FaceFlow, first: float, second: float, name: str = "fluid") -> Any:

@@ -48,6 +48,25 @@ def test_ring_of_one_transmissivity():
     assert np.log2(errors[0] / errors[1]) > 1.9
 
 
+@pytest.mark.parametrize(("across", "around"), [(1, 20), (2, 40)])
+def test_triangles_cut_into_four_tell_the_error_of_their_size(across, around):
+    """Leaks fall with the square of the size; a ring one element wide has no node between."""
+    faces, flows = [TriangleFace(*quarter_ring(across, around))], []
+    for _ in range(4):
+        count = len(faces[-1].corners)
+        flows.append(faces[-1].flow(np.full((count, 2), 3e-9)).total)
+        faces.append(faces[-1].quartered())
+    changes = -np.diff(flows)
+    assert np.all(changes > 0.0)
+    rates = changes[:-1] / changes[1:]  # tends to 4
+    assert np.all(rates > 2.5)
+    exact = flows[-1] - changes[-1] / (rates[-1] - 1.0)
+    assert changes[0] < flows[0] - exact < 2.0 * changes[0]  # what runs state
+    # straight edges are in none of them
+    ring = 0.5 * np.pi * 3e-9 / np.log(OUTER / INNER)
+    assert exact == pytest.approx(ring, rel=5e-3)
+
+
 def test_ring_whose_transmissivity_falls_outwards():
     """T = T₀ (r₀/r)³ along all directions: ∫ dr/(r T) across the ring."""
     corners, bore, rim = quarter_ring(24, 100)
