@@ -26,6 +26,9 @@ AT = 1.6e4
 """Unknowns of the pad with the cells of `body_solvers.py` at a scale of 0.6, about."""
 MANY, NEIGHBOURS = 256, 14
 """Ranks of the plan, and the neighbours that a part of an unstructured mesh has, about."""
+BYTES = 8.4 / 4.0
+"""Of a product for an operation: an entry above the diagonal and its share of a column number are
+read once for two multiplications and additions. hypre's operations are not counted."""
 EXCHANGES = 2
 """Of a product: half of a symmetric matrix needs the ghosts' numbers, and sends theirs back."""
 
@@ -139,7 +142,9 @@ def show(facts):
 
 def plan(facts, on=Machine()):  # noqa: B008
     """Print the time of an iteration on many ranks."""
-    work = facts[0]["cpu"] / facts[0]["iterations"]
+    solved = [one for one in facts if "iterations" in one]
+    operations = max(one["flops"] / one["iterations"] for one in solved)
+    work = operations / (on.memory / BYTES)
     cut = max(one["cut"] for one in facts)
     products = 5  # of an iteration: one of conjugate gradients, four of the cycle
     print(
