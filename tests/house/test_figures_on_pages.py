@@ -105,7 +105,7 @@ def test_errors_of_couplings(tmp_path):
         stored = [errors[coupling, plane, f"{n} × {n}"][-1] for plane, n in planes]
         assert table == [round(one) if one > 10.0 else one for one in stored]
     worst = max(max(one) for key, one in errors.items() if key[0].startswith("consistent"))
-    turned = max(numbers(" ".join(cells("accuracy", "## Couplings", "the same, the largest of"))))
+    turned = max(numbers(" ".join(cells("accuracy", "## Couplings", "largest of seeds"))))
     says("accuracy", f"is at most {worst:.2f} % everywhere")
     says("README", f"≤ {worst:.2f} %; free tilt ≤ {turned:.2f} %")
     says("choosing", f"≤ {worst:.2f} % against `concurrent`", f"≤ {turned:.2f} % where the plane")
