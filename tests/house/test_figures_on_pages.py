@@ -141,7 +141,7 @@ def test_errors_on_bodies():
     foot, cube = "### A body that is no cuboid", "## Contact problems on meshes"
     bars, *errors = (
         numbers(" ".join(cells("accuracy", foot, start)))
-        for start in ("its error bars", "`concurrent` |", "`consistent` |")
+        for start in ("error bars of the reference", "`concurrent` |", "`consistent` |")
     )
     largest, widest = max(map(max, errors)), max(bars)
     assert 0.05 < widest <= 0.1  # one digit
