@@ -86,3 +86,13 @@ def _nodes(corners, order):
         return corners
     between = [corners[list(ends)].mean(axis=0) for ends in BETWEEN[len(corners)]]
     return (2.0 * np.concatenate([corners, between])).astype(int)
+
+
+def cube_section(folder, cells, *, margin=0.0, above=False):
+    """Write a cube of 1 mm, below its contact face or above it; return its section of a scene."""
+    path = folder / f"{cells}-{margin}-{above}.msh"
+    across = np.linspace(-margin, 1.0 + margin, cells + 1)
+    levels = np.linspace(0.0, 1.0, cells + 1) if above else np.linspace(-1.0, 0.0, cells + 1)
+    write_box(path, (across, across, levels))
+    contact, held = ("bottom", "top") if above else ("top", "bottom")
+    return {"mesh": str(path), "contact": contact, "supports": [{"surface": held}]}

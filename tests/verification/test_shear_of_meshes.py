@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.box_msh import write_box
+from helpers.box_msh import cube_section
 
 from multiscale import Scene, run
 
@@ -28,14 +28,8 @@ def sheared(*, coupled=False, **sections):
     return np.array(rows[1:])
 
 
-def cube(folder, cells, *, margin=0.0, above=False):
-    path = folder / f"{cells}-{margin}-{above}.msh"
-    across = np.linspace(-margin, 1.0 + margin, cells + 1)
-    levels = np.linspace(0.0, 1.0, cells + 1) if above else np.linspace(-1.0, 0.0, cells + 1)
-    write_box(path, (across, across, levels))
-    faces = ("bottom", "top") if above else ("top", "bottom")
-    supports = [{"surface": faces[1]}]
-    return {"mesh": str(path), "contact": faces[0], "supports": supports, **CONSTANTS}
+def cube(folder, cells, **where):
+    return CONSTANTS | cube_section(folder, cells, **where)
 
 
 @pytest.mark.long
