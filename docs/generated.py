@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import re
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 
 from multiscale.loading.load_step import COLUMNS
+from multiscale.results.contact_record import FIELDS, ContactRecord
 from multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
@@ -32,6 +34,7 @@ def write(folder: Path) -> None:
     pages = {
         "scene_keys.md": scene_key_tables(),
         "history_columns.md": history_columns(),
+        "contact_maps.md": contact_maps(),
         **{f"{package}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
@@ -115,6 +118,14 @@ def history_columns() -> str:
     """Return the table of the columns of ``history.csv``, from where they are declared."""
     rows = ((f"`{one.name}`", one.meaning, one.unit or "–") for one in COLUMNS)
     return _table(("column", "meaning", "unit"), rows)
+
+
+def contact_maps() -> str:
+    """Return the table of the datasets of ``contact.h5``, from the record that reads them."""
+    text = (inspect.getdoc(ContactRecord) or "").partition("Attributes:\n")[2]
+    said = {name: " ".join(words.split()) for name, words in
+            re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)}  # fmt: skip
+    return _table(("dataset", "meaning"), ((f"`{name}`", said[name]) for name in FIELDS))
 
 
 def public_names(package: str) -> list[str]:

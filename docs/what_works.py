@@ -3,17 +3,19 @@
     .venv/bin/python docs/what_works.py
 
 Small scenes of every coupling on a block and on a mesh are planned, each with one more choice, and
-with two. What is refused stands on the page in the words of the refusal. A new choice is a line of
-`CHOICES`.
+with two. What is refused stands on the page in the words of the refusal, less the names in it. A
+new choice is a line of `CHOICES`.
 """
 
 from __future__ import annotations
 
+import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from itertools import combinations
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -126,39 +128,45 @@ ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)
 INTRO = """# What works with what
 
 Which choice goes with which coupling? `docs/what_works.py` writes this page from what the code
-itself refuses; a refusal also says what would do instead.
+refuses; a refusal also says what would do instead. Columns are values of `coupling.kind`, and laws
+of samples (`law.kind = "representative"`).
 
-* ● works.
-* ○ is accepted and changes nothing.
-* A number is that of the reason in the [list at the end](#reasons).
-* Two signs in a cell are those on a block (`[block]`) and on a mesh (`[body]`); one sign is that of
-  both.
+## One choice
 
-A column names `coupling.kind`; laws of samples are `law.kind = "representative"`. Where a scene
-states nothing else, a rigid, smooth plane is pressed to an approach, and contacts are those of a
-half-space. [Choosing](choosing.md) has the accuracy and the speed of each way.
+● works, ○ is accepted and changes nothing, a number is that of a [reason](#reasons). Two signs are
+those on a block (`[block]`) and on a mesh (`[body]`); one sign is that of both.
 """
+EVERYWHERE = "These work with every coupling: {}.\n"
 PAIRS = """## Two choices together
 
-Two choices that each work with a coupling but not together:
+Choices that each work with a coupling, but not together:
 """
+
+NAMES = (
+    (r"coupling\.kind = '\w+'", "this coupling"),
+    (r"^\w+ = '[\w-]+' does not go with kind = '\w+'", "does not go with this coupling"),
+    (r"^is ('\w+'|true), but ", ""),
+    (r"^'\w+' needs kind", "needs law.kind"),
+)
+"""Names in the words of a refusal, and what stands on the page in their place."""
 
 
 class Reason(NamedTuple):
     """Why something does not work.
 
     Attributes:
-        key: Key of the scene that the code names; empty for none.
         problem: What is wrong.
     """
 
-    key: str
     problem: str
 
-    @property
-    def text(self) -> str:
-        """The reason as the page shows it."""
-        return f"`{self.key}`: {self.problem}" if self.key else self.problem
+    @classmethod
+    def of(cls, error: InputError) -> Reason:
+        """Return the reason of a refusal, without the names of what it refuses."""
+        text = error.problem
+        for pattern, instead in NAMES:
+            text = re.sub(pattern, instead, text)
+        return cls(f"`{error.key}` {text}" if text.startswith("is required") else text)
 
 
 class Planner:
@@ -245,9 +253,9 @@ class Planner:
             load_finite_elements(scene, None)
             return make_setup(scene)
         except InputError as error:
-            return Reason(error.key or "", error.problem)
+            return Reason.of(error)
         except NotConverged as error:
-            return Reason("", str(error))
+            return Reason(str(error))
 
     def error(self, coupling: str, body: str) -> Reason | None:
         """Return why a coupling measures no error; None where it does."""
@@ -255,7 +263,7 @@ class Planner:
         if isinstance(made, Reason):
             return made
         why = made.unmeasured()
-        return Reason("", f"no error is measured: {why}") if why else None
+        return Reason(f"no error is measured: {why}") if why else None
 
     def laws(self, coupling: str, body: str) -> Reason | None:
         """Return why a coupling has no laws; None where it has."""
@@ -263,7 +271,7 @@ class Planner:
         try:
             coupling_class(scene).check_has_laws(scene)
         except InputError as error:
-            return Reason(error.key or "", error.problem)
+            return Reason.of(error)
         return None
 
 
@@ -316,24 +324,22 @@ def page(*, pairs: bool = True) -> str:
     with tempfile.TemporaryDirectory() as folder:
         planner, reasons = Planner(Path(folder)), Reasons()
         works: dict[tuple[str, str], list[str]] = {}
-        parts = [INTRO, "## One choice\n", _table(planner, reasons, works)]
+        parts = [INTRO, _table(planner, reasons, works)]
         if pairs:
             parts += [PAIRS, _pairs(planner, reasons, works)]
-    listed = "".join(f"{number}. {reason.text}\n" for reason, number in reasons.items())
+    listed = "".join(f"{number}. {reason.problem}\n" for reason, number in reasons.items())
     return "\n".join([*parts, "## Reasons\n", listed])
 
 
 def _table(planner: Planner, reasons: Reasons, works: dict[tuple[str, str], list[str]]) -> str:
     """Return the table of choices by topic, and note which of them work."""
-    lines = [f"| | {' | '.join(COUPLINGS)} |\n|---|{':-:|' * len(COUPLINGS)}\n"]
+    rows: list[tuple[str, list[str]]] = []
     bare = {(one, body): planner.planned(one, body) for one in COUPLINGS for body in BODIES}
     for topic, choices in CHOICES.items():
-        lines.append(f"| **{topic}** |{' |' * len(COUPLINGS)}\n")
-        if topic == "Contact":
-            lines.append(_row("nothing else", lambda *at: reasons.cell(_reason(bare[at])), BODIES))
+        rows.append((f"**{topic}**", [""] * len(COUPLINGS)))
         if topic == "Results":
-            lines.append(_row(ERROR, lambda *at: reasons.cell(planner.error(*at)), BODIES))
-            lines.append(_row(LAWS, lambda *at: reasons.cell(_laws(planner, *at)), BODIES))
+            rows.append((ERROR, _row(lambda *at: reasons.cell(planner.error(*at)), BODIES)))
+            rows.append((LAWS, _row(lambda *at: reasons.cell(_laws(planner, *at)), BODIES)))
         for name, changes in choices.items():
             bodies = [body for body in BODIES if name.startswith(f"`{body}.")] or BODIES
 
@@ -346,19 +352,19 @@ def _table(planner: Planner, reasons: Reasons, works: dict[tuple[str, str], list
                 works.setdefault((coupling, body), []).append(name)
                 return "○" if _changes_nothing(changes, made, bare[coupling, body]) else "●"
 
-            lines.append(_row(name, cell, bodies))
-    return "".join(lines)
+            rows.append((name, _row(cell, bodies)))
+    everywhere = [name for name, cells in rows if set(cells) == {"●"}]
+    lines = [f"| | {' | '.join(COUPLINGS)} |\n|---|{':-:|' * len(COUPLINGS)}\n"]
+    lines += [f"| {name} | {' | '.join(cells)} |\n" for name, cells in rows
+              if name not in everywhere]  # fmt: skip
+    return "\n".join([fill(EVERYWHERE.format(", ".join(everywhere)), 100) + "\n", "".join(lines)])
 
 
 def _laws(planner: Planner, coupling: str, body: str) -> Reason | None:
     try:
         return planner.laws(coupling, body)
     except InputError as error:
-        return Reason(error.key or "", error.problem)
-
-
-def _reason(made: Any) -> Reason | None:
-    return made if isinstance(made, Reason) else None
+        return Reason.of(error)
 
 
 def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
@@ -370,10 +376,9 @@ def _changes_nothing(changes: Changes, made: Any, bare: Any) -> bool:
     return False
 
 
-def _row(name: str, cell: Callable[[str, str], str], bodies: Iterable[str]) -> str:
-    """Return a row: for every coupling what stands there on each body, once if it is the same."""
-    cells = [" ".join(dict.fromkeys(cell(one, body) for body in bodies)) for one in COUPLINGS]
-    return f"| {name} | {' | '.join(cells)} |\n"
+def _row(cell: Callable[[str, str], str], bodies: Iterable[str]) -> list[str]:
+    """Return for every coupling what stands there on each body, once if it is the same."""
+    return [" ".join(dict.fromkeys(cell(one, body) for body in bodies)) for one in COUPLINGS]
 
 
 def _pairs(planner: Planner, reasons: Reasons, works: Mapping[tuple[str, str], list[str]]) -> str:
@@ -389,10 +394,12 @@ def _pairs(planner: Planner, reasons: Reasons, works: Mapping[tuple[str, str], l
                 where = found.setdefault((first, second, made), [])
                 if coupling not in where:
                     where.append(coupling)
-    lines = ["| choice | with | in | reason |\n|---|---|---|:-:|\n"]
+    alike: dict[tuple[str, Reason, str], list[str]] = {}
     for (first, second, reason), where in found.items():
-        couplings = "all" if len(where) == len(COUPLINGS) else ", ".join(where)
-        lines.append(f"| {first} | {second} | {couplings} | {reasons.cell(reason)} |\n")
+        alike.setdefault((first, reason, ", ".join(where)), []).append(second)
+    lines = ["| choice | with | in | reason |\n|---|---|---|:-:|\n"]
+    for (first, reason, where), others in alike.items():
+        lines.append(f"| {first} | {'; '.join(others)} | {where} | {reasons.cell(reason)} |\n")
     return "".join(lines)
 
 

@@ -95,7 +95,9 @@ def draw(picture, path):
     space.add_collection3d(
         Poly3DCollection(deformed, facecolors=colours, edgecolors=colours, lw=0.2, rasterized=True)
     )
-    on_top = np.abs(corners[..., 2]).max(axis=1) < ROUGH
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    upward = np.abs(normal[:, 2]) > 0.5 * np.linalg.norm(normal, axis=1)  # not a side of the leg
+    on_top = upward & (np.abs(corners[..., 2]).max(axis=1) < ROUGH)
     nearest = cKDTree(corners[on_top][..., :2].mean(axis=1)).query(spots)[1]
     x, y, z = deformed[on_top][nearest].mean(axis=1).T
     space.scatter(x, y, z, s=2, c=style.VERMILLION, depthshade=False, zorder=3)

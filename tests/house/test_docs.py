@@ -44,6 +44,12 @@ def test_every_column_of_the_history_is_in_the_table(generated):
         assert f"| `{column.name}` | {column.meaning} | {column.unit or '–'} |" in table
 
 
+def test_every_map_of_a_contact_is_in_the_table(generated):
+    rows = generated["contact_maps"]().splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == [f"| `{name}`" for name in FIELDS]
+    assert rows[FIELDS.index("gap_mm")].split(" | ")[1].startswith("Gaps between the plane and the")
+
+
 def columns_of_a_reference():
     none = np.zeros((1, 0))
     estimate = Estimate(value=none[0], error=none[0], rate=none[0])
@@ -59,7 +65,6 @@ def columns_of_a_reference():
     [
         ("patches.csv", (*PATCH_COLUMNS, "region", PATCH_STIFFNESS)),
         ("contacts.csv", ("step", "spot", *SPOT_COLUMNS)),
-        ("contact.h5", FIELDS),
         ("reference.csv", columns_of_a_reference()),
         ("laws.csv", ("ix", "iy", "region", *CSV_COLUMNS, *FLOW_COLUMNS, "pressure_scatter_MPa")),
     ],

@@ -10,8 +10,8 @@ ROOT = Path(__file__).parents[2]
 DEMOS, DOCS = ROOT / "demos", ROOT / "docs"
 ENTRY = re.compile(
     r"^### (?P<title>.+)\n\n!\[(?P<alt>.+)\]\((?P<picture>.+)\)\n\n(?:\*(?P<caption>.+)\*\n\n)?"
-    r"\[`(?P<name>.+)`\]\((?P<script>.+)\) · \[discussed here\]"
-    r"\((?P<page>[^)#]+)(?P<part>#.+)?\) · ",
+    r"\[`(?P<name>.+)`\]\((?P<script>.+)\), \d+ (s|min); \[discussed here\]"
+    r"\((?P<page>[^)#]+)(?P<part>#.+)?\)$",
     re.MULTILINE,
 )
 ENTRIES = [entry.groupdict() for entry in ENTRY.finditer((DOCS / "demos.md").read_text("utf-8"))]
