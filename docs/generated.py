@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+import sys
 import tomllib
 from collections.abc import Iterable, Iterator
 from importlib import import_module
@@ -35,6 +36,7 @@ def write(folder: Path) -> None:
         "scene_keys.md": scene_key_tables(),
         "history_columns.md": history_columns(),
         "contact_maps.md": contact_maps(),
+        "hard_cases.md": hard_cases(),
         **{f"{package}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
@@ -126,6 +128,16 @@ def contact_maps() -> str:
     said = {name: " ".join(words.split()) for name, words in
             re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)}  # fmt: skip
     return _table(("dataset", "meaning"), ((f"`{name}`", said[name]) for name in FIELDS))
+
+
+def hard_cases() -> str:
+    """Return the table of the hard cases, from where the demo declares them."""
+    sys.path.insert(0, str(ROOT / "demos"))
+    for module in ("hard.blocks_and_loads", "hard.surfaces"):
+        import_module(module)  # which fills the list
+    cases = sorted(import_module("hard.bench").CASES, key=lambda case: case.number)
+    rows = ((str(case.number), case.hard, case.holds, f"{case.bound:g}") for case in cases)
+    return _table(("kind", "what is difficult", "what must hold", "bound"), rows)
 
 
 def public_names(package: str) -> list[str]:

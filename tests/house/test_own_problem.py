@@ -7,7 +7,16 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "own_problem.md").read_text(encoding="utf-8")
-EXAMPLE, FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+FRICTION, *_ = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+(EXAMPLE,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+def test_page_begins_with_the_example_of_the_readme():
+    after, before = re.findall(r":(?:start-after|end-before): \"(.*)\"", PAGE)
+    included = README.partition(after)[2].partition(before)[0]
+    assert EXAMPLE in included
+    assert "It prints" in included
 
 
 def test_example_runs_and_prints_what_the_page_says():
@@ -18,7 +27,7 @@ def test_example_runs_and_prints_what_the_page_says():
     )
     assert shown.returncode == 0, shown.stderr
     (line,) = shown.stdout.splitlines()
-    said = re.search(r"It prints `(.*?)`", PAGE)
+    said = re.search(r"It prints `(.*?)`", README)
     assert line == said.group(1)
 
 

@@ -48,15 +48,6 @@ def test_scene_shown_first_is_the_one_that_is_run_first():
     assert tomllib.loads(shown) == scene
 
 
-def test_example_of_an_own_problem_is_that_of_its_page():
-    page = (DOCS / "own_problem.md").read_text(encoding="utf-8")  # whose test runs it
-    (example,) = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
-    shown = re.search(r"It prints `.*?`", page)
-    assert len(example.splitlines()) <= 25
-    assert example in page
-    assert shown[0] in TEXT
-
-
 def test_readme_is_short():
     assert len(TEXT.splitlines()) <= 120
 
