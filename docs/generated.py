@@ -15,6 +15,8 @@ from multiscale.results.contact_record import FIELDS, ContactRecord
 from multiscale.scene.keys import Key, scene_keys
 
 ROOT = Path(__file__).parents[1]
+SCRIPTS = {"foot": "tests/benchmarks/body_reference.py"}
+"""Scripts of pictures that are no demos."""
 PACKAGES = ("patchlaw", "multiscale", "micro", "macro", "geometry")
 """Packages with public names, from the top down; a name is described in the first that has it."""
 
@@ -37,6 +39,7 @@ def write(folder: Path) -> None:
         "history_columns.md": history_columns(),
         "contact_maps.md": contact_maps(),
         "hard_cases.md": hard_cases(),
+        "gallery.md": gallery(),
         **{f"{package}.md": names_of(package) for package in PACKAGES},
     }
     for name, text in pages.items():
@@ -128,6 +131,29 @@ def contact_maps() -> str:
     said = {name: " ".join(words.split()) for name, words in
             re.findall(r"^    (\w+): (.*(?:\n {8}.*)*)", text, re.MULTILINE)}  # fmt: skip
     return _table(("dataset", "meaning"), ((f"`{name}`", said[name]) for name in FIELDS))
+
+
+def gallery() -> str:
+    """Return the pictures of all pages in their order, each with its script and its discussion."""
+    entries: dict[str, str] = {}
+    order = re.findall(r"^(\w+)$", (ROOT / "docs" / "index.md").read_text("utf-8"), re.MULTILINE)
+    for page in (name for name in order if (ROOT / "docs" / f"{name}.md").is_file()):
+        text = (ROOT / "docs" / f"{page}.md").read_text("utf-8") if page != "demos" else ""
+        part = ""
+        for line in text.splitlines():
+            if line.startswith("##"):
+                part = "#" + re.sub(r"[^\w\- ]", "", line.lstrip("# ").lower()).replace(" ", "-")
+            elif shown := re.match(r"\s*!\[(.+)\]\(\.\./(demos/\w+/(\w+)\.png)\)", line):
+                title, picture, stem = shown.groups()
+                script = SCRIPTS.get(stem) or picture.replace("/pictures", "").replace(
+                    ".png", ".py"
+                )
+                entries[picture] = (
+                    f"### {title}\n\n![{title}](../{picture})\n\n"
+                    f"[`{script.removeprefix('demos/')}`](../{script}); "
+                    f"[discussed here]({page}.md{part})\n"
+                )
+    return "\n".join(entries.values())
 
 
 def hard_cases() -> str:

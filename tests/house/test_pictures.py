@@ -1,6 +1,7 @@
 """Every picture has one sentence, which stands once, and a script that draws it."""
 
 import re
+import runpy
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,13 @@ ROOT = Path(__file__).parents[2]
 DEMOS, DOCS = ROOT / "demos", ROOT / "docs"
 ENTRY = re.compile(
     r"^### (?P<title>.+)\n\n!\[(?P<alt>.+)\]\((?P<picture>.+)\)\n\n(?:\*(?P<caption>.+)\*\n\n)?"
-    r"\[`(?P<name>.+)`\]\((?P<script>.+)\), \d+ (s|min); \[discussed here\]"
+    r"\[`(?P<name>.+)`\]\((?P<script>.+)\)(?:, \d+ (?:s|min))?; \[discussed here\]"
     r"\((?P<page>[^)#]+)(?P<part>#.+)?\)$",
     re.MULTILINE,
 )
-ENTRIES = [entry.groupdict() for entry in ENTRY.finditer((DOCS / "demos.md").read_text("utf-8"))]
+GALLERY = runpy.run_path(str(DOCS / "generated.py"))["gallery"]()
+TEXT = f"{(DOCS / 'demos.md').read_text('utf-8')}\n{GALLERY}"
+ENTRIES = [entry.groupdict() for entry in ENTRY.finditer(TEXT)]
 PICTURES = sorted({*DEMOS.glob("pictures/*.png"), *DEMOS.glob("bodies/*.png")})
 LARGEST = 350_000
 """Bytes of a picture."""

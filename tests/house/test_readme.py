@@ -1,6 +1,7 @@
 """README is true: its example runs, its commands and files exist."""
 
 import re
+import runpy
 import subprocess
 import sys
 import tomllib
@@ -77,7 +78,8 @@ def test_links_lead_to_files_and_headings(page):
 
 def test_every_demo_and_picture_is_shown():
     pages = {page: page.read_text(encoding="utf-8") for page in PAGES}
-    index = pages[DOCS / "demos.md"]
+    gallery = runpy.run_path(str(DOCS / "generated.py"))["gallery"]()
+    index = pages[DOCS / "demos.md"] + gallery
     for path in (*DEMOS.glob("*.py"), *DEMOS.glob("scenes/*.toml")):
         assert str(path.relative_to(DEMOS)) in index, path
     linked = {
