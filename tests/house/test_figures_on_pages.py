@@ -67,16 +67,18 @@ def test_configurations_of_the_papers_scene():
 
 
 def test_errors_of_micro_models(tmp_path):
-    row = re.compile(r"\| ([\w-]+, \d+²) \| (.*)% \| (.*)% \|")
+    row = re.compile(r"\| ([\w-]+, \d+²) \| (.*)% \| (.*)% \| (.*) \|")
     printed = filter(None, map(row.match, drawn_again("micro_accuracy", tmp_path)))
-    errors = {one[1]: [percent(float(one[k]) / 100.0) for k in (2, 3)] for one in printed}
+    rows = {one[1]: one for one in printed}
+    errors = {key: [percent(float(one[k]) / 100.0) for k in (2, 3)] for key, one in rows.items()}
+    times = {key: rounded(float(one[4])) for key, one in rows.items()}
     both = ("", "-independent")
     grids = [f"half-space, {n}²" for n in (32, 64, 128)]
     pairs = [[f"{shape}{kind}, 256²" for shape in ("elliptic", "circular")] for kind in both]
     for one in (*grids, *pairs[0], *pairs[1]):
         model, heights = one.split(", ")
-        shown = f"| `{model}` | {heights} | {errors[one][0]} % | {errors[one][1]} % |"
-        says("accuracy", shown)
+        shown = f"| `{model}` | {heights} | {errors[one][0]} % | {errors[one][1]} %"
+        says("accuracy", f"{shown} | {times[one]} ms |")
     force, area = (", ".join(errors[one][k] for one in grids) for k in (0, 1))
     coarse, fine = (errors[f"half-space, {n}²"] for n in (64, 128))
     says("choosing", "its force errs by {} %, its area by {} %".format(*fine))
