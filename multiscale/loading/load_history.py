@@ -263,7 +263,8 @@ class LoadHistory:
             one.hold or one.loads_bodies for one in self.stage
         ):
             return True
-        return any(leg.end < leg.start for leg in self.ways)  # type: ignore[operator]
+        later = self.ways[1:]  # the first way is from first touch, wherever the zero lies
+        return any(leg.end < leg.start for leg in later)  # type: ignore[operator]
 
     @property
     def largest_controls(self) -> list[Control]:
