@@ -13,7 +13,7 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from itertools import combinations
+from itertools import combinations, groupby
 from pathlib import Path
 from textwrap import fill
 from typing import Any, NamedTuple
@@ -355,8 +355,9 @@ def _table(planner: Planner, reasons: Reasons, works: dict[tuple[str, str], list
             rows.append((name, _row(cell, bodies)))
     everywhere = [name for name, cells in rows if set(cells) == {"●"}]
     lines = [f"| | {' | '.join(COUPLINGS)} |\n|---|{':-:|' * len(COUPLINGS)}\n"]
-    lines += [f"| {name} | {' | '.join(cells)} |\n" for name, cells in rows
-              if name not in everywhere]  # fmt: skip
+    refused = [(name, cells) for name, cells in rows if name not in everywhere]
+    for cells, alike in groupby(refused, key=lambda row: row[1]):
+        lines.append(f"| {'; '.join(name for name, _ in alike)} | {' | '.join(cells)} |\n")
     return "\n".join([fill(EVERYWHERE.format(", ".join(everywhere)), 100) + "\n", "".join(lines)])
 
 
@@ -394,12 +395,15 @@ def _pairs(planner: Planner, reasons: Reasons, works: Mapping[tuple[str, str], l
                 where = found.setdefault((first, second, made), [])
                 if coupling not in where:
                     where.append(coupling)
-    alike: dict[tuple[str, Reason, str], list[str]] = {}
+    seconds: dict[tuple[str, Reason, str], list[str]] = {}
     for (first, second, reason), where in found.items():
-        alike.setdefault((first, reason, ", ".join(where)), []).append(second)
+        seconds.setdefault((first, reason, ", ".join(where)), []).append(second)
+    firsts: dict[tuple[str, Reason, str], list[str]] = {}
+    for (first, reason, where), others in seconds.items():
+        firsts.setdefault(("; ".join(others), reason, where), []).append(first)
     lines = ["| choice | with | in | reason |\n|---|---|---|:-:|\n"]
-    for (first, reason, where), others in alike.items():
-        lines.append(f"| {first} | {'; '.join(others)} | {where} | {reasons.cell(reason)} |\n")
+    for (others, reason, where), names in firsts.items():
+        lines.append(f"| {'; '.join(names)} | {others} | {where} | {reasons.cell(reason)} |\n")
     return "".join(lines)
 
 
