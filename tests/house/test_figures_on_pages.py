@@ -194,6 +194,8 @@ def test_other_times():
     unknowns, time = pad.search(TEXTS["speed"]).groups()
     says("README", f"{unknowns} unknowns with a law takes {time} for 8 load steps on 2 ranks")
     says("choosing", f"brake pad of {unknowns} unknowns, 8 load steps, 2 ranks: {time} |")
+    first = re.search(r"After (\d+ s) it has", TEXTS["README"])[1]
+    says("my_surface", f"The first takes {first} on one core")
     laws = cells("speed", "## Couplings", "consistent laws on the block")[0]
     steps = numbers(cells("speed", "## Couplings", "100 load steps")[0])[0]
     says("choosing", f"once, {laws} at 256² heights; then {10.0 * steps:.1f} ms a load step")
