@@ -6,11 +6,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-MODULES = [
-    path
-    for package in ("support", "geometry", "micro", "macro", "multiscale")
-    for path in sorted((ROOT / package).rglob("*.py"))
-]
 RUNS_TEXT = {"eval", "exec", "compile", "__import__"}
 RUNS_FILES = {
     ("pickle", "load"), ("pickle", "loads"), ("pickle", "Unpickler"), ("marshal", "load"),
@@ -39,9 +34,12 @@ def dangers(tree):
                 yield keyword.arg
 
 
-@pytest.mark.parametrize("path", MODULES, ids=lambda path: f"{path.parent.name}.{path.stem}")
-def test_no_module_runs_data(path):
-    assert list(dangers(ast.parse(path.read_text(encoding="utf-8")))) == []
+@pytest.mark.parametrize("package", ["support", "geometry", "micro", "macro", "multiscale"])
+def test_no_module_runs_data(package):
+    modules = list((ROOT / package).rglob("*.py"))
+    assert modules
+    for path in modules:
+        assert list(dangers(ast.parse(path.read_text(encoding="utf-8")))) == [], path
 
 
 @pytest.mark.parametrize(

@@ -80,7 +80,7 @@ class Springs(PowerLaw):
 
 def shear_beside_half_space():
     """Shear a block on an elastic half-space and return what must not depend on the ranks."""
-    block = block_of(comm=COMM, element="Q1", cells=(4, 4, 3))
+    block = block_of(comm=COMM, element="Q1", cells=(3, 3, 2))
     face = LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
     pressed = LawContactProblem(
         face,

@@ -1,9 +1,9 @@
-"""Rough interfaces in a user's problem on 1 to 4 ranks: the block's own forces, everywhere."""
+"""Rough interfaces in a user's problem on 1 to 3 ranks: the block's own forces, everywhere."""
 
 import pytest
 from helpers.on_ranks import OnRanks
 
-RANKS = [1, 2, pytest.param(3, marks=pytest.mark.long), pytest.param(4, marks=pytest.mark.long)]
+RANKS = [1, 2, pytest.param(3, marks=pytest.mark.long)]
 
 
 @pytest.fixture(scope="module")

@@ -159,8 +159,23 @@ def test_same_numbers_on_any_number_of_ranks(waiting_ranks, alone, tmp_path, sce
         assert np.all(np.abs(more - one) <= 1e-8 * np.abs(one).max(axis=0))
 
 
+@pytest.fixture(scope="module")
+def folders(waiting_ranks, tmp_path_factory):
+    """Return a function that runs the paper's scene on some ranks, once, and returns its folder."""
+
+    @cache
+    def made(ranks, *scene):
+        out = tmp_path_factory.mktemp(f"on_{ranks}")
+        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *scene)
+        done = waiting_ranks(ranks, *words)
+        assert done.returncode == 0, done.stderr
+        return out
+
+    return made
+
+
 @pytest.mark.parametrize("ranks", RANKS)
-def test_contacts_read_back_and_their_pictures_are_those_of_one(waiting_ranks, tmp_path, ranks):
+def test_contacts_read_back_and_their_pictures_are_those_of_one(folders, ranks):
     scene = [
         "surface.grid=[32, 32]", "surface.spectrum.waves=[2, 6]", "coupling.kind=analytic",
         "micro.model=half-space", "micro.hardness=300 MPa", "load.approach=['8 um', '0 um']",
@@ -168,10 +183,7 @@ def test_contacts_read_back_and_their_pictures_are_those_of_one(waiting_ranks, t
     ]  # fmt: skip
     found, pictures = [], []
     for count in (1, ranks):
-        out = tmp_path / str(count)
-        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *scene)
-        done = waiting_ranks(count, *words)
-        assert done.returncode == 0, done.stderr
+        out = folders(count, *scene)
         found.append(read_contact(out))
         report = (out / "report.html").read_text()
         pictures.append(re.findall(r'alt="Load step (\d.*?)" src="(.*?)"', report))
@@ -185,14 +197,10 @@ def test_contacts_read_back_and_their_pictures_are_those_of_one(waiting_ranks, t
 
 
 @pytest.mark.long
-def test_ranks_draw_the_figures_of_one(waiting_ranks, tmp_path):
+def test_ranks_draw_the_figures_of_one(folders):
     drawn = []
     for ranks in (1, 3):
-        out = tmp_path / str(ranks)
-        scene = ("coupling.kind=analytic", "output.figures=true")
-        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
-        done = waiting_ranks(ranks, *words)
-        assert done.returncode == 0, done.stderr
+        out = folders(ranks, *SMALL, "coupling.kind=analytic", "output.figures=true")
         drawn.append({path.name: path.read_bytes() for path in out.glob("*.png")})
     assert set(drawn[0]) == {
         "overview.png", "surface.png", "curves.png", "pressures.png", "contact.png",
@@ -318,18 +326,12 @@ def sorted_fields(folder):
 
 @pytest.mark.long
 @pytest.mark.parametrize("ranks", RANKS)
-def test_fields_of_any_number_of_ranks(waiting_ranks, tmp_path, ranks):
+def test_fields_of_any_number_of_ranks(folders, ranks):
     scene = (
         "coupling.kind=concurrent", "micro.model=half-space", "block.cells=[8, 8, 5]",
         "output.fields=[1, 2]",
     )  # fmt: skip
-    found = []
-    for count in (1, ranks):
-        out = tmp_path / str(count)
-        words = ("-m", "patchlaw", "run", PAPER, "--out", out, "--set", *SMALL, *scene)
-        done = waiting_ranks(count, *words)
-        assert done.returncode == 0, done.stderr
-        found.append(sorted_fields(out))
+    found = [sorted_fields(folders(count, *SMALL, *scene)) for count in (1, ranks)]
     for name, values in found[0].items():
         # the linear solver goes to 1e-10 of the load
         np.testing.assert_allclose(found[1][name], values, atol=1e-7 * np.abs(values).max())

@@ -9,13 +9,13 @@ from geometry import BlockShape
 
 
 @pytest.mark.long
-def test_bodies_of_scenes_on_one_to_four_ranks(waiting_ranks, root, tmp_path):
+def test_bodies_of_scenes_on_one_to_three_ranks(waiting_ranks, root, tmp_path):
     x, y, z = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks
     write_box(tmp_path / "cube.msh", (x, y, z))
     write_box(tmp_path / "above.msh", (x[::2], y, -z[::-1]))
     write_box(tmp_path / "curved.msh", (x, y, z), crown=1e-2, order=2)
     found = []
-    for ranks in (1, 2, 3, 4):
+    for ranks in (1, 2, 3):
         words = (root / "tests/parallel/scene_body_script.py", tmp_path)
         ended = waiting_ranks(ranks, *words, timeout=900)
         assert ended.returncode == 0, ended.stderr

@@ -12,14 +12,14 @@ from geometry.filters import spikes
 from support.checks import real_array
 
 
-@pytest.mark.parametrize("seed", range(120))
-def test_maps_come_back_to_the_last_bit(tmp_path, seed):
-    came_back(tmp_path, seed)
+def test_maps_come_back_to_the_last_bit(tmp_path):
+    for seed in range(120):
+        came_back(tmp_path, seed)
 
 
-@pytest.mark.parametrize("seed", range(60))
-def test_damaged_cells_are_told_by_their_place(tmp_path, seed):
-    assert damage_was_told(tmp_path, seed) == "told"
+def test_damaged_cells_are_told_by_their_place(tmp_path):
+    for seed in range(60):
+        assert damage_was_told(tmp_path, seed) == "told", seed
 
 
 JUNK = np.ma.array(np.full((6, 5), 1e3), mask=np.zeros((6, 5), dtype=bool))

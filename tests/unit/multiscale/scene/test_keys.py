@@ -40,17 +40,19 @@ def described_keys(record):
                 yield from described_keys(inner)
 
 
-@pytest.mark.parametrize(("name", "text"), list(described_keys(Scene)))
-def test_every_key_has_a_description(name, text):
-    assert len(text) > 10, name
-    assert text[0].isupper() and text.endswith("."), name
+def test_every_key_has_a_description():
+    texts = dict(described_keys(Scene))
+    assert len(texts) > 100
+    for name, text in texts.items():
+        assert len(text) > 10, name
+        assert text[0].isupper() and text.endswith("."), name
 
 
-@pytest.mark.parametrize("key", scene_keys().values(), ids=lambda key: key.name)
-def test_every_key_of_the_schema_is_explained(key):
-    assert key.meaning.endswith(".")
-    assert key.is_section or key.values
-    assert "``" not in key.meaning
+def test_every_key_of_the_schema_is_explained():
+    for name, key in scene_keys().items():
+        assert key.meaning.endswith("."), name
+        assert key.is_section or key.values, name
+        assert "``" not in key.meaning, name
 
 
 def test_sections_come_before_their_keys():

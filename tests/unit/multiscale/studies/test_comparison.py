@@ -37,16 +37,16 @@ def beaten(one, other, bar):
 
 
 @pytest.mark.parametrize("bar", [0.0, 3.0])
-@pytest.mark.parametrize("seed", range(20))
-def test_frontier_is_that_of_brute_force(seed, bar):
-    rng = np.random.default_rng(seed)
-    # few different values: many ties in time, in error and in both
-    values = rng.integers(1, 8, size=(25, 2)).astype(float)
-    rows = [row(str(number), *value) for number, value in enumerate(values)]
-    oracle = {one.name for one in rows if not any(beaten(one, other, bar) for other in rows)}
-    found = comparison(rows, bar).frontier()
-    assert {one.name for one in found} == oracle
-    assert [one.seconds for one in found] == sorted(one.seconds for one in found)
+def test_frontier_is_that_of_brute_force(bar):
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        # few different values: many ties in time, in error and in both
+        values = rng.integers(1, 8, size=(25, 2)).astype(float)
+        rows = [row(str(number), *value) for number, value in enumerate(values)]
+        oracle = {one.name for one in rows if not any(beaten(one, other, bar) for other in rows)}
+        found = comparison(rows, bar).frontier()
+        assert {one.name for one in found} == oracle
+        assert [one.seconds for one in found] == sorted(one.seconds for one in found)
 
 
 def test_frontier_leaves_out_what_did_not_end_or_is_unknown():
