@@ -1,6 +1,8 @@
 """The page on what engineers read off is true: its scene gives the numbers it prints."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -61,3 +63,13 @@ def test_the_leak_on_the_page_is_that_of_its_scene():
         found = [leak.constriction for leak in step.leaks]
         said = [float(one) for one in re.findall(r"\d+", shares)]
         np.testing.assert_allclose(100.0 * np.array(found), said, atol=0.6)
+
+
+@pytest.mark.long
+def test_python_of_the_page_runs():
+    (example,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    done = subprocess.run(
+        [sys.executable, "-c", example], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    *_, forth, back = (float(line.split()[-2]) for line in done.stdout.splitlines())
+    assert back == pytest.approx(-forth, abs=0.011)  # at half the force all slides, both ways
