@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from mpi4py import MPI
@@ -94,20 +94,6 @@ class SingleLaws:
     def stiffnesses(self, patch: Indices, closure: Array) -> Array:
         """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
         return by_patch(self._stiffnesses, patch, closure)
-
-
-class StickingFrom(NamedTuple):
-    """Shear stresses of n samples that stick: τ + k/r (s − u), with their displacements u.
-
-    Attributes:
-        stress: τ, of the latest load step, shape (n, 2) [MPa].
-        slip: s, how far the plane has moved since then against where they were, (n, 2) [mm].
-        ratio: r, Mindlin's ratio, shape (n,).
-    """
-
-    stress: Array
-    slip: Array
-    ratio: Array
 
 
 class ContactForces:
@@ -261,7 +247,6 @@ class ContactForces:
         load: PETSc.Vec,
         *,
         body: float,
-        first: bool,
     ) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
@@ -272,16 +257,32 @@ class ContactForces:
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
             body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
-            first: Whether these are the first lines of a load step, which friction tells apart.
         """
         samples = self._sampling.values
         samples.array[:] = pressure
         self._sampling.operator.mult(samples, load)
         self.linearise(stiffness)
 
-    def sticking_from_last(self) -> StickingFrom | None:
-        """Return what springs that stick bear from the latest load step on; None without them."""
-        return None
+    def write_shear_in(
+        self,
+        parts: Array,
+        y: Array,
+        stretches: Array,
+        closure: Array,
+        pressure: Array,
+        stiffness: Array,
+    ) -> None:
+        """Add the work of shear stresses in each of k displacements, none without friction.
+
+        Args:
+            parts: Receives the work on this rank, and its derivatives by the shares, (> k, k).
+            y: Shares of the displacements, shape (k,).
+            stretches: What samples move by in each against their directions, times their weights,
+                shape (k, n, 1 or 3) [mm³].
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            pressure: Their pressures on the lines [MPa].
+            stiffness: Their stiffnesses [MPa/mm].
+        """
 
     def along(self, displacement: PETSc.Vec) -> Array:
         """Return displacements along the face that shear stresses follow, none without friction."""

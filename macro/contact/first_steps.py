@@ -22,9 +22,6 @@ Array = NDArray[np.float64]
 
 NEAR = 0.01
 """Residual over the contact forces from which Newton's method goes on alone."""
-_FAR = 0.1
-"""Residual beyond which the first lines are those of contact that sticks. Nearer, the guess is that
-already, in the basis of earlier solutions."""
 _MOST_STEPS = 8
 _TOLERANCE = {True: 1e-3, False: 1e-4}
 """Relative tolerance of linear solves, by whether a force is prescribed. Under a prescribed
@@ -80,9 +77,8 @@ class FirstSteps:
         own, layer = solver.getTolerances()[0], self._layer if len(basis) > 1 else None
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            first = len(residuals) == 1 and residuals[0] > _FAR
             lines = self._lines(displacement, *predicted, basis.stiffness, layer)
-            self._linearise(displacement, lines, basis.stiffness, first=first)
+            self._linearise(displacement, lines, basis.stiffness)
             self._follow()
             solver.setTolerances(rtol=tolerance)
             solver.solve(self._residual, step)
@@ -125,14 +121,12 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _linearise(
-        self, displacement: PETSc.Vec, lines: Lines, body: float, *, first: bool
-    ) -> None:
+    def _linearise(self, displacement: PETSc.Vec, lines: Lines, body: float) -> None:
         """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
         matrix, forces = self._equilibrium.matrix, self._forces
         closure = self._closure_on(lines, displacement)
         pressure, stiffness = lines.at(closure), lines.stiffness
         at = displacement, closure, pressure, stiffness
-        forces.write_lines(*at, self._load, body=body, first=first)
+        forces.write_lines(*at, self._load, body=body)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -10,6 +10,7 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.spatial import cKDTree
 
@@ -17,13 +18,15 @@ from geometry.rigid_plane import Control
 from geometry.shear_state import ShearControl
 from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
-from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws, StickingFrom
+from macro.contact.contact_forces import ContactForces, ContactLaw, ContactLaws
 from macro.contact.face_equilibrium import FaceShear
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.shear_lines import ShearLines, shear_lines
 from support.arrays import Array
 from support.collective import together
 from support.errors import InputError, NotConverged
+
+Indices = NDArray[np.intp]
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _MOST_STEPS = 100
@@ -53,6 +56,14 @@ class SliderMemory(NamedTuple):
     shift: Array
     direction: Array
     dissipated: float
+
+
+class _Evaluated(NamedTuple):
+    """A response of the sliders, and what it is one to."""
+
+    before: SliderState
+    at: tuple[Array, ...]
+    found: SliderResponse
 
 
 class FrictionalForces(ContactForces):
@@ -106,6 +117,7 @@ class FrictionalForces(ContactForces):
         )
         self._shear = _HELD
         self._lines: ShearLines | None = None
+        self._latest: _Evaluated | None = None
         self._shift: Array = np.zeros(2)
         self._tangent: Array = np.zeros((n, 3, 3))
         self._closes: Array = np.zeros(n)
@@ -163,7 +175,13 @@ class FrictionalForces(ContactForces):
             rate: Their derivatives by the closure, shape (n,) [MPa/mm].
             sticks: Whether springs stick whatever they bear.
         """
-        moved, pressed = self.along(displacement), np.maximum(pressure, 0.0)
+        return self._respond_to(closure, self.along(displacement), pressure, rate, sticks=sticks)
+
+    def _respond_to(
+        self, closure: Array, moved: Array, pressure: Array, rate: Array, *, sticks: bool = False
+    ) -> SliderResponse:
+        """Return the same at displacements of samples along the axes, shape (n, 2) [mm]."""
+        pressed = np.maximum(pressure, 0.0)
 
         def respond(shift: Array) -> SliderResponse:
             slip = shift - self.preload - moved
@@ -265,16 +283,17 @@ class FrictionalForces(ContactForces):
         load: PETSc.Vec,
         *,
         body: float,
-        first: bool,
     ) -> None:
         """Write the forces on laws that are lines; see `ContactForces.write_lines`.
 
-        First all springs stick: where slip is softer than sticking, later steps do not go too far.
+        Under a prescribed shear force all springs stick at first: where slip is softer than
+        sticking, later steps do not go too far.
         """
-        lines = None if first else self._lines
+        lines = self._lines
         if lines is None or self._shifts:
-            found = self.respond_on(closure, displacement, pressure, stiffness, sticks=first)
-            lines = ShearLines(found.after.slip, closure, found.stress, found)
+            sticks = lines is None and self._shifts
+            found = self.respond_on(closure, displacement, pressure, stiffness, sticks=sticks)
+            lines = ShearLines(found.slip, closure, found.stress, found)
         else:
             slip = self._shift - self.preload - self.along(displacement)
             respond = partial(self._sliders_at, closure, np.maximum(pressure, 0.0), stiffness)
@@ -284,16 +303,52 @@ class FrictionalForces(ContactForces):
         self.linearise_shear(stiffness, lines.response)
 
     def _sliders_at(
-        self, closure: Array, pressure: Array, rate: Array, slip: Array, *, sticks: bool = False
+        self,
+        closure: Array,
+        pressure: Array,
+        rate: Array,
+        slip: Array,
+        *,
+        sticks: bool = False,
+        rows: Indices | None = None,
     ) -> SliderResponse:
-        before = self.memory.sliders
-        return self.sliders.respond(before, closure, slip, pressure, rate, sticks=sticks)
+        """Return the response of sliders of all samples, or of rows of them with their slips."""
+        before, at = self.memory.sliders, (closure, slip, pressure, rate)
+        if rows is not None:
+            pressed = pressure[rows], rate[rows]
+            return self.sliders.respond(before, closure[rows], slip, *pressed, rows=rows)
+        if sticks:
+            return self.sliders.respond(before, *at, sticks=True)
+        latest = self._latest  # residual and tangent of a point ask for the same
+        known = latest is not None and latest.before is before
+        if latest is None or not (known and all(map(np.array_equal, at, latest.at))):
+            latest = _Evaluated(before, at, self.sliders.respond(before, *at))
+            self._latest = latest
+        return latest.found
 
-    def sticking_from_last(self) -> StickingFrom | None:
-        """Return what springs that stick bear; unchanged where the shift is not known yet."""
-        slip = self._shift - self.preload - self.memory.sliders.slip
-        ratio = np.full_like(self.sliders.ratio, np.inf) if self._shifts else self.sliders.ratio
-        return StickingFrom(self.memory.stress, slip, ratio)
+    def write_shear_in(
+        self,
+        parts: Array,
+        y: Array,
+        stretches: Array,
+        closure: Array,
+        pressure: Array,
+        stiffness: Array,
+    ) -> None:
+        """Add the work of shear stresses and its derivative; see `ContactForces.write_shear_in`.
+
+        Where the shift is not known yet, the stresses of the latest load step stay.
+        """
+        along = stretches[:, :, 1:]
+        if self._shifts:
+            parts[0] -= np.einsum("kni,ni->k", along, self.memory.stress)
+            return
+        moved = np.einsum("k,kni->ni", y, along) / self._sampling.weight[:, None]
+        found = self._respond_to(closure, moved, pressure, stiffness)
+        self.linearise_shear(stiffness, found)
+        parts[0] -= np.einsum("kni,ni->k", along, found.stress)
+        changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
+        parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step."""
@@ -368,6 +423,14 @@ class FrictionalForces(ContactForces):
             known: A part of `slope` that is left out, as y holds its product already, shape (3 n,).
         """
         stretch = self._stretched(x)
+        self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
+
+    def _stress_change(self, stretch: Array) -> Array:
+        """Return the change of pressures and shear stresses where samples move, shape (n, 3).
+
+        Args:
+            stretch: What they move by against the directions, times their weights, (n, 3) [mm³].
+        """
         pressed = self.pressure_change(stretch[:, 0])
         change = np.einsum("nij,nj->ni", self._tangent[:, :, 1:], stretch[:, 1:])
         closes = pressed * self._closes * self._sampling.weight
@@ -378,7 +441,7 @@ class FrictionalForces(ContactForces):
             moves = self.total((self._tangent[:, 1:, 1:] * weight).reshape(-1, 4)).reshape(2, 2)
             shift = np.linalg.lstsq(moves, self.total(change[:, 1:]), rcond=1e-13)[0]
             change[:, 1:] -= (self._tangent[:, 1:, 1:] * weight) @ shift
-        self._add_stresses(change.ravel() - known * stretch.ravel(), y)
+        return change
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Add the product with springs of other slopes, shape (3 n,), to y."""
@@ -401,11 +464,11 @@ class FrictionalForces(ContactForces):
             The shear of the face there.
         """
         found, before = self.respond(closure, displacement), self.memory
-        shear = self._shear_of(found)
+        after, shear = self._shear_of(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
         self.memory = SliderMemory(
-            found.after,
+            after,
             found.stress,
             self._shift.copy(),
             moved / size if size else before.direction,
@@ -420,21 +483,22 @@ class FrictionalForces(ContactForces):
             closure: Closures of this rank's samples, shape (n,) [mm].
             displacement: Displacements [mm].
         """
-        return self._shear_of(self.respond(closure, displacement))
+        return self._shear_of(self.respond(closure, displacement))[1]
 
-    def _shear_of(self, found: SliderResponse) -> FaceShear:
-        """Return the shear of the face by a response of the sliders."""
+    def _shear_of(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
+        """Return the sliders and the shear of the face by a response of them."""
         step = self.sliders.step(self.memory.sliders, found)
         lost = float(self.total(step.lost[:, None])[0])
         force, shift = self.total(found.stress), self._shift
-        return FaceShear(
+        shear = FaceShear(
             shift=(float(shift[0]), float(shift[1])),
             force=(float(force[0]), float(force[1])),
             dissipated=self.memory.dissipated + lost,
             sample_stress=found.stress,
-            stick_closure=np.minimum(step.stick_closure, found.after.closure),
+            stick_closure=np.minimum(step.stick_closure, found.closure),
             stuck=step.stuck,
         )
+        return step.after, shear
 
     def record(self) -> SliderRecord:
         """Return what load steps left behind, of all ranks together; collective."""

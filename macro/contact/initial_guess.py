@@ -16,7 +16,6 @@ from mpi4py import MPI
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from macro.contact.contact_forces import StickingFrom
 from macro.contact.equations import Equilibrium
 from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
@@ -116,8 +115,8 @@ class DisplacementBasis:
     def write_guess(self, into: PETSc.Vec) -> tuple[Array, Array]:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
-        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution. What
-        stuck then sticks on.
+        It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution; shear
+        stresses are those of sliders.
 
         Returns:
             Closures of this rank's samples there [mm], and the pressures that the displacements
@@ -128,9 +127,8 @@ class DisplacementBasis:
         pressure = y @ self._pressures
         closure = forces.closure_of(y @ self._sampled / self._sampling.weight)
         lines = law_lines(forces, closure, pressure, stiffness)
-        sheared = self._equilibrium.forces.sticking_from_last()
         for _ in range(_STEPS):
-            change = self._step(y, lines, sheared)
+            change = self._step(y, lines)
             y = y - change
             closure = self._closure_on(lines, y)
             lines = law_lines(forces, closure, lines.at(closure), stiffness)
@@ -146,30 +144,26 @@ class DisplacementBasis:
         displaced = (y @ self._sampled) / self._sampling.weight
         return self._equilibrium.forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _step(self, y: Array, lines: Lines, sheared: StickingFrom | None) -> Array:
+    def _step(self, y: Array, lines: Lines) -> Array:
         """Return the step to the solution in the basis with linearised laws."""
         forces, weight, columns = self._equilibrium.forces, self._sampling.weight, self._sampled
-        pressure = lines.at(self._closure_on(lines, y))
+        closure = self._closure_on(lines, y)
+        pressure = lines.at(closure)
         parts = np.vstack([
             -columns @ pressure,
             (columns * (lines.stiffness / weight)) @ columns.T,
             (columns @ forces.border(lines.stiffness)).T,
         ])  # fmt: skip
-        if sheared is not None:
-            parts[: len(y) + 1] += self._sticking(y, lines, sheared)
+        forces.write_shear_in(parts, y, self._stretches, closure, pressure, lines.stiffness)
         parts = self._sum(parts)
         stiff, border = parts[1 : len(y) + 1], parts[len(y) + 1 :]
         return np.linalg.solve(np.eye(len(y)) + stiff - border.T @ border, y + parts[0])
 
-    def _sticking(self, y: Array, lines: Lines, last: StickingFrom) -> Array:
-        """Return the gradient and the stiffness of springs that stick, shape (k + 1, k)."""
-        stiffness = (lines.stiffness / last.ratio)[:, None]
-        along = np.array(self._along)
-        stress = last.stress + stiffness * (last.slip - np.einsum("k,kni->ni", y, along))
-        weighted = along * self._sampling.weight[:, None]
-        work = -np.einsum("kni,ni->k", weighted, stress)
-        stiff = np.einsum("kni,lni->kl", weighted * stiffness, along)
-        return np.vstack([work, stiff])
+    @property
+    def _stretches(self) -> Array:
+        """What samples move by in each vector, times their weights, (k, n, 1 or 3) [mm³]."""
+        along = np.array(self._along) * self._sampling.weight[:, None]
+        return np.concatenate([self._sampled[:, :, None], along], axis=2)
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)

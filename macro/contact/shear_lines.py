@@ -23,8 +23,8 @@ from geometry.sliders import SliderResponse
 from support.arrays import Array
 
 _MOST_STEPS = 12
-_CLOSE = 1e-3
-"""Residual of the slips, relative to the largest shear stress."""
+_CLOSE = 1e-4
+"""Residual of a sample's shear stress that ends its steps, relative to the largest one."""
 
 
 class ShearLines(NamedTuple):
@@ -61,20 +61,25 @@ def shear_lines(
     From springs that all stick Newton's method comes to them from one side.
 
     Args:
-        respond: The shear stresses at slips; with ``sticks=True`` those of springs that stick.
+        respond: The shear stresses at slips; with ``sticks=True`` those of springs that stick, with
+            ``rows`` those of some of the samples.
         slip: Predicted slips of this rank's samples, shape (n, 2) [mm].
         closure: Their closures, shape (n,) [mm].
         stress: Predicted shear stresses, shape (n, 2) [MPa].
         along: Stiffness of the body [MPa/mm].
     """
     stiff = along * np.eye(2)
-    found, at = respond(slip, sticks=True), slip
+    found, at, largest = respond(slip, sticks=True), slip.copy(), 0.0
+    left, excess, by_slip = np.arange(len(slip)), found.stress - stress, found.by_slip
     for _ in range(_MOST_STEPS):
-        excess = found.stress - stress + along * (at - slip)
-        at = at - np.linalg.solve(found.by_slip + stiff, excess[:, :, None])[:, :, 0]
-        found = respond(at)
-        excess = found.stress - stress + along * (at - slip)
-        if np.abs(excess).max(initial=0.0) <= _CLOSE * np.abs(found.stress).max(initial=0.0):
+        at[left] -= np.linalg.solve(by_slip + stiff, excess[:, :, None])[:, :, 0]
+        some = respond(at[left], rows=left)
+        excess = some.stress - stress[left] + along * (at - slip)[left]
+        largest = np.abs(some.stress).max(initial=largest)
+        off = (np.abs(excess) > _CLOSE * largest).any(axis=1)
+        if not off.any():
             break
+        left, excess, by_slip = left[off], excess[off], some.by_slip[off]
+    found = respond(at)
     there = found.stress + np.einsum("nij,nj->ni", found.by_slip, slip - at)
     return ShearLines(slip, closure, there, found)

@@ -61,10 +61,10 @@ class Both:
             state = self.cells.advance(state, pressed.pressures, ShearControl(shift=tuple(shift)))
             c = np.atleast_1d(self.closure_of(pressure))
             p, rate = self.law.pressure(c), self.law.stiffness(c)
-            after = self.sliders.respond(before, c, shift[None], p, rate)
-            lost = float(self.sliders.step(before, after).lost[0])
-            before = after.after
-            found.append([state.force, after.stress[0], state.dissipated_in_step, lost])
+            now = self.sliders.respond(before, c, shift[None], p, rate)
+            step = self.sliders.step(before, now)
+            before, lost = step.after, float(step.lost[0])
+            found.append([state.force, now.stress[0], state.dissipated_in_step, lost])
         bound = MU * self.largest
         cells, springs, energy, lost = (np.array(column) for column in zip(*found, strict=True))
         energies = np.column_stack([energy, lost]) / (bound * self.sliding)

@@ -116,7 +116,8 @@ def test_tangents_are_the_derivatives():
     def at(before, closure, slip):
         return sliders.respond(before, closure, slip, pressure(closure), rate(closure))
 
-    before = at(sliders.at_rest, closures[0], slips[0]).after
+    rest = sliders.at_rest
+    before = sliders.step(rest, at(rest, closures[0], slips[0])).after
     found, width = at(before, closures[1], slips[1]), 1e-8 * END
     for k, axis in enumerate(np.eye(2)):
         ahead, behind = (at(before, closures[1], slips[1] + w * axis) for w in (width, -width))
@@ -127,6 +128,29 @@ def test_tangents_are_the_derivatives():
     change = (ahead.stress - behind.stress) / (2.0 * width)
     assert found.by_closure == pytest.approx(change, abs=1e-5 * float(rate(END)))
     assert np.abs(found.by_closure).max() > 0.1 * MU * float(rate(END))
+
+
+def test_samples_answer_alike_in_any_company(sliders):
+    """Some rows alone, and so many that they are worked on in several parts."""
+    bed = springs_of(pressure, rate, TOUCH, END)
+    many = Sliders([bed, bed], np.array([RATIO, 2.0]), np.repeat([0, 1], 700), MU)
+    rng = np.random.default_rng(4)
+    closures, slips = END * rng.uniform(-0.2, 1.0, (2, 1400)), MU * END * rng.normal(size=(1400, 2))
+
+    def at(before, closure, slip, **rows):
+        return many.respond(before, closure, slip, pressure(closure), rate(closure), **rows)
+
+    before = many.step(many.at_rest, at(many.at_rest, closures[0], slips)).after
+    whole, rows = at(before, closures[1], -slips), np.sort(rng.choice(1400, 40, replace=False))
+    some = at(before, closures[1][rows], -slips[rows], rows=rows)
+    one = [at(before, closures[1][[k]], -slips[[k]], rows=np.array([k])) for k in rows]
+    assert np.abs(whole.stress).max() > 0.5 * MU * float(pressure(END))
+    for name in ("stress", "by_slip", "by_closure", "sticking"):
+        expected = getattr(whole, name)[rows]
+        close = 1e-13 * np.abs(expected).max()  # sums over more or fewer springs that do not touch
+        np.testing.assert_allclose(getattr(some, name), expected, atol=close)
+        alone = np.concatenate([getattr(each, name) for each in one])
+        np.testing.assert_allclose(alone, expected, atol=close)
 
 
 def test_nothing_gains_energy_on_any_path(sliders):

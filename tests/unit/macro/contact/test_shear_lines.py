@@ -29,8 +29,9 @@ def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
     pressure, rate = law.pressure(closure), law.stiffness(closure)
     before = sliders.at_rest
 
-    def respond(slip, *, sticks=False):
-        return sliders.respond(before, closure, slip, pressure, rate, sticks=sticks)
+    def respond(slip, *, sticks=False, rows=slice(None)):
+        at = closure[rows], slip, pressure[rows], rate[rows]
+        return sliders.respond(before, *at, sticks=sticks, rows=np.arange(n)[rows])
 
     slip = rng.normal(0.0, 2e-3, (n, 2))  # far beyond full slip at most samples
     stress = rng.normal(0.0, 3.0, (n, 2))
@@ -44,8 +45,8 @@ def test_lines_touch_the_sliders_where_the_bodys_stiffness_leads():
     assert np.abs(left(exact.ravel())).max() < 1e-6
     there = respond(exact)
     expected = there.stress + np.einsum("nij,nj->ni", there.by_slip, slip - exact)
-    # Newton's steps end at 1e-3 of the largest stress, from where lines change by that at most
-    close = 3e-3 * np.abs(there.stress).max()
+    # Newton's steps end at 1e-4 of the largest stress; what lines change from there is more
+    close = 1e-3 * np.abs(there.stress).max()
     np.testing.assert_allclose(lines.at(slip, closure), expected, atol=close)
     slipped = np.hypot(*there.stress.T) > 0.999 * 0.3 * pressure
     assert 0 < slipped.sum() < n
