@@ -286,13 +286,14 @@ class FrictionalForces(ContactForces):
     ) -> None:
         """Write the forces on laws that are lines; see `ContactForces.write_lines`.
 
-        Under a prescribed shear force all springs stick at first: where slip is softer than
-        sticking, later steps do not go too far.
+        Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
         """
-        lines = self._lines
+        lines, at = self._lines, (closure, displacement, pressure, stiffness)
         if lines is None or self._shifts:
-            sticks = lines is None and self._shifts
-            found = self.respond_on(closure, displacement, pressure, stiffness, sticks=sticks)
+            try:
+                found = self.respond_on(*at)
+            except NotConverged:
+                found = self.respond_on(*at, sticks=True)
             lines = ShearLines(found.slip, closure, found.stress, found)
         else:
             slip = self._shift - self.preload - self.along(displacement)
@@ -337,14 +338,15 @@ class FrictionalForces(ContactForces):
     ) -> None:
         """Add the work of shear stresses and its derivative; see `ContactForces.write_shear_in`.
 
-        Where the shift is not known yet, the stresses of the latest load step stay.
+        The latest stresses stay where pressures do not transmit the prescribed shear force yet.
         """
         along = stretches[:, :, 1:]
-        if self._shifts:
+        moved = np.einsum("k,kni->ni", y, along) / self._sampling.weight[:, None]
+        try:
+            found = self._respond_to(closure, moved, pressure, stiffness)
+        except NotConverged:
             parts[0] -= np.einsum("kni,ni->k", along, self.memory.stress)
             return
-        moved = np.einsum("k,kni->ni", y, along) / self._sampling.weight[:, None]
-        found = self._respond_to(closure, moved, pressure, stiffness)
         self.linearise_shear(stiffness, found)
         parts[0] -= np.einsum("kni,ni->k", along, found.stress)
         changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])

@@ -6,6 +6,8 @@ from helpers.body_meshes import box, standing
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
+from geometry.shear_state import ShearControl
+from geometry.spring_bed import Friction
 from macro import LawContactProblem, Material
 from macro.linear_solvers.options import has_hypre
 
@@ -15,6 +17,8 @@ SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)
 
 class Square:
     """A law p = k c²."""
+
+    range = 0.0, 2e-3
 
     def __init__(self, k):
         self.k = k
@@ -52,3 +56,31 @@ def test_the_answer_does_not_depend_on_the_preconditioner(monkeypatch):
     alone, without = pressed("tetrahedron", 1, 1e9)
     assert with_laws.force == pytest.approx(without.force, rel=1e-8)
     assert alone > 6.0
+
+
+class Exponential:
+    """A law p = 10 kPa (exp(c / 0.4 µm) − 1)."""
+
+    range = 0.0, 3.2e-3
+
+    def pressure(self, closure):
+        return 1e-2 * np.expm1(np.clip(closure / 4e-4, 0.0, 200.0))
+
+    def stiffness(self, closure):
+        grown = np.exp(np.clip(closure / 4e-4, 0.0, 200.0))
+        return np.where(closure > 0.0, 25.0 * grown, 0.0)
+
+
+def test_friction_takes_few_steps_more():
+    """Guesses know what slides: with springs that stick they took 4 steps in place of 3 and 2."""
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (6, 6, 3), "tetrahedron"), SOFT, WHOLE, 1)
+    friction, steps = Friction(coefficient=0.3, poisson_ratio=0.3), {}
+    for rubs in (None, friction):
+        problem = LawContactProblem(face, [Exponential()], "pointwise", friction=rubs)
+        loads = [Control(force=force) for force in (2.5, 5.0, 7.5, 10.0)]
+        steps[rubs] = [problem.solve(load).iterations for load in loads]
+    shears = [ShearControl(force=(part * 3.0, 0.0)) for part in (0.25, 0.5, 0.75, 0.25)]
+    sheared = [problem.solve(Control(force=10.0, shear=shear)).iterations for shear in shears]
+    assert sum(steps[friction]) <= 1.3 * sum(steps[None])
+    assert max(steps[friction][2:]) <= 3
+    assert max(sheared) <= 4
