@@ -1,15 +1,32 @@
-"""Legendre modes on a rectangle: what smooth fields on the contact face are expanded in.
+"""Legendre modes on a rectangle, which expand smooth fields on the contact face; Gauss' rule.
 
 On an interval of length L the modes are P_k(2x/L − 1) √(2k + 1): orthogonal, with mean square 1.
 """
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 
 from support.arrays import Array
+
+
+@cache
+def gauss_rule(count: int) -> tuple[Array, Array]:
+    """Return places on [−1, 1] and weights of Gauss' rule, not to be written to, shapes (count,).
+
+    Its eigenvalue problem takes longer than most sums over the places, so it is solved once.
+
+    Args:
+        count: Number of places.
+    """
+    rule = legendre.leggauss(count)
+    for values in rule:
+        values.flags.writeable = False
+    return rule
 
 
 def mode_values(points: ArrayLike, length: float, count: int) -> Array:
@@ -86,7 +103,7 @@ def modes_within(
     Returns:
         Means over the part of its modes times those of the rectangle, shape (K², K²).
     """
-    nodes, weights = legendre.leggauss(count)
+    nodes, weights = gauss_rule(count)
     share = 0.5 * (1.0 + nodes)
     along = [
         (0.5 * weights * mode_values(share * inner, inner, count))

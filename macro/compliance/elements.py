@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import legendre
 
-from geometry.legendre_modes import mode_values
+from geometry.legendre_modes import gauss_rule, mode_values
 from support.arrays import Array
 
 _MORE = 6
@@ -74,7 +74,7 @@ def across(length: float, degree: int, count: int) -> Line:
         degree: Degree of the element, larger than the number of modes.
         count: Number of Legendre modes to integrate.
     """
-    t, weights = legendre.leggauss(degree + 1)
+    t, weights = gauss_rule(degree + 1)
     half = 0.5 * length
     values, slopes = _shape_functions(t, degree)
     values[:2], slopes[:2] = [np.ones_like(t), t], [np.zeros_like(t), np.ones_like(t)]
@@ -92,7 +92,7 @@ def upwards(ticks: Array, degrees: Sequence[int]) -> Line:
         ticks: Borders of the elements, ascending, shape (n + 1,) [mm].
         degrees: Degree of every element, at least 1.
     """
-    t, weights = legendre.leggauss(max(degrees) + 1)
+    t, weights = gauss_rule(max(degrees) + 1)
     first = np.cumsum([0, *degrees])  # of every element: the function that is 1 at its upper end
     values, slopes = np.zeros((2, first[-1], len(degrees), len(t)))
     halves = 0.5 * np.diff(ticks)

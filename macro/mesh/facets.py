@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 from dolfinx import mesh as dmesh
-from numpy.polynomial import legendre
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from geometry.legendre_modes import gauss_rule
 from macro import compat
 from support.arrays import Array, Indices
 from support.errors import InputError
@@ -342,7 +342,7 @@ def facet_rule(corners: int, exact: int) -> tuple[Array, Array]:
     """
     if corners == 3:
         return compat.triangle_rule(exact)
-    nodes, weights = legendre.leggauss(exact // 2 + 1)
+    nodes, weights = gauss_rule(exact // 2 + 1)
     nodes, weights = 0.5 * (1.0 + nodes), 0.5 * weights
     x, y = np.meshgrid(nodes, nodes, indexing="ij")
     return np.column_stack([x.ravel(), y.ravel()]), np.outer(weights, weights).ravel()

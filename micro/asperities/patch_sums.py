@@ -30,6 +30,7 @@ import numpy as np
 from scipy.special import roots_jacobi
 
 from geometry import PatchGrid
+from geometry.legendre_modes import gauss_rule
 from micro.closed_forms.love import corner_integral
 from support.arrays import Array, Indices
 from support.cores import blocks
@@ -177,7 +178,7 @@ def _rule(start: Array, end: Array, kinks: Array) -> tuple[Array, Array]:
     inner = np.clip(kinks, start[:, None], end[:, None])
     ticks = np.sort(np.concatenate([start[:, None], inner, end[:, None]], axis=1), axis=1)
     half = 0.5 * np.diff(ticks, axis=1)[:, :, None]
-    points, weights = np.polynomial.legendre.leggauss(12)
+    points, weights = gauss_rule(12)
     nodes = 0.5 * (ticks[:, 1:] + ticks[:, :-1])[:, :, None] + half * points
     flat = len(start), nodes.shape[1] * nodes.shape[2]
     return nodes.reshape(flat), (half * weights).reshape(flat)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from geometry import PatchGrid
+from geometry.legendre_modes import gauss_rule
 from micro.boundary_elements.quarter_space import side_compliance, side_stresses
 from support.arrays import Array, Indices
 from support.errors import InputError
@@ -211,7 +212,7 @@ def gauss_points(ticks: Array, count: int) -> tuple[Array, Array]:
     Returns:
         Two arrays of shape (n count,).
     """
-    points, weights = np.polynomial.legendre.leggauss(count)
+    points, weights = gauss_rule(count)
     half = 0.5 * np.diff(ticks)[:, None]
     middle = 0.5 * (ticks[1:] + ticks[:-1])[:, None]
     return (middle + half * points).ravel(), (half * weights).ravel()

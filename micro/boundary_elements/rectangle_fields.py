@@ -39,9 +39,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numpy.polynomial import legendre
 
-from geometry.legendre_modes import mode_values
+from geometry.legendre_modes import gauss_rule, mode_values
 from geometry.materials import Material
 from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
 from micro.boundary_elements.traction_modes import half_space_traction_modes
@@ -211,7 +210,7 @@ class RectangleFields:
         self, axis: int, part: int, nearest: Array, apart: Array, rule: int
     ) -> tuple[Array, Array]:
         """Return places (n, 2 rule) along an axis, and the pressures there times weights."""
-        nodes, weights = legendre.leggauss(abs(rule))
+        nodes, weights = gauss_rule(abs(rule))
         low, high = self._interval(axis, part)
         if rule < 0:
             t = np.broadcast_to(0.5 * (low + high + (high - low) * nodes), (len(apart), -rule))
@@ -331,7 +330,7 @@ def _graded(length: float, count: int) -> tuple[Array, Array]:
     x = L (10 t³ − 15 t⁴ + 6 t⁵): a logarithm of the distance from an end becomes smooth. The 28
     points leave 1e-6 of displacements and stresses.
     """
-    nodes, weights = legendre.leggauss(28)
+    nodes, weights = gauss_rule(28)
     t = 0.5 * (1.0 + nodes)
     x = length * t**3 * (10.0 - 15.0 * t + 6.0 * t * t)
     slope = 30.0 * length * (t * (1.0 - t)) ** 2

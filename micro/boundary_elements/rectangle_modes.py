@@ -19,10 +19,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.polynomial import legendre
 from scipy.special import spherical_jn
 
-from geometry.legendre_modes import mode_slopes, mode_values
+from geometry.legendre_modes import gauss_rule, mode_slopes, mode_values
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, gauss_points, values_at
 from support.arrays import Array, Indices
 from support.small_caches import cached_where_small
@@ -155,7 +154,7 @@ def _overlaps(
     shifts: Array, length: float, there: Callable[[Array, float, int], Array], count: int
 ) -> Array:
     """Return ∫ φ_k(x) ψ_l(x + s) dx where both are on the interval, shape (shifts, K, K)."""
-    nodes, weights = legendre.leggauss(count)
+    nodes, weights = gauss_rule(count)
     half = 0.5 * (length - shifts)[:, None]
     x = half * (1.0 + nodes)
     shape = count, len(shifts), count

@@ -14,10 +14,10 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.polynomial import legendre
 from numpy.typing import ArrayLike
 from scipy.linalg import toeplitz
 
+from geometry.legendre_modes import gauss_rule
 from geometry.patches import PatchGrid
 from support.arrays import Array
 
@@ -104,7 +104,7 @@ def _far_influence(dx: Array, dy: Array, a: float, b: float) -> Array:
     From six longer sides on the error of six points on a side is rounding. The shifts along x have
     the density 1 − |t| at 2 a t, those along y at 2 b t.
     """
-    nodes, weights = legendre.leggauss(6)
+    nodes, weights = gauss_rule(6)
     t, weights = 0.5 * (1.0 + nodes), 0.25 * weights * (1.0 - nodes)
     t, weights = np.concatenate([-t, t]), np.concatenate([weights, weights])
     total = np.zeros(np.shape(dx))

@@ -103,12 +103,9 @@ def tractions_on_mesh():
     body = MeshedBody(tagged, material, (Support(tag=BOTTOM),))
     facets = contact_facets(mesh.mesh, mesh.facet_tags.find(TOP), UPWARD)
     rectangle = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
-    fields = [
-        RectangleFields(
-            lengths=(1.0, 1.0), count=2, material=material, extended=(True,) * 4, axis=axis
-        )
-        for axis in range(3)
-    ]
+    # what fields are extended by beyond the face, no rank shares with another
+    sides = {"lengths": (1.0, 1.0), "extended": (False,) * 4}
+    fields = [RectangleFields(count=2, material=material, axis=k, **sides) for k in range(3)]
     found = mesh_face_tractions(body, facets, rectangle, material, 2, fields)
     return np.linalg.norm(found, axis=(2, 3)).tolist()
 

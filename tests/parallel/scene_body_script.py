@@ -27,7 +27,7 @@ def sections(folder):
     whole |= {"micro": {"finite_slopes": False}, "body": body, "output": QUIET}
     whole |= {"load": {"approach": "6 um", "steps": 2, "tilt": [1e-3, 0]}}
     for name, way in (("full", {"newton": "full"}), ("points", {"interface": "pointwise"})):
-        coupling = {"kind": "consistent", "table_tolerance": 5e-3, **way}
+        coupling = {"kind": "consistent", "table_tolerance": 5e-2, **way}
         yield name, {**whole, "coupling": coupling}
     rough = {"coupling": {"kind": "reference"}, "reference": {"fine": 0.06, "meshes": 1}}
     yield "rough", {**whole, **rough}

@@ -152,7 +152,7 @@ def test_one_patch_under_a_force_is_one_linear_solve():
 @pytest.mark.parametrize("mode", MODES)
 def test_a_force_takes_no_more_than_an_approach(mode):
     """The derivative under a force lies between those of the free block and under a fixed plane."""
-    steps = 1.0 + np.arange(6)
+    steps = 1.0 + 2.0 * np.arange(3)
     prescribed, forced, freed = (uneven_block(mode, grid=(4, 4)) for _ in range(3))
     first = [prescribed.solve(Control(approach=2e-3 * step)) for step in steps]
     for tilt, pressed in (((0.0, 0.0), forced), (None, freed)):

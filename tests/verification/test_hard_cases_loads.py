@@ -179,8 +179,9 @@ def test_nine_patches_with_such_laws(name):
     assert state.plane[0] == pytest.approx(level.plane[0], rel=1e-7)
     # 74 and 92 at kinks, and none found at walls, before steps were bent along the laws
     assert max(level.iterations, state.iterations) <= 12
-    # patch after patch by Brent's method, until nothing moves: slow and sure, as energy is convex
-    found = np.zeros(9)
+    # patch after patch by Brent's method, until nothing moves: slow and sure from any start, as
+    # energy is convex; from the solution, which has to stay where it is
+    found = state.point.pressure.copy()
     for _ in range(200):
         before = found.copy()
         for i, one in enumerate(laws):
@@ -191,9 +192,11 @@ def test_nine_patches_with_such_laws(name):
 
             root = brentq(missing, -0.1, 0.1, xtol=1e-18, rtol=1e-15)
             found[i] = float(one.along(root).pressure)
-        if np.abs(found - before).max() <= 1e-11 * found.max():
+        # at the wall a rounding of closures, 1e-18 mm, is 1e-7 MPa
+        if np.abs(found - before).max() <= 2e-7:
             break
-    # at the wall a rounding of closures, 1e-18 mm, is 1e-7 MPa
+    else:
+        raise AssertionError("patch after patch nothing comes to rest")
     np.testing.assert_allclose(state.point.pressure, found, rtol=1e-6, atol=1e-6)
 
 
