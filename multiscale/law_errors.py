@@ -30,7 +30,7 @@ from scipy.special import stdtrit
 from geometry import Control, Surface
 from multiscale.bodies.bodies import free_bodies
 from multiscale.inputs.bodies import BodyFacts
-from multiscale.inputs.memory import body_request
+from multiscale.inputs.cost import body_request
 from multiscale.inputs.surfaces import RegionSamples
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import LEAST_LOAD

@@ -10,11 +10,10 @@ from typing import Any
 
 from geometry import NotConverged
 from multiscale.auto.keys import resolved_sections
-from multiscale.console import run_progress
+from multiscale.console import Clock, run_progress
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_table import LawTable
-from multiscale.loading.clock import Clock
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
@@ -113,7 +112,7 @@ class Run:
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
         return next(filter(None, (getattr(one, "fluid", None) for one in self.observers)), None)
 
     @property

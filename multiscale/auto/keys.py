@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from geometry.surface import Surface
-from multiscale.couplings.cost import SOLUTIONS_OF_LAWS
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
+from multiscale.inputs.cost import SOLUTIONS_OF_LAWS
 from multiscale.inputs.loads import PROVISIONAL_PATCHES
 from multiscale.inputs.surfaces import most_waves
 from multiscale.loading.stepper import step_count

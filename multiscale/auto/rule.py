@@ -7,8 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from multiscale.auto.keys import MOST_HEIGHTS, auto_keys, with_value
-from multiscale.couplings.cost import Work
 from multiscale.inputs.bodies import LAW_BLOCK_CELLS, BodyFacts, stated_cells
+from multiscale.inputs.cost import Work
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.scene.scene import Scene
 

@@ -42,8 +42,8 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
+from multiscale.inputs.cost import MemoryLacking
 from multiscale.inputs.loads import load_history_on
-from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory

@@ -15,8 +15,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
+from multiscale.cli.interruption import ended_if_told, signals_raise
 from multiscale.cli.words import UsageError, command_parser
-from multiscale.restart.interruption import ended_if_told, signals_raise
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,9 +16,9 @@ from multiscale.console import following
 from multiscale.figures.files import Drawing, file_kinds
 from multiscale.output import terminal
 from multiscale.output.report import filled
+from multiscale.output.results_folder import locked
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
-from multiscale.restart.results_folder import locked
 from multiscale.studies import errors
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from multiscale.cli.interruption import ended_if_told
 from multiscale.console import quietly
 from multiscale.machine import (
     check_address_space,
@@ -18,7 +19,6 @@ from multiscale.machine import (
     world,
 )
 from multiscale.output import terminal
-from multiscale.restart.interruption import ended_if_told
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
@@ -99,7 +99,7 @@ def scene_and_folder(
     Note:
         Collective.
     """
-    from multiscale.restart.results_folder import folder_name  # `help` and `schema` do without
+    from multiscale.output.results_folder import folder_name  # `help` and `schema` do without
     from multiscale.scene.scene import Scene
 
     refuse_detached_processes()

@@ -18,13 +18,13 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class, load_finite_elements
 from multiscale.exports.export import export_texts, remove_exports
 from multiscale.figures.files import Drawing, file_kinds, write_figure
-from multiscale.inputs.memory import shortage_warnings
+from multiscale.inputs.cost import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
 from multiscale.output import terminal
 from multiscale.output.results import surface_drawing
-from multiscale.restart.results_folder import locked, refuse_other_results
+from multiscale.output.results_folder import locked, refuse_other_results
 from multiscale.run import Run
 from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene

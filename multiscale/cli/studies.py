@@ -21,7 +21,7 @@ from multiscale.figures.files import (
 from multiscale.output import terminal
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
-from multiscale.restart.results_folder import locked
+from multiscale.output.results_folder import locked
 from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.difference import Difference, difference
 from multiscale.studies.running import JOURNAL, part_name

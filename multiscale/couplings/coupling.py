@@ -22,8 +22,8 @@ from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel, micro_model
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
+from multiscale.console import Clock
 from multiscale.couplings import describe, validity
-from multiscale.couplings.cost import Work, cost_statement
 from multiscale.inputs.bodies import (
     FIELD_CELLS,
     LAW_BLOCK_CELLS,
@@ -32,11 +32,10 @@ from multiscale.inputs.bodies import (
     SceneBody,
     stated_cells,
 )
-from multiscale.inputs.memory import body_request, scene_requests
+from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import located
 from multiscale.laws.law_table import LawTable
-from multiscale.loading.clock import Clock
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.machine import ClusterNodes, MemoryRequest

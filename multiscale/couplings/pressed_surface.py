@@ -14,8 +14,8 @@ from geometry.materials import MaterialPair
 from geometry.patches import patch_means
 from multiscale.couplings.coupling import Coupling, Meshes, Source
 from multiscale.inputs.bodies import BodyFacts, second_material
+from multiscale.inputs.cost import check_memory
 from multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
-from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import located, make_surfaces
 from support.arrays import Array
 

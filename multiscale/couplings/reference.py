@@ -18,7 +18,6 @@ from geometry import RefinedShape
 from micro import HalfSpaceModel
 from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
-from multiscale.couplings.cost import SET_UP_CYCLES, Work
 from multiscale.couplings.coupling import Meshes, Source
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.couplings.reference_estimates import (
@@ -29,6 +28,7 @@ from multiscale.couplings.reference_estimates import (
 )
 from multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
 from multiscale.inputs.bodies import Cells, block_section
+from multiscale.inputs.cost import SET_UP_CYCLES, Work
 from multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
     check_reference_memory,

@@ -18,12 +18,11 @@ from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
-from multiscale.couplings.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
 from multiscale.couplings.coupling import NOT_WITH_FRICTION, Meshes, Source
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.inputs.bodies import BodyFacts, second_material
+from multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
 from multiscale.inputs.loads import check_load, load_history_on
-from multiscale.inputs.memory import check_memory
 from multiscale.inputs.surfaces import (
     RegionSamples,
     located,

@@ -14,7 +14,7 @@ from scipy.ndimage import distance_transform_edt
 from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
 from geometry.meshes.families import ContactMap, Shape, characteristic_size, reference_shapes
 from multiscale.inputs.bodies import BodyFacts, block_unknowns
-from multiscale.inputs.memory import check_memory
+from multiscale.inputs.cost import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import listed

@@ -69,7 +69,7 @@ class LeakObserver(StepObserver):
 
     @property
     def fluid(self) -> Any:
-        """The `multiscale.observers.face_leak.FluidMap` of the last load step; None without."""
+        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
         return None
 
     @abstractmethod

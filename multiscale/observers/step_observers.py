@@ -288,8 +288,8 @@ def _places(coupling: Coupling) -> Iterator[str]:
     if scene.conductance is not None:
         yield "conductance.ConductanceObserver"
     if scene.leak is not None:
-        own = "patch_leak.PatchLeakObserver" if coupling.has_laws else "leak.GapLeakObserver"
-        yield "face_leak.FaceLeakObserver" if scene.leak.between_edges else own
+        own = "law_leaks.PatchLeakObserver" if coupling.has_laws else "leak.GapLeakObserver"
+        yield "law_leaks.FaceLeakObserver" if scene.leak.between_edges else own
     if scene.friction is not None:
         yield "friction.FrictionObserver"
 

@@ -1,1 +1,1 @@
-"""What a run writes and prints: tables, figures, report, fields, lines in the terminal."""
+"""What a run writes and prints: tables, figures, report, fields, checkpoint, lines; its folder."""

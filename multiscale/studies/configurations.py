@@ -20,8 +20,8 @@ from micro import MODELS
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
+from multiscale.inputs.cost import MemoryLacking
 from multiscale.inputs.loads import load_history_on, patch_grid
-from multiscale.inputs.memory import MemoryLacking
 from multiscale.inputs.surfaces import make_surface
 from multiscale.scene.identity import identity
 from multiscale.scene.reader import to_dict

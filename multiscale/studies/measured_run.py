@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from geometry.patches import PatchGrid
-from multiscale.inputs.memory import MemoryLacking
+from multiscale.inputs.cost import MemoryLacking
 from multiscale.readable import duration
 from multiscale.results.history import History
 from multiscale.run import Run

@@ -17,9 +17,9 @@ import time
 from pathlib import Path
 
 from multiscale import Run, Scene
+from multiscale.output.checkpoint import CheckpointWriter
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import CheckpointWriter
-from multiscale.restart.results_folder import FolderLock
+from multiscale.output.results_folder import FolderLock
 
 SCENES = {
     "summits": {"coupling": {"kind": "analytic"}, "micro": {"model": "elliptic"}},

@@ -33,7 +33,7 @@ from geometry import (
 from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
 from micro import FreeSides, HalfSpaceModel
 from multiscale.bodies.face_terms import BlockTerms
-from multiscale.results.extrapolation import extrapolated
+from multiscale.results.reference_record import extrapolated
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.15)
 SIDE, APPROACH, ORDER = 1.0, 8e-3, 4.0

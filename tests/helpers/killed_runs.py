@@ -130,7 +130,7 @@ def enter(words, log, root):
     os.dup2(file, 1)
     os.dup2(file, 2)
     from multiscale.cli.command_line import main
-    from multiscale.restart import checkpoint
+    from multiscale.output import checkpoint
 
     # these runs take less than the second between two writes
     checkpoint.LEAST_INTERVAL = checkpoint.LEAST_RATIO = 0.0

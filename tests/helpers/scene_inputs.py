@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from helpers.schema_values import counts, extreme, keys
-from multiscale.couplings.cost import memory_parts
+from multiscale.inputs.cost import memory_parts
 from multiscale.run import run
 from multiscale.scene.scene import Scene
 from multiscale.setup import make_setup

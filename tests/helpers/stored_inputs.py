@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from multiscale.laws.law_file import read_laws, write_laws
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 from support.checked_store import checksum_hdf5

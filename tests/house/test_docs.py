@@ -12,9 +12,8 @@ from multiscale.exports.export import CSV_COLUMNS, FLOW_COLUMNS
 from multiscale.loading.load_step import COLUMNS
 from multiscale.output.results import FILES
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS
-from multiscale.results.extrapolation import Estimate
 from multiscale.results.history import PATCH_COLUMNS, PATCH_STIFFNESS
-from multiscale.results.reference_record import ReferenceRecord
+from multiscale.results.reference_record import Estimate, ReferenceRecord
 from multiscale.scene.keys import scene_keys
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ from scipy.optimize import brentq
 
 from geometry import BlockShape
 from multiscale import Scene
-from multiscale.restart.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
-from multiscale.restart.results_folder import find_checkpoint
+from multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
+from multiscale.output.results_folder import find_checkpoint
 from multiscale.run import Run
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(4, 4, 3)).ticks

@@ -21,7 +21,7 @@ from geometry import (
 )
 from macro import Block, LoadedFace, UnilateralContactProblem, block_mesh, rough_block_mesh
 from micro import FreeSides
-from multiscale.results.extrapolation import extrapolated
+from multiscale.results.reference_record import extrapolated
 
 SQUARE = (1.0, 1.0)
 SIDES = FreeSides(lengths=SQUARE, poisson_ratio=MATERIAL.poisson_ratio, decay_length=0.25)

@@ -19,7 +19,7 @@ from geometry import (
     synthesise,
 )
 from macro import Block, UnilateralContactProblem, rough_block_mesh
-from multiscale.results.extrapolation import extrapolated
+from multiscale.results.reference_record import extrapolated
 
 APPROACH, FLAT = 8e-3, 0.01
 

@@ -10,8 +10,8 @@ from geometry import Control
 from micro import HalfSpaceModel
 from micro.conductance import STEFAN_BOLTZMANN
 from multiscale import Run, Scene, make_setup, run
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
 from support.errors import InputError
 

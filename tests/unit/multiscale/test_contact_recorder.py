@@ -11,8 +11,8 @@ import pytest
 
 from geometry import Control
 from multiscale import Run, Scene, run
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.contact_record import SPOT_COLUMNS
 
 SPECTRUM = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}

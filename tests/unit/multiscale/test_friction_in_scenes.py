@@ -16,8 +16,8 @@ from multiscale import Run, make_setup, run
 from multiscale.cli import main
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.loading.load_history import LoadHistory
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
 from support.errors import InputError, NotConverged
 

@@ -8,7 +8,7 @@ import pytest
 
 from multiscale import Run, Scene, make_setup, run
 from multiscale.laws.law_file import read_laws, write_laws
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from support.errors import InputError, NotConverged
 
 MU, SHIFT = 0.3, 4e-4

@@ -12,8 +12,8 @@ from micro import HalfSpaceModel
 from multiscale import Run, make_setup, run, sweep
 from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.observers.step_observers import FieldRecorder
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
 from support.errors import InputError
 

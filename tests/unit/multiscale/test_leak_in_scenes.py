@@ -10,8 +10,8 @@ from micro.flow.gap_flow import gap_flow
 from multiscale import Run, Scene, gap_flows, make_setup, run
 from multiscale.observers import leak as observer
 from multiscale.observers.leak import leak_text
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.results.reading import read_history
 from support.errors import InputError
 

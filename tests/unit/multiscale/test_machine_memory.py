@@ -13,8 +13,8 @@ from mpi4py import MPI
 from multiscale import Scene, make_setup
 from multiscale.cli.command_line import main
 from multiscale.couplings.dispatch import coupling_class
-from multiscale.inputs import memory
-from multiscale.inputs.memory import body_request, shortage_warnings
+from multiscale.inputs import cost
+from multiscale.inputs.cost import body_request, shortage_warnings
 from multiscale.machine import (
     ClusterNodes,
     MemoryRequest,
@@ -38,7 +38,7 @@ def requests(given):
 
 
 def check_memory(given, nodes):
-    memory.check_memory(given, nodes, requests(given))
+    cost.check_memory(given, nodes, requests(given))
 
 
 def of(count, *, ranks=1, memory=64.0):

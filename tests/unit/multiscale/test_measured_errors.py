@@ -14,9 +14,9 @@ from geometry.rigid_plane import Control
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, run
 from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.output.checkpoint import checkpoint_of
 from multiscale.output.results import write_results, write_tables
 from multiscale.readable import quantity, with_error
-from multiscale.restart.checkpoint import checkpoint_of
 from support.errors import NotConverged
 
 

@@ -12,8 +12,8 @@ import pytest
 from multiscale import Run, Scene, make_setup
 from multiscale.auto import search
 from multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
-from multiscale.couplings import cost
-from multiscale.couplings.cost import SOLUTIONS_OF_LAWS
+from multiscale.inputs import cost
+from multiscale.inputs.cost import SOLUTIONS_OF_LAWS
 from multiscale.machine import ClusterNodes
 from multiscale.output import terminal
 from multiscale.output.provenance import provenance

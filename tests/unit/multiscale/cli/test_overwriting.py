@@ -6,7 +6,7 @@ import pytest
 from helpers.small_scene import SMALL_SCENE
 
 from multiscale.cli.command_line import main
-from multiscale.restart.checkpoint import FILE_NAME, CheckpointWriter
+from multiscale.output.checkpoint import FILE_NAME, CheckpointWriter
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
 

@@ -5,7 +5,7 @@ import pytest
 
 from geometry import NotConverged
 from multiscale import Run, Scene, run
-from multiscale.restart.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 
 SCENE = {
     "surface": {

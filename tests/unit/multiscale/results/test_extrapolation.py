@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from multiscale.results.extrapolation import extrapolated
+from multiscale.results.reference_record import extrapolated
 from support.errors import InputError
 
 LIMIT = 4.0

@@ -14,8 +14,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
+from multiscale.output.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
 from multiscale.removed import without_removed
-from multiscale.restart.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
 from multiscale.scene.identity import (
     CONTENT,
     VERSION,

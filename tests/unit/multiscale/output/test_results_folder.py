@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from multiscale.cli.command_line import main
-from multiscale.restart.results_folder import FolderLock
+from multiscale.output.results_folder import FolderLock
 from support.errors import InputError
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
@@ -124,7 +124,7 @@ def test_folders_above_are_removed_as_well(tmp_path):
 def test_lock_of_a_killed_process_is_lifted(tmp_path, root):
     code = (
         "import os, signal, sys; from pathlib import Path\n"
-        "from multiscale.restart.results_folder import FolderLock\n"
+        "from multiscale.output.results_folder import FolderLock\n"
         "lock = FolderLock(Path(sys.argv[1])); lock.hold()\n"
         "os.kill(os.getpid(), signal.SIGKILL)"
     )

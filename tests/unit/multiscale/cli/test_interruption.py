@@ -14,7 +14,7 @@ import pytest
 from multiscale import Run
 from multiscale.cli import keys
 from multiscale.cli.command_line import main
-from multiscale.restart.interruption import Ended, Stopped, signals_raise, watching
+from multiscale.cli.interruption import Ended, Stopped, signals_raise, watching
 from support.errors import InputError
 from support.quantities import parse_duration
 
@@ -139,7 +139,7 @@ def test_what_is_no_duration(capsys, text, problem):
 def test_a_notice_after_the_end_does_not_kill():
     """A batch system tells the end of the time whenever it likes."""
     code = (
-        "import os, signal; from multiscale.restart.interruption import watching\n"
+        "import os, signal; from multiscale.cli.interruption import watching\n"
         "with watching(None): pass\n"
         "os.kill(os.getpid(), signal.SIGUSR1)"
     )
@@ -283,7 +283,7 @@ def test_a_signal_that_becomes_another_error_ends_with_its_code(monkeypatch, cap
 def test_a_signal_is_seen_though_standard_error_is_full():
     code = (
         "import os, signal\n"
-        "from multiscale.restart.interruption import Stopped, watching\n"
+        "from multiscale.cli.interruption import Stopped, watching\n"
         "with watching(None) as watch:\n"
         "    os.kill(os.getpid(), signal.SIGTERM)\n"
         "    try: watch.check('after load step 1')\n"

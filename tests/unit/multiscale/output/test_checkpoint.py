@@ -15,14 +15,14 @@ import pytest
 from multiscale import Run, Scene
 from multiscale.auto import keys as auto_keys
 from multiscale.cli.command_line import main
-from multiscale.output.field_files import write_fields
-from multiscale.restart.checkpoint import (
+from multiscale.output.checkpoint import (
     CheckpointWriter,
     checkpoint_of,
     read_checkpoint,
     write_checkpoint,
 )
-from multiscale.restart.results_folder import FolderLock, find_checkpoint
+from multiscale.output.field_files import write_fields
+from multiscale.output.results_folder import FolderLock, find_checkpoint
 from support.checked_store import write_record
 from support.errors import InputError, NotConverged, NotWritten
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from multiscale.loading.load_step import LoadStep, PatchState
-from multiscale.restart.checkpoint import read_steps, write_steps
+from multiscale.output.checkpoint import read_steps, write_steps
 from support.checked_store import START, Mark
 from support.errors import InputError, NotWritten
 

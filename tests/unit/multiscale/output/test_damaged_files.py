@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from multiscale.laws.law_file import read_laws
-from multiscale.restart.checkpoint import read_checkpoint
+from multiscale.output.checkpoint import read_checkpoint
 from support.checked_store import checksum_hdf5
 from support.errors import InputError
 

@@ -5,8 +5,8 @@ from helpers.box_msh import write_box
 
 from geometry import BlockShape, InputError
 from multiscale import Scene
-from multiscale.restart.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
-from multiscale.restart.results_folder import find_checkpoint
+from multiscale.output.checkpoint import FILE_NAME, checkpoint_of, write_checkpoint
+from multiscale.output.results_folder import find_checkpoint
 from multiscale.run import Run
 
 TICKS = BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 2)).ticks

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from multiscale import Run, Scene
-from multiscale.restart import checkpoint
-from multiscale.restart.checkpoint import (
+from multiscale.output import checkpoint
+from multiscale.output.checkpoint import (
     CheckpointWriter,
     checkpoint_of,
     read_checkpoint,
     write_checkpoint,
 )
-from multiscale.restart.results_folder import FolderLock
+from multiscale.output.results_folder import FolderLock
 
 SURFACE = {
     "spectrum": {"hurst": 0.9, "waves": [2, 6], "rms_slope": 0.1, "seed": 2},
