@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from geometry import InputError, Regions
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw, repaired_law
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Conducts = Callable[[Array], dict[str, Array]]
 """From stiffnesses dp/dc [MPa/mm] to conductances per area by the name of their column."""
 

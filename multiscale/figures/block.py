@@ -9,7 +9,6 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LightSource, Normalize, PowerNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from geometry import Surface
 from geometry.materials import von_mises
@@ -17,8 +16,7 @@ from micro.half_space.stresses_below import stresses_below
 from multiscale.figures.contact import record_text
 from multiscale.figures.maps import blocks_of
 from multiscale.figures.style import FULL_WIDTH, PRESSURES, STRESSES, new_figure, styled
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 @styled()

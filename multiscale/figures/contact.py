@@ -14,9 +14,9 @@ from geometry.patches import PatchGrid
 from geometry.surface import Surface
 from multiscale.figures.contact_scales import ContactScales
 from multiscale.figures.maps import (
-    coarsened,
     colour_bar,
     draw_face,
+    draw_image,
     draw_pressures,
     map_axes,
     say,
@@ -161,13 +161,9 @@ def _draw_field(
 ) -> Any:
     """Draw a field of cells as an image, one of nodes as triangles between them."""
     look: dict[str, Any] = {"cmap": colours, "norm": scale}
-    unit = map_axes(axes, record.lengths_mm)
     if values.ndim == 2:
-        width, depth = record.lengths_mm
-        extent = (0.0, unit * width, 0.0, unit * depth)
-        return axes.imshow(
-            coarsened(values, largest=largest).T, origin="lower", extent=extent, **look
-        )
+        return draw_image(axes, record.lengths_mm, values, largest=largest, **look)
+    unit = map_axes(axes, record.lengths_mm)
     from matplotlib.tri import Triangulation
 
     mesh = Triangulation(unit * record.x_mm, unit * record.y_mm)

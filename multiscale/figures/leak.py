@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
 from micro.flow.gap_flow import GapFlow
-from multiscale.figures.maps import coarsened, colour_bar, map_axes
+from multiscale.figures.maps import blocks_of, colour_bar, draw_image, map_axes, map_unit
 from multiscale.figures.style import (
     BLUE,
     FULL_WIDTH,
@@ -115,17 +115,16 @@ def _channel_text(flow: GapFlow) -> str:
 
 def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
     """Draw fluid pressure in blue, contact in grey, flow lines, and a ring about a constriction."""
-    scale = map_axes(axes, flow.lengths)
+    scale, _ = map_unit(flow.lengths)
     first, second = section.pressures
     pressure = second + flow.pressure * (first - second)
     name, unit = usual_unit([first, second], "MPa")
-    fluid = np.ma.masked_invalid(coarsened(pressure, largest=False) / unit)
-    contact = np.ma.masked_greater(coarsened(flow.gap, largest=False), 0.0)
-    extent = (0.0, scale * flow.lengths[0], 0.0, scale * flow.lengths[1])
-    look: dict[str, Any] = {"origin": "lower", "extent": extent}
-    axes.imshow(0.0 * contact.T, cmap=ListedColormap([_CONTACT]), **look)
+    contact, fluid = np.ma.masked_greater(flow.gap, 0.0), np.ma.masked_invalid(pressure / unit)
+    grey: dict[str, Any] = {"cmap": ListedColormap([_CONTACT])}
+    draw_image(axes, flow.lengths, 0.0 * contact, largest=False, **grey)
     norm = Normalize(min(first, second) / unit, max(first, second) / unit)
-    image = axes.imshow(fluid.T, cmap=_FLUID, norm=norm, **look)
+    blue: dict[str, Any] = {"cmap": _FLUID, "norm": norm}
+    image = draw_image(axes, flow.lengths, fluid, largest=False, **blue)
     colour_bar(image, axes, f"fluid pressure [{name}]")
     if flow.constriction is None:
         return
@@ -137,7 +136,7 @@ def _draw_flow(axes: Any, flow: GapFlow, section: Any) -> None:
 def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
     """Draw flow lines, the thicker the more flows."""
     steps = [-(-count // 100) for count in flow.gap.shape]
-    along, across = (sign * _means(part, steps) for part in flow.flux)
+    along, across = (sign * blocks_of(part, steps).mean(axis=(1, 3)) for part in flow.flux)
     x, y = (
         scale * (np.arange(count) + 0.5) * step * length / whole
         for count, step, length, whole in zip(
@@ -153,13 +152,6 @@ def _draw_lines(axes: Any, flow: GapFlow, scale: float, sign: float) -> None:
         arrowsize=0.5,
     )  # fmt: skip
     map_axes(axes, flow.lengths)
-
-
-def _means(field: Any, steps: list[int]) -> Any:
-    """Return the means of blocks of cells; what is left over at the ends is left out."""
-    nx, ny = (count // step for count, step in zip(field.shape, steps, strict=True))
-    part = field[: nx * steps[0], : ny * steps[1]]
-    return part.reshape(nx, steps[0], ny, steps[1]).mean(axis=(1, 3))
 
 
 def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:

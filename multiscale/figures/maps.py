@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from geometry.patches import PatchGrid
 from multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
 from multiscale.readable import number, usual_unit
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 def map_unit(lengths: tuple[float, float]) -> tuple[float, str]:
@@ -47,6 +46,24 @@ def map_axes(axes: Any, lengths: tuple[float, float]) -> float:
     if wide < 1.5:  # labels of the ticks would meet
         axes.locator_params(axis="x", nbins=max(1, int(wide / 0.4)))
     return scale
+
+
+def draw_image(
+    axes: Any, lengths: tuple[float, float], values: Any, *, largest: bool, **look: Any
+) -> Any:
+    """Draw a field of cells as a map, on few enough cells to be seen.
+
+    Args:
+        axes: Axes, which become those of a map.
+        lengths: Sides of the face along x and y [mm].
+        values: The field, shape (nx, ny); what is masked is not drawn.
+        largest: Whether blocks of cells show their largest value instead of their mean.
+        **look: Colours and their scale, as `imshow` takes them.
+    """
+    scale = map_axes(axes, lengths)
+    extent = (0.0, scale * lengths[0], 0.0, scale * lengths[1])
+    shown = coarsened(values, largest=largest).T
+    return axes.imshow(shown, origin="lower", extent=extent, **look)
 
 
 def _drawn_inches(axes: Any) -> tuple[float, float]:

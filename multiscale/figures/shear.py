@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
-from multiscale.figures.maps import coarsened, colour_bar, map_axes
-from multiscale.figures.style import BLUE, NO_CONTACT, PRESSURES, VERMILLION, map_panels, styled
+from multiscale.figures.maps import colour_bar, draw_image
+from multiscale.figures.style import BLUE, PRESSURES, VERMILLION, map_panels, styled
 from multiscale.readable import percent, usual_unit
 
 _STICK, _SLIP = 1.0, 2.0
@@ -38,8 +38,12 @@ def shear_figure(history: Any, record: Any) -> Figure:
 def _draw_cells(axes: Any, record: Any) -> None:
     closed, slipping = record.pressure_MPa > 0.0, record.slipping
     values = np.where(closed, np.where(slipping, _SLIP, _STICK), 0.0)
-    look = {"cmap": ListedColormap([BLUE, VERMILLION]), "norm": Normalize(_STICK, _SLIP)}
-    _draw_map(axes, record, np.ma.masked_equal(values, 0.0), look)
+    look: dict[str, Any] = {
+        "cmap": ListedColormap([BLUE, VERMILLION]),
+        "norm": Normalize(_STICK, _SLIP),
+    }
+    shown = np.ma.masked_equal(values, 0.0)
+    draw_image(axes, record.lengths_mm, shown, largest=True, **look)
     slip = np.count_nonzero(slipping) / max(1, np.count_nonzero(closed))
     axes.set_title(f"blue sticks; {percent(slip, 3)} of the contact slips, in orange")
 
@@ -50,19 +54,10 @@ def _draw_tractions(axes: Any, record: Any) -> None:
     shown = np.ma.masked_where(record.pressure_MPa <= 0.0, traction / size)
     # few cells carry the largest tractions
     top = float(np.quantile(shown.compressed(), 0.99)) if shown.count() else 1.0
-    look = {"cmap": PRESSURES, "norm": Normalize(0.0, top or 1.0)}
-    image = _draw_map(axes, record, shown, look)
+    look: dict[str, Any] = {"cmap": PRESSURES, "norm": Normalize(0.0, top or 1.0)}
+    image = draw_image(axes, record.lengths_mm, shown, largest=True, **look)
     colour_bar(image, axes, f"tangential traction [{unit}]", extend="max")
     axes.set_title("tangential traction")
-
-
-def _draw_map(axes: Any, record: Any, values: Any, look: dict[str, Any]) -> Any:
-    unit = map_axes(axes, record.lengths_mm)
-    axes.set_facecolor(NO_CONTACT)
-    width, depth = record.lengths_mm
-    shown = coarsened(values, largest=True).T
-    extent = (0.0, unit * width, 0.0, unit * depth)
-    return axes.imshow(shown, origin="lower", extent=extent, **look)
 
 
 def _draw_loop(axes: Any, history: Any) -> None:

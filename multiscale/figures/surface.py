@@ -6,14 +6,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from geometry.asperities import Asperities
 from geometry.patches import PatchGrid
 from geometry.spectrum import Spectrum, random_waves
 from geometry.statistics import power_spectrum, roughness
 from geometry.surface import Surface
-from multiscale.figures.maps import coarsened, colour_bar, draw_patch_borders, map_axes
+from multiscale.figures.maps import colour_bar, draw_image, draw_patch_borders, map_unit
 from multiscale.figures.style import (
     BLUE,
     GREY,
@@ -25,8 +24,7 @@ from multiscale.figures.style import (
     styled,
 )
 from multiscale.readable import usual, usual_unit
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 MOST_SUMMITS = 200
 """Summits that are marked on a map; of more, the highest, which come into contact first."""
@@ -67,17 +65,14 @@ def draw_surface(
         asperities: The summits of the surface; None leaves them out.
         patches: The partition of the interface; None draws none.
     """
-    scale = map_axes(axes, surface.lengths)
-    unit, centred = _centred(surface)
-    heights = coarsened(centred, largest=False)
-    extent = (0.0, scale * surface.lengths[0], 0.0, scale * surface.lengths[1])
-    image = axes.imshow(heights.T, origin="lower", extent=extent, cmap=HEIGHTS)
+    unit, heights = _centred(surface)
+    image = draw_image(axes, surface.lengths, heights, largest=False, cmap=HEIGHTS)
     colour_bar(image, axes, f"height over the mean plane [{unit}]")
     if patches is not None and 1 < patches.count <= 1024:
         draw_patch_borders(axes, patches, colour="white")
     title = f"{surface.grid[0]} × {surface.grid[1]} heights"
     if asperities is not None:
-        title = _draw_summits(axes, asperities, scale)
+        title = _draw_summits(axes, asperities, map_unit(surface.lengths)[0])
     axes.set_title(title)
 
 

@@ -13,9 +13,8 @@ from geometry.contact_state import ContactState
 from multiscale.figures import by_matplotlib
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import column, measured, number
+from support.arrays import Array
 from support.displayed import Displayed, Table, of_columns
-
-Array = NDArray[np.float64]
 
 SPOT_COLUMNS = ("x_mm", "y_mm", "area_mm2", "force_N", "peak_pressure_MPa")
 """Columns of ``contacts.csv`` behind the load step and the number of the spot."""

@@ -18,10 +18,9 @@ from multiscale.readable import Caution, span
 from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.reference_record import ReferenceRecord
+from support.arrays import Array
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
 """Columns of ``patches.csv``; with laws `PATCH_STIFFNESS` follows."""

@@ -14,9 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import measured, percent, usual_unit, with_error
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -210,8 +209,6 @@ def reference_record(
         area=extrapolated(area, sizes, area_order),
     )
 
-
-Array = NDArray[np.float64]
 
 RATE_MARGIN = 1.25
 """The error bar allows a rate this much below the known order.

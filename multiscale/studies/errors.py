@@ -39,14 +39,13 @@ from dataclasses import dataclass, field, fields
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry.patches import interval_overlaps
 from multiscale.inputs.bodies import block_section
 from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid, times
 from multiscale.studies.running import CaseResult
+from support.arrays import Array
 
-Array = NDArray[np.float64]
 Curves: TypeAlias = Mapping[str, Array]
 """The load steps of a run, see `multiscale.studies.measured_run``; empty of one without any."""
 

@@ -24,11 +24,10 @@ from multiscale.scene.identity import identity
 from multiscale.scene.scene import Scene
 from multiscale.studies.cases import Case, sweep_cases
 from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
+from support.arrays import Array
 from support.collective import on_root, place_in, together
 from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 NUMBERS = tuple(column.name for column in COLUMNS if column.name != "reason")
 """Columns of ``history.csv`` that are numbers."""
