@@ -21,8 +21,7 @@ from multiscale.observers.step_observers import ContactRecorder, FieldRecorder, 
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.scene.identity import identity
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup
 from support.collective import on_root
 from support.packages import optional_packages
@@ -41,7 +40,7 @@ class Run:
     Attributes:
         clock: Measures the phases of the run, and reports them to an observer.
         given: The scene as the user wrote it.
-        identity: All that its numbers depend on, see `multiscale.scene.identity`.
+        identity: All that its numbers depend on, see `multiscale.scene.scene`.
         coupling: The coupling made from the scene, which solves the load steps.
         scene: The scene with values for its auto keys.
         steps: The load steps accepted so far, counted from first touch.

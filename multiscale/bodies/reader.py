@@ -19,8 +19,7 @@ from multiscale.inputs.loads import body_states
 from multiscale.inputs.surfaces import located
 from multiscale.loading.stages import BodyLoads
 from multiscale.scene.bodies import CounterBodySection
-from multiscale.scene.identity import content_digest
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, content_digest
 from support.collective import on_root
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

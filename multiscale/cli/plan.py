@@ -26,8 +26,7 @@ from multiscale.output import terminal
 from multiscale.output.results import surface_drawing
 from multiscale.output.results_folder import locked, refuse_other_results
 from multiscale.run import Run
-from multiscale.scene.identity import identity
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup
 from support.collective import on_root, on_root_alone, place_in
 from support.whole_files import write_text

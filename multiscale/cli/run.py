@@ -20,8 +20,7 @@ from multiscale.output.results_folder import (
     refuse_other_results,
 )
 from multiscale.run import Run
-from multiscale.scene.identity import identity
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, identity
 from support.collective import on_root
 from support.errors import InputError, NotConverged, NotInstalled, PatchlawError
 from support.packages import optional_packages

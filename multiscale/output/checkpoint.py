@@ -50,7 +50,7 @@ class Checkpoint:
     """A run between two load steps. Nothing in it depends on the number of ranks.
 
     Attributes:
-        identity: All that the numbers of the run depend on, see `multiscale.scene.identity`.
+        identity: All that the numbers of the run depend on, see `multiscale.scene.scene`.
         resolved: What the auto values of the scene became, see `resolved_sections`.
         laws: Bytes of the law file; empty without laws.
         steps: The accepted load steps.

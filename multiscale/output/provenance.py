@@ -17,7 +17,7 @@ from multiscale.couplings.coupling import Coupling
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.machine import peak_memory
 from multiscale.run import Run
-from multiscale.scene.identity import files_of
+from multiscale.scene.scene import files_of
 from support.checked_store import fingerprint
 
 LIBRARIES = "numpy scipy dolfinx petsc4py mpi4py gmsh h5py pydantic pint matplotlib".split()

@@ -16,16 +16,16 @@ from typing import Any
 
 from multiscale.output.checkpoint import FILE_NAME, FORMER_NAME, Checkpoint, read_checkpoint
 from multiscale.removed import without_removed
-from multiscale.scene.identity import (
+from multiscale.scene.scene import (
     CONTENT,
     VERSION,
     Change,
+    Scene,
     changes,
     flat_identity,
     identity,
     told,
 )
-from multiscale.scene.scene import Scene
 from support.collective import on_root
 from support.errors import InputError
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from multiscale.figures import by_matplotlib
 from multiscale.figures.contact_scales import ContactScales
@@ -23,6 +22,27 @@ from support.errors import InputError
 from support.packages import optional_packages
 
 _MAPS = FIELDS[2:]
+
+
+_SHAPE = "shape (n, nx, ny), or (n, nodes) of a reference"
+
+
+def _of_steps(name: str, meaning: str, kind: Any = float) -> Any:
+    """Return a property: a number of all contacts."""
+    return property(
+        lambda history: np.array([getattr(one, name) for one in history.records], kind),
+        doc=meaning,
+    )
+
+
+def _map(name: str, meaning: str) -> Any:
+    """Return a property: a map of all contacts, or the places that they have in common."""
+
+    def read(history: ContactHistory) -> Array:
+        found = history.of_records(name)
+        return found if name in _MAPS else found[0]
+
+    return property(read, doc=meaning)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -67,50 +87,15 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
             allowed=f"{recorded}; any of a run with output.contact = 'all'",
         )
 
-    @property
-    def step(self) -> NDArray[np.int64]:
-        """Numbers of the load steps, shape (n,)."""
-        return np.array([record.step for record in self.records], np.int64)
-
-    @property
-    def approach_mm(self) -> Array:
-        """Approaches of the plane, shape (n,) [mm]."""
-        return np.array([record.approach_mm for record in self.records])
-
-    @property
-    def force_N(self) -> Array:
-        """Forces of all spots, shape (n,) [N]."""
-        return np.array([record.force_N for record in self.records])
-
-    @property
-    def unloading(self) -> NDArray[np.bool_]:
-        """Whether the load fell to each of the load steps, shape (n,)."""
-        return np.array([record.unloading for record in self.records], bool)
-
-    @property
-    def x_mm(self) -> Array:
-        """Abscissae of the nx cells, shape (nx,), or of the nodes of a reference [mm]."""
-        return self._of_records("x_mm")[0]
-
-    @property
-    def y_mm(self) -> Array:
-        """Ordinates of the ny cells, shape (ny,), or of the nodes of a reference [mm]."""
-        return self._of_records("y_mm")[0]
-
-    @property
-    def pressure_MPa(self) -> Array:
-        """Contact pressures, shape (n, nx, ny), or (n, nodes) of a reference [MPa]."""
-        return self._of_records("pressure_MPa")
-
-    @property
-    def gap_mm(self) -> Array:
-        """Gaps between plane and deformed surface, shape (n, nx, ny) or (n, nodes) [mm]."""
-        return self._of_records("gap_mm")
-
-    @property
-    def plastic_depth_mm(self) -> Array:
-        """Plastic depths that the loads so far left, shape (n, nx, ny) [mm]."""
-        return self._of_records("plastic_depth_mm")
+    step = _of_steps("step", "Numbers of the load steps, shape (n,).", np.int64)
+    approach_mm = _of_steps("approach_mm", "Approaches of the plane, shape (n,) [mm].")
+    force_N = _of_steps("force_N", "Forces of all spots, shape (n,) [N].")
+    unloading = _of_steps("unloading", "Whether the load fell to each load step, shape (n,).", bool)
+    x_mm = _map("x_mm", "Abscissae of the nx cells, shape (nx,), or of a reference's nodes [mm].")
+    y_mm = _map("y_mm", "Ordinates of the ny cells, shape (ny,), or of a reference's nodes [mm].")
+    pressure_MPa = _map("pressure_MPa", f"Contact pressures, {_SHAPE} [MPa].")
+    gap_mm = _map("gap_mm", f"Gaps between plane and deformed surface, {_SHAPE} [mm].")
+    plastic_depth_mm = _map("plastic_depth_mm", f"Plastic depths that loads left, {_SHAPE} [mm].")
 
     @property
     def spots(self) -> tuple[Array, ...]:
@@ -125,8 +110,15 @@ class ContactHistory(Displayed, Sequence[ContactRecord]):
         """
         return bool(self.records) and all(getattr(one, name) is not None for one in self.records)
 
-    def _of_records(self, name: str) -> Array:
-        """Return a map of all contacts, which are all of the same points."""
+    def of_records(self, name: str) -> Array:
+        """Return a map of all contacts, which are all of the same points.
+
+        Args:
+            name: Name of the map.
+
+        Raises:
+            InputError: When a contact is without it.
+        """
         if not self.has(name):
             needed = "a hardness" if name == "plastic_depth_mm" else "a model with cells or nodes"
             raise InputError("is not known of these contacts", key=name, allowed=f"with {needed}")

@@ -12,8 +12,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from multiscale.scene.identity import CONTENT, content_digest
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import CONTENT, Scene, content_digest
 from multiscale.scene.scene_file import parsed
 from support.errors import InputError
 from support.whole_files import plain

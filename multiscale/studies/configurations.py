@@ -23,9 +23,8 @@ from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from multiscale.inputs.cost import MemoryLacking
 from multiscale.inputs.loads import load_history_on, patch_grid
 from multiscale.inputs.surfaces import make_surface
-from multiscale.scene.identity import identity
 from multiscale.scene.reader import to_dict
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup
 from support.errors import InputError, NotConverged
 

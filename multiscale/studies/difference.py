@@ -15,7 +15,16 @@ import numpy as np
 
 from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
-from multiscale.readable import SCALED_UNITS, number, percent, quantity, usual_unit, with_error
+from multiscale.readable import (
+    SCALED_UNITS,
+    column,
+    number,
+    percent,
+    quantity,
+    usual,
+    usual_unit,
+    with_error,
+)
 from multiscale.results.history import History
 from multiscale.results.reading import read_history, result_of_a_run
 from multiscale.scene.keys import scene_keys
@@ -32,7 +41,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
-from support.displayed import Displayed, Table, data_frame
+from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
 
 _MOST_CHANGES = 40
@@ -68,6 +77,14 @@ class Ratio:
         """Error of the ratio, the sum of both relative errors times the ratio, shape (n,)."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.abs(self.ratio) * np.abs(self.errors / self.values).sum(axis=0)
+
+    def ratio_text(self, index: int) -> str:
+        """Return the ratio at a load, with its error where that is known.
+
+        Args:
+            index: Which of the loads.
+        """
+        return with_error(float(self.ratio[index]), _known(self.error[index]), 4)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -107,23 +124,25 @@ class Difference(Displayed):
         known = ", ".join(ratio.name for ratio in self.ratios)
         raise InputError("is not known of both runs", key="name", value=name, allowed=known)
 
+    @property
+    def load(self) -> Quantity:
+        """What they have in common."""
+        return PRESSURE if self.at == AT[0] else APPROACH
+
     def load_text(self, index: int = -1) -> str:
         """Return a load with its unit, as text.
 
         Args:
             index: Which of the loads; the largest by default.
         """
-        name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
-        shown, size = usual_unit([float(self.loads[index])], unit)
-        return f"{name} {number(self.loads[index] / size)} {shown}"
+        return f"{self.load.text} {usual(float(self.loads[index]), self.load.unit)}"
 
     def records(self) -> Iterator[dict[str, Any]]:
         """Yield the rows of ``diff.csv``: every quantity at every load, as a dictionary."""
-        load = PRESSURE.name if self.at == AT[0] else APPROACH.name
         for index, value in enumerate(self.loads.tolist()):
             for one in self.ratios:
                 yield {
-                    f"at_{load}": value,
+                    f"at_{self.load.name}": value,
                     "quantity": one.name,
                     "first": float(one.values[0, index]),
                     "first_error": float(one.errors[0, index]),
@@ -157,8 +176,7 @@ class Difference(Displayed):
                 with_error(value / size, _known(error / size))
                 for value, error in zip(one.values[:, index], one.errors[:, index], strict=True)
             ]
-            ratio = with_error(float(one.ratio[index]), _known(one.error[index]), 4)
-            rows.append((f"{one.text} [{name}]", *both, ratio))
+            rows.append((f"{one.text} [{name}]", *both, one.ratio_text(index)))
         return ("at " + self.load_text(index), first, second, f"{second} / {first}"), rows
 
     def load_table(self, most: int = 40) -> Table:
@@ -167,19 +185,10 @@ class Difference(Displayed):
         Args:
             most: Largest number of loads shown; of more, so many at equal distances.
         """
-        name, unit = ("mean pressure", "MPa") if self.at == AT[0] else ("approach", "mm")
-        count = len(self.loads)
-        chosen = np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(int))
-        shown, size = usual_unit(self.loads.tolist(), unit)
-        rows = [
-            (
-                number(self.loads[index] / size),
-                *(with_error(float(one.ratio[index]), _known(one.error[index]), 4)
-                  for one in self.ratios),
-            )
-            for index in chosen
-        ]  # fmt: skip
-        return (f"{name} [{shown}]", *(one.text for one in self.ratios)), rows
+        chosen = spread(len(self.loads), most)
+        loads = column(self.load.text, self.loads[chosen], self.load.unit)
+        ratios = ([one.text, *(one.ratio_text(k) for k in chosen)] for one in self.ratios)
+        return of_columns(loads, *ratios)
 
     def plot(self) -> Any:
         """Draw the curves of both runs over each other, and the ratios.

@@ -269,8 +269,8 @@ def difference_figure(both: Difference) -> Figure:
 
 def _draw_ratios(axes: Any, both: Difference) -> None:
     """Draw ratios over the load that both have in common, with error bars where these are known."""
-    at_pressure = both.at == "pressure"
-    load = both.loads if at_pressure else 1e3 * both.loads
+    drawn = 1.0 if both.load.unit == "MPa" else 1e-3
+    load = both.loads / drawn
     axes.axhline(1.0, color="0.7", lw=0.8)
     shown = [one for one in both.ratios if one.name in _SHOWN]
     for one, mark in zip(shown, "osD^", strict=False):
@@ -279,8 +279,7 @@ def _draw_ratios(axes: Any, both: Difference) -> None:
         known = np.isfinite(one.error) & (one.error > 0.0)
         bars = {"fmt": "none", "ecolor": _COLOURS[one.name], "capsize": 2.0}
         axes.errorbar(load[known], one.ratio[known], one.error[known], **bars)
-    text, unit, drawn = ("mean pressure", "MPa", 1.0) if at_pressure else ("approach", "mm", 1e-3)
-    show_unit(axes.xaxis, text, unit, both.loads, drawn)
+    show_unit(axes.xaxis, both.load.text, both.load.unit, both.loads, drawn)
     axes.set(ylabel="second over first", title=f"{both.names[1]} over {both.names[0]}")
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.18 * len(shown) * (high - low))  # for the legend

@@ -24,8 +24,7 @@ from numpy.typing import NDArray
 from multiscale.loading.load_step import COLUMNS
 from multiscale.results.history import History
 from multiscale.run import Run
-from multiscale.scene.identity import changes, told
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, changes, told
 from support.checked_store import START, append, end_of, unsealed
 from support.collective import on_root, place_in, together
 from support.errors import InputError, NotConverged

@@ -20,8 +20,7 @@ from multiscale.console import case_progress
 from multiscale.figures import by_matplotlib
 from multiscale.loading.load_step import COLUMNS
 from multiscale.readable import column
-from multiscale.scene.identity import identity
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, identity
 from multiscale.studies.cases import Case, sweep_cases
 from multiscale.studies.running import CaseResult, Journal, run_case, run_cases
 from support.arrays import Array

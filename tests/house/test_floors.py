@@ -66,7 +66,7 @@ FLOORS = {
         "auto observers",
         "setup",
         "run",
-        "doctor output",
+        "output",
         "studies",
         "cli",
         "__main__",

@@ -5,12 +5,11 @@ from typing import get_type_hints
 import numpy as np
 import pytest
 
-from multiscale.scene import identity as module
+from multiscale.scene import scene as module
 from multiscale.scene.bodies import BodySection, CounterBodySection
-from multiscale.scene.identity import changes, content_digest, identity
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.reader import described
-from multiscale.scene.scene import Scene, names_a_file
+from multiscale.scene.scene import Scene, changes, content_digest, identity, names_a_file
 from multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}

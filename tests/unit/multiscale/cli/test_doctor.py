@@ -7,10 +7,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from multiscale import doctor
-from multiscale.cli import doctor as command
+from multiscale.cli import doctor
 from multiscale.cli.command_line import main
-from multiscale.doctor import CheckResult, examine
+from multiscale.cli.doctor import CheckResult, examine
 from multiscale.machine import ClusterNodes
 from support.errors import InputError
 
@@ -25,7 +24,7 @@ def test_a_tested_machine_is_well(capsys):
 
 
 def test_lines_come_with_remedies(capsys):
-    command.show("threads", CheckResult("warning", "the reference [BLAS]", "apt-get install it"))
+    doctor.show("threads", CheckResult("warning", "the reference [BLAS]", "apt-get install it"))
     shown = capsys.readouterr().out
     assert "the reference [BLAS]" in shown  # no markup
     assert "→ apt-get install it" in shown
@@ -43,13 +42,13 @@ def test_a_check_that_raises_has_failed(monkeypatch, capsys):
     assert (petsc.state, petsc.text) == ("fail", "RuntimeError: no such device")
     assert ranks.text.startswith("1: 1 on ")
     assert (cache.state, cache.text) == ("fail", "HOME: has none")
-    monkeypatch.setattr(command, "CHECKS", checks)
+    monkeypatch.setattr(doctor, "CHECKS", checks)
     assert main(["doctor"]) == 2
     assert capsys.readouterr().err == "patchlaw: doctor: not fit to run: PETSc, form cache\n"
 
 
 def test_a_warning_is_no_failure(monkeypatch, capsys):
-    monkeypatch.setattr(command, "CHECKS", {"threads": lambda comm: CheckResult("warning", "slow")})
+    monkeypatch.setattr(doctor, "CHECKS", {"threads": lambda comm: CheckResult("warning", "slow")})
     assert main(["doctor"]) == 0
     assert "slow" in capsys.readouterr().out
 
