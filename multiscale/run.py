@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import nullcontext
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from geometry import NotConverged
@@ -17,7 +16,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
-from multiscale.observers.step_observers import ContactRecorder, FieldRecorder, observers_of
+from multiscale.observers.step_observers import Observers
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
@@ -45,8 +44,7 @@ class Run:
         scene: The scene with values for its auto keys.
         steps: The load steps accepted so far, counted from first touch.
         position: Position in the load history after them.
-        fields: The states that the fields of chosen load steps are written from.
-        observers: Observers, which each load step is passed to.
+        observers: What is read off load steps; each is passed to them.
     """
 
     def __init__(
@@ -56,7 +54,6 @@ class Run:
         self.given, self.comm = scene, comm
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
-        self._start: Any = None
         self._notes: list[str] = []
         self.identity: dict[str, Any] = on_root(comm, lambda: identity(scene))
         load_finite_elements(scene, comm)
@@ -65,20 +62,11 @@ class Run:
         self.clock.add(self.coupling.seconds)
         self.coupling.clock = self.clock
         self.scene = self.coupling.scene
-        self.fields = FieldRecorder(self.coupling)
-        self._contacts = ContactRecorder(self.coupling)
-        self.observers = [self.fields, *observers_of(self.coupling), self._contacts]
+        self.observers = Observers(self.coupling)
 
     def make_laws(self) -> LawTable:
         """Tabulate the laws of all patches, once; see `Coupling.make_laws`."""
         return self.coupling.make_laws()
-
-    def prepare(self) -> None:
-        """Make what load steps need, once: laws, bodies, a start from the steps so far."""
-        solver = self.coupling.solver
-        if self._start is not None:
-            solver.restore(self._start)
-            self._start = None
 
     def load_steps(self) -> Iterator[LoadStep]:
         """Yield the load steps as they are accepted, after making what they need.
@@ -86,33 +74,28 @@ class Run:
         Raises:
             NotConverged: When a step fails for good; `history` holds those before it.
         """
-        self.prepare()
         stepper = LoadStepper(self.coupling.solver, self.coupling.load_history, self.position)
         with self.clock.phase("load steps"):
             for step in stepper:
                 self.position = stepper.position
-                with self.clock.phase("contact"):
-                    for observer in self.observers:
-                        step = observer.observe(step, self.steps, last=self.finished)
+                step = self.observers.observe(step, self.steps, last=self.finished)
                 self.steps.append(step)
                 yield step.counted_from(self.coupling.zero)
 
     def finish(self) -> None:
         """Notify observers that no load step follows, also where the run ended early."""
         if self.steps:
-            with self.clock.phase("contact"):
-                for observer in self.observers:
-                    self.steps[-1] = observer.finish(self.steps[-1])
+            self.steps[-1] = self.observers.finish(self.steps[-1])
 
     @property
     def contacts(self) -> tuple[ContactRecord, ...]:
         """Contacts of the load steps so far whose contact the scene asks for."""
-        return tuple(self._contacts.records)
+        return tuple(self.observers.contacts.records)
 
     @property
     def fluid(self) -> Any:
         """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
-        return next(filter(None, (getattr(one, "fluid", None) for one in self.observers)), None)
+        return self.observers.fluid
 
     @property
     def finished(self) -> bool:
@@ -123,14 +106,6 @@ class Run:
     def resolved(self) -> dict[str, Any]:
         """Values of the scene's auto keys."""
         return resolved_sections(self.coupling, self.given)
-
-    def state(self) -> Any:
-        """Return what the coupling's next load step starts from.
-
-        Note:
-            Collective.
-        """
-        return self.coupling.solver.state() if self._start is None else self._start
 
     def resume(
         self,
@@ -145,15 +120,14 @@ class Run:
         Args:
             steps: The load steps accepted so far.
             position: Position in the load history after them.
-            state: What `state` returned then.
+            state: What `Coupling.state` returned then.
             laws: The laws of the coupling then, where any were made.
             contacts: What `contacts` was then.
         """
-        self.steps, self.position, self._start = list(steps), position, state
-        self._contacts.records = list(contacts)
+        self.steps, self.position = list(steps), position
+        self.coupling.start, self.coupling.table = state, laws
+        self.observers.contacts.records = list(contacts)
         self._notes += [f"resumed after load step {len(steps)}; phase times are those since then"]
-        if laws is not None:
-            self.coupling.table = laws
 
     @property
     def laws(self) -> LawTable | None:
@@ -167,41 +141,23 @@ class Run:
         """Return the load steps accepted so far, counted from the zero, with times and notes."""
         coupling, zero = self.coupling, self.coupling.zero
         steps, record = coupling.with_mesh_errors(self.steps)
-        last_stage = self.steps[-1].stage if self.steps else None
-        by_force = coupling.load_history.quantity_in(last_stage) == "force"
-        unmeasured = coupling.unmeasured()
-        accuracy = verdict(steps, self.given.accuracy, unmeasured, by_force=by_force)
+        unmeasured, prescribed = coupling.unmeasured(), coupling.load_history
+        accuracy = verdict(steps, self.given.accuracy, unmeasured, prescribed)
+        notes = [] if accuracy is None else [accuracy.sentence]
+        notes += coupling.notes(self.steps)
         return History(
             steps=tuple(step.counted_from(zero) for step in steps),
             patches=coupling.regions or coupling.patches,
             seconds=self.clock.times,
-            notes=(*([] if accuracy is None else [accuracy.sentence]), *self._all_notes()),
+            notes=(*notes, *self._notes, *self.observers.notes(self.steps)),
             accuracy=accuracy,
             reference=None if record is None else record.counted_from(zero),
             contact_records=self.contacts,
         )
 
-    def _all_notes(self) -> Iterator[str]:
-        """Yield what a report says, after the accuracy."""
-        yield from self.coupling.notes(self.steps)
-        yield from self._notes
-        for observer in self.observers:
-            yield from observer.notes(self.steps)
-
     def remark(self, notes: Iterable[str]) -> None:
         """Add notes to the history, each once."""
         self._notes += [note for note in dict.fromkeys(notes) if note not in self._notes]
-
-    def write_fields(self, path: Path) -> None:
-        """Write the fields of the load steps that the scene names, see `FieldRecorder.write`.
-
-        Args:
-            path: File to write, ending in ``.xdmf``.
-        """
-        if self.finished:
-            self.prepare()
-        with self.clock.phase("field"):
-            self.fields.write(path, self.steps, finished=self.finished)
 
     def close(self) -> None:
         """Free the bodies. Accepted load steps stay, fields are gone.
@@ -209,8 +165,7 @@ class Run:
         Note:
             Collective.
         """
-        for observer in self.observers:
-            observer.release()
+        self.observers.release()
         self.coupling.release()
 
 

@@ -73,7 +73,7 @@ def measured_mesh_error(coupling: ReferenceCoupling) -> float:
         NotConverged: When the contact problem cannot be solved.
     """
     history = coupling.load_history
-    step = coupling.press(history.control(history.largest))
+    step = coupling.solver.press(history.control(history.largest))
     (with_error,), _ = coupling.with_mesh_errors([step])
     coupling.release()
     if not step.force_N > 0.0:

@@ -101,7 +101,7 @@ def _make_load_steps(
             figures.begin(run)
             interruption.check("before the block was made")
             with optional_packages():
-                run.prepare()
+                _ = run.coupling.solver  # made here, before the time is checked again
             interruption.check(f"after load step {len(run.steps)}")
             for step in run.load_steps():
                 checkpoints.accept(step)

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from geometry import Control, InputError, MaterialPair, PatchGrid, RigidPlane, Surface
+from geometry import InputError, MaterialPair, PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
@@ -100,6 +100,7 @@ class Coupling(SceneParts, ABC):
         clock: Measures the phases of the run.
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
+        start: What the first load step starts from, see `state`; set it before the solver is made.
     """
 
     tolerance_by_accuracy: ClassVar[bool] = False
@@ -116,6 +117,7 @@ class Coupling(SceneParts, ABC):
     comm: Any = field(default=None, init=False)
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
+    start: Any = field(default=None, init=False)
     _meshes: Meshes = field(default=(None, None), init=False)
 
     def __post_init__(self) -> None:
@@ -427,11 +429,18 @@ class Coupling(SceneParts, ABC):
     def solver(self) -> StepSolver:
         """What finds load steps, on the bodies, which are made with it; collective."""
         with self.clock.phase("block"):
-            return self._make_solver()
+            made = self._make_solver()
+        if self.start is not None:
+            made.restore(self.start)
+        return made
 
-    def press(self, control: Control) -> LoadStep:
-        """Find the equilibrium of one load step; see `StepSolver.press`."""
-        return self.solver.press(control)
+    def state(self) -> Any:
+        """Return what the next load step starts from, see `StepSolver.state`.
+
+        Note:
+            Collective.
+        """
+        return self.start if self.made_solver is None else self.made_solver.state()
 
     # --- what is made of load steps
 

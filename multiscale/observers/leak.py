@@ -67,11 +67,6 @@ class LeakObserver(StepObserver):
         self._section = section
         self._scale = section.drop / (12.0 * section.viscosity_MPa_s)
 
-    @property
-    def fluid(self) -> Any:
-        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
-        return None
-
     @abstractmethod
     def _leaks(self, step: LoadStep) -> tuple[Leak, ...]:
         """Return the leaks along all ways; collective."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from importlib import import_module
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +86,11 @@ class StepObserver:
             history: All load steps.
         """
         return iter(())
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        return None
 
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
@@ -256,9 +262,10 @@ class FieldRecorder(StepObserver):
         Note:
             Collective.
         """
-        if finished:
-            self._complete(steps)
-        self._coupling.write_fields(path, self.kept)
+        with self._coupling.clock.phase("field"):
+            if finished:
+                self._complete(steps)
+            self._coupling.write_fields(path, self.kept)
 
     def _complete(self, steps: Sequence[LoadStep]) -> None:
         """Press to load steps again whose fields are wanted, but were not kept by a resumed run."""
@@ -294,18 +301,67 @@ def _places(coupling: Coupling) -> Iterator[str]:
         yield "friction.FrictionObserver"
 
 
-def observers_of(coupling: Coupling) -> Iterator[StepObserver]:
-    """Yield what a scene wants read off its load steps, in the order in which they see them.
+class Observers(StepObserver):
+    """What a scene wants read off its load steps: observers, in the order in which they see them.
 
     Args:
         coupling: What finds the load steps.
 
+    Attributes:
+        fields: The states that the fields of chosen load steps are written from.
+        contacts: The contacts recorded so far.
+
     Raises:
-        InputError: When the scene does not allow it.
+        InputError: When the scene does not allow one of them.
 
     Note:
         Collective.
     """
+
+    def __init__(self, coupling: Coupling) -> None:
+        super().__init__(coupling)
+        self.fields, self.contacts = FieldRecorder(coupling), ContactRecorder(coupling)
+        self._all = [self.fields, *_beside(coupling), self.contacts]
+
+    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
+        """Return the load step with what all of them add."""
+        with self._coupling.clock.phase("contact"):
+            for one in self._all:
+                step = one.observe(step, past, last=last)
+        return step
+
+    def finish(self, step: LoadStep) -> LoadStep:
+        """Return the last load step of a run that ended early, with what all of them add."""
+        with self._coupling.clock.phase("contact"):
+            for one in self._all:
+                step = one.finish(step)
+        return step
+
+    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
+        """Yield what a report says of what they saw."""
+        return chain.from_iterable(one.notes(steps) for one in self._all)
+
+    def results(self, step: LoadStep) -> Iterator[tuple[str, str]]:
+        """Yield what a report lists of the last load step beside its columns: name and value."""
+        return chain.from_iterable(one.results(step) for one in self._all)
+
+    def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
+        """Yield figures: name of the file, function in `multiscale.figures`, and its arguments."""
+        return chain.from_iterable(one.figures(history) for one in self._all)
+
+    @property
+    def fluid(self) -> Any:
+        """The `multiscale.observers.law_leaks.FluidMap` of the last load step; None without."""
+        return next(filter(None, (one.fluid for one in self._all)), None)
+
+    def release(self) -> None:
+        """Let go of what holds bodies in memory."""
+        for one in self._all:
+            one.release()
+
+
+def _beside(coupling: Coupling) -> Iterator[StepObserver]:
+    """Yield the observers beside those that keep fields and contacts."""
     if coupling.scene.output.contact != "none":
         yield StiffnessObserver(coupling)
     yield from (_loaded(place, coupling) for place in _places(coupling))

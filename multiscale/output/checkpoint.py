@@ -95,7 +95,7 @@ def checkpoint_of(run: Run, state: Any) -> Checkpoint:
 
     Args:
         run: The run.
-        state: What `Run.state` returned.
+        state: What `Coupling.state` returned.
     """
     return Checkpoint(
         identity=run.identity,
@@ -232,7 +232,7 @@ class CheckpointWriter:
         Note:
             Collective.
         """
-        run, state = self._run, self._run.state()
+        run, state = self._run, self._run.coupling.state()
 
         def keep() -> None:
             self._pending = checkpoint_of(run, state)

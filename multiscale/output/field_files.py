@@ -44,7 +44,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
     Note:
         Collective: every rank writes its part.
     """
-    if not run.coupling.has_body or not (run.finished or run.fields.kept):
+    if not run.coupling.has_body or not (run.finished or run.observers.fields.kept):
         return []
 
     # The XDMF file contains the name of its HDF5 file. Both are therefore written under their
@@ -69,7 +69,7 @@ def write_fields(folder: Path, run: Run) -> list[Path]:
 def _write(run: Run, path: Path) -> None:
     """Write fields; an error of dolfinx about files becomes NotWritten, a bug stays as it is."""
     try:
-        run.write_fields(path)
+        run.observers.fields.write(path, run.steps, finished=run.finished)
     except (OSError, RuntimeError) as error:
         if isinstance(error, PatchlawError) or not _FILE_ERROR.search(str(error)):
             raise

@@ -278,8 +278,8 @@ class RunFigures:
             if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
                 ratio = coupling.materials.first.poisson_ratio
                 figures["block"] = "block.contact_block", (surface, contact, ratio)
-        for observer in run.observers:
-            figures |= {name: (function, of) for name, function, of in observer.figures(history)}
+        for name, function, of in run.observers.figures(history):
+            figures[name] = function, of
         for name, (function, arguments) in figures.items():
             yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
         if run.scene.output.report:

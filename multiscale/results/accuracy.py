@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent
 
@@ -69,7 +70,7 @@ def relative_error(step: LoadStep, *, by_force: bool) -> float | None:
 
 
 def verdict(
-    steps: Sequence[LoadStep], accuracy: float | None, unknown: str, *, by_force: bool
+    steps: Sequence[LoadStep], accuracy: float | None, unknown: str, history: LoadHistory
 ) -> AccuracyVerdict | None:
     """Return whether load steps keep an accuracy; None where none was asked for.
 
@@ -77,13 +78,14 @@ def verdict(
         steps: The load steps, with the errors that were measured.
         accuracy: Relative error of the force that was asked for, or None.
         unknown: Why errors are not measured; empty where they should have been.
-        by_force: Whether the force is prescribed.
+        history: What was prescribed.
     """
     if accuracy is None:
         return None
     loaded = [step for step in steps if step.force_N > 0.0]
     if not loaded:
         return AccuracyVerdict(requested=accuracy, unknown="no load step has a force")
+    by_force = history.quantity_in(steps[-1].stage) == "force"
     decisive = (loaded[-1], max(loaded, key=lambda step: step.force_N))
     found = [(relative_error(step, by_force=by_force), step) for step in decisive]
     known = [(error, step) for error, step in found if error is not None]

@@ -72,7 +72,7 @@ def run(name: str, steps: int) -> None:
         before = counted("written")
         with CheckpointWriter(Path(folder) / "out", whole, lock.hold) as checkpoints:
             checkpoints.accept()
-            whole.prepare()
+            _ = whole.coupling.solver
             began = time.perf_counter()
             for step in whole.load_steps():
                 checkpoints.accept()

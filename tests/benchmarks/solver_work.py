@@ -172,7 +172,7 @@ def main() -> None:
     words += REFERENCE if choice.reference else ["coupling.newton=full"]
     stream = bandwidth(COMM)
     run = Run(Scene.load(SCENE, words), COMM)
-    run.prepare()
+    _ = run.coupling.solver
     solver: Any = run.coupling.solver
     finest = solver.finest if choice.reference else solver.face
     work = Work(finest.body.solver)

@@ -226,7 +226,7 @@ def test_a_run_goes_on_within_stages(folder, tmp_path):
     for step in first.load_steps():
         place = tmp_path / f"after {step.step}"
         if place in ended:
-            write_checkpoint(place / FILE_NAME, checkpoint_of(first, first.state()))
+            write_checkpoint(place / FILE_NAME, checkpoint_of(first, first.coupling.state()))
     for place in ended:
         again, kept = Run(scene), find_checkpoint(place, scene)
         again.resume(kept.steps, kept.position, kept.state, kept.table)

@@ -144,7 +144,9 @@ def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
     done = Run(scene("consistent"))
     for step in done.load_steps():
         if step.step == 1:
-            write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(done, done.state()))
+            write_checkpoint(
+                tmp_path / "checkpoint.state", checkpoint_of(done, done.coupling.state())
+            )
     kept = read_checkpoint(tmp_path / "checkpoint.state")
     np.testing.assert_array_equal(
         kept.steps[0].patches.stiffness_MPa_per_mm, done.steps[0].patches.stiffness_MPa_per_mm

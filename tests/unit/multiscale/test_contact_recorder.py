@@ -103,7 +103,7 @@ def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     tilt = None if tilt == "free" else tilt
     near = 1e-7
     ahead, back = (
-        whole.coupling.press(Control(approach=0.008 + change, tilt=tilt)).force_N
+        whole.coupling.solver.press(Control(approach=0.008 + change, tilt=tilt)).force_N
         for change in (near, -near)
     )
     # forces are right to 1e-12 of 1 N and laws smooth: second differences are below 1e-6
@@ -155,7 +155,7 @@ def test_contacts_survive_a_checkpoint(tmp_path):
     path = tmp_path / "c.h5"
     for step in whole.load_steps():
         if step.step == 1:
-            write_checkpoint(path, checkpoint_of(whole, whole.state()))
+            write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
     kept = read_checkpoint(path)
     again = Run(whole.given)
     again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)

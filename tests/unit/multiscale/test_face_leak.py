@@ -212,7 +212,7 @@ def test_the_fluid_pressure_is_written_with_the_fields(box, laws, tmp_path):
     output = {"figures": False, "report": False, "fields": "last"}
     done = begun(scene(box, output=output), laws)
     list(done.load_steps())
-    done.write_fields(tmp_path / "fields.xdmf")
+    done.observers.fields.write(tmp_path / "fields.xdmf", done.steps, finished=done.finished)
     text = (tmp_path / "fields.xdmf").read_text(encoding="utf-8")
     assert text.count('Name="fluid_pressure"') == 1
     with h5py.File(tmp_path / "fields.h5") as file:

@@ -112,7 +112,7 @@ def test_a_run_goes_on_with_its_tractions_and_slip(tmp_path):
     for step in first.load_steps():
         if step.step == 6:
             break
-    write_checkpoint(path, checkpoint_of(first, first.state()))
+    write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(scene())
     second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)
@@ -143,7 +143,7 @@ def test_coupled_friction_says_so_and_goes_on_where_it_was(tmp_path, kind):
     for step in first.load_steps():
         if step.step == 4:
             break
-    write_checkpoint(path, checkpoint_of(first, first.state()))
+    write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(made)
     second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)

@@ -112,7 +112,7 @@ def test_a_run_goes_on_with_its_sliders(kind, tmp_path):
     for step in first.load_steps():
         if step.step == 4:
             break
-    write_checkpoint(path, checkpoint_of(first, first.state()))
+    write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(scene(kind))
     second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)

@@ -91,7 +91,7 @@ def test_resumed_run_keeps_the_plastic_depth_bit_for_bit(tmp_path):
         if step.step == 2:
             break
     path = tmp_path / "checkpoint.state"
-    write_checkpoint(path, checkpoint_of(first, first.state()))
+    write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
     kept, again = read_checkpoint(path), Run(scene())
     again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
     after = list(again.load_steps())

@@ -183,7 +183,9 @@ def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
     done = Run(scene(output={"figures": True, "report": True}))
     for step in done.load_steps():
         if step.step == 2:
-            write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(done, done.state()))
+            write_checkpoint(
+                tmp_path / "checkpoint.state", checkpoint_of(done, done.coupling.state())
+            )
     kept = read_checkpoint(tmp_path / "checkpoint.state")
     resumed = Run(scene(output={"figures": True, "report": True}))
     resumed.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)

@@ -150,7 +150,7 @@ def test_a_run_that_goes_on_measures_the_same(tmp_path):
     whole = Run(scene("concurrent"))
     steps = whole.load_steps()
     next(steps)
-    kept = checkpoint_of(whole, whole.state())
+    kept = checkpoint_of(whole, whole.coupling.state())
     list(steps)
     again = Run(scene("concurrent"))
     again.resume(kept.steps, kept.position, kept.state, kept.table)

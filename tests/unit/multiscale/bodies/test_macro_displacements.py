@@ -52,7 +52,7 @@ def test_consistent_laws_solve_the_mesh_once_for_each_loaded_patch(monkeypatch):
     monkeypatch.setattr(macro, "displacements_under", counted)
     setup = make_setup(Scene.load(PAPER, [*SMALL, *COARSE]))
     assert setup.newton().condensed
-    step = setup.press(Control(approach=0.008))
+    step = setup.solver.press(Control(approach=0.008))
     touched = setup.table.touched
     assert 0 < len(touched) < setup.patches.count
     np.testing.assert_array_equal(sum(given), np.isin(range(8), touched)[None].astype(float))

@@ -56,7 +56,9 @@ def test_a_run_goes_on_with_the_extended_laws(tmp_path):
     steps = first.load_steps()
     for _ in range(3):
         next(steps)
-    path = write_checkpoint(tmp_path / "checkpoint.state", checkpoint_of(first, first.state()))
+    path = write_checkpoint(
+        tmp_path / "checkpoint.state", checkpoint_of(first, first.coupling.state())
+    )
     last = next(steps)
     kept, again = read_checkpoint(path), Run(scene)
     again.resume(kept.steps, kept.position, kept.state, kept.table)

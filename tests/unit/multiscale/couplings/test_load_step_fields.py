@@ -41,7 +41,7 @@ def written(tmp_path, *more):
     """Run a scene; return it and its fields."""
     run = Run(scene(*more))
     list(run.load_steps())
-    run.write_fields(tmp_path / "fields.xdmf")
+    run.observers.fields.write(tmp_path / "fields.xdmf", run.steps, finished=run.finished)
     return run, fields(tmp_path / "fields.xdmf")
 
 
@@ -76,14 +76,14 @@ def test_every_coupling_with_a_body_has_fields_of_every_step(tmp_path, coupling)
 def test_fields_are_kept_of_the_steps_that_are_named_alone(asked, steps):
     run = Run(scene(*CONTACTS, f"output.fields={asked}"))
     list(run.load_steps())
-    assert set(run.fields.kept) == steps
+    assert set(run.observers.fields.kept) == steps
 
 
 def test_nothing_is_kept_that_no_field_is_written_of():
     for more in (CONTACTS, ["coupling.kind=analytic", "output.fields=all"]):
         run = Run(scene(*more))
         list(run.load_steps())
-        assert not run.fields.kept
+        assert not run.observers.fields.kept
 
 
 def test_contacts_load_the_face_where_they_are(tmp_path):
@@ -109,11 +109,15 @@ def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
     next(steps)
     next(steps)
     again = Run(scene(*more))
-    again.resume(first.steps, first.position, first.state(), first.coupling.table, first.contacts)
+    again.resume(
+        first.steps, first.position, first.coupling.state(), first.coupling.table, first.contacts
+    )
     list(again.load_steps())
-    assert set(again.fields.kept) == {3}
+    assert set(again.observers.fields.kept) == {3}
     (tmp_path / "again").mkdir()
-    again.write_fields(tmp_path / "again" / "fields.xdmf")
+    again.observers.fields.write(
+        tmp_path / "again" / "fields.xdmf", again.steps, finished=again.finished
+    )
     _, whole = written(tmp_path, *more)
     found = fields(tmp_path / "again" / "fields.xdmf")
     assert set(found) == set(whole)

@@ -37,7 +37,7 @@ def test_a_run_goes_on_with_the_same_mesh_alone(tmp_path):
     first = Run(scene)
     steps = first.load_steps()
     next(steps)
-    write_checkpoint(folder / FILE_NAME, checkpoint_of(first, first.state()))
+    write_checkpoint(folder / FILE_NAME, checkpoint_of(first, first.coupling.state()))
     whole = [first.steps[0].approach_mm, *(step.approach_mm for step in steps)]
 
     write_box(mesh, (*TICKS[:2], 1.1 * TICKS[2]))

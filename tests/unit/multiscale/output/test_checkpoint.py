@@ -77,7 +77,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
     whole = Run(scene(changes))
     for step in whole.load_steps():
         path = tmp_path / f"{step.step}.h5"
-        write_checkpoint(path, checkpoint_of(whole, whole.state()))
+        write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
     count = len(whole.steps)
     assert count >= 3
     wanted = columns(whole.steps)
@@ -98,7 +98,7 @@ def test_resumed_run_is_as_if_never_stopped(tmp_path, changes):
 def test_checkpoint_keeps_every_bit(tmp_path):
     run = Run(scene(CUBE | {"load": {"approach": "8 um", "steps": 2, "tilt": [1e-3, 0.0]}}))
     list(run.load_steps())
-    kept = checkpoint_of(run, run.state())
+    kept = checkpoint_of(run, run.coupling.state())
     found = read_checkpoint(write_checkpoint(tmp_path / "c.h5", kept))
     assert (found.identity, found.resolved) == (kept.identity, kept.resolved)
     assert (found.position, found.laws) == (kept.position, kept.laws)
@@ -511,7 +511,7 @@ def test_a_plan_stands_though_a_later_release_would_choose_otherwise(tmp_path, m
     left_open = Scene.from_dict(data)
     whole = Run(left_open)
     next(steps := whole.load_steps())
-    path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.state()))
+    path = write_checkpoint(tmp_path / "c.h5", checkpoint_of(whole, whole.coupling.state()))
     list(steps)
     kept = read_checkpoint(path)
 

@@ -109,7 +109,9 @@ def test_resumed_cycles_go_on_where_they_were(tmp_path):
     for step in part.load_steps():
         if step.step == 9:
             break
-    kept = read_checkpoint(write_checkpoint(tmp_path / "c.h5", checkpoint_of(part, part.state())))
+    kept = read_checkpoint(
+        write_checkpoint(tmp_path / "c.h5", checkpoint_of(part, part.coupling.state()))
+    )
     again = Run(part.given)
     again.resume(kept.steps, kept.position, kept.state, kept.table)
     list(again.load_steps())
