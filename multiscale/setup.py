@@ -16,8 +16,9 @@ from multiscale.auto.keys import (
     with_value,
 )
 from multiscale.bodies.reader import read_bodies
-from multiscale.couplings.coupling import Coupling, Meshes, Source
+from multiscale.couplings.coupling import Coupling, Meshes
 from multiscale.couplings.dispatch import coupling_class
+from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import located, make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
 from multiscale.scene.scene import Scene

@@ -5,6 +5,8 @@ Theory: docs/theory.md, section 8.
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -248,3 +250,33 @@ class HertzContact:
     @property
     def _depth(self) -> Array:
         return np.asarray(self.indentation, float)
+
+
+def crowned_peak(
+    radii: Sequence[float],
+    contact_modulus: float,
+    length: float,
+    *,
+    force: float = 0.0,
+    approach: float = 0.0,
+) -> float:
+    """Return the largest pressure of a smooth crowned face on a plane [MPa].
+
+    Args:
+        radii: Radii of curvature along x and y, or the one of a cylinder [mm].
+        contact_modulus: E* [MPa].
+        length: Length of a cylinder [mm].
+        force: Its force [N].
+        approach: Its approach; the larger of both pressures counts [mm].
+
+    Source:
+        Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45; ellipses are circles of the
+        geometric mean of the radii, and a cylinder's approach its depth of the circular segment.
+    """
+    modulus, radius = contact_modulus, math.sqrt(math.prod(radii))
+    if len(radii) == 1:
+        (radius,) = radii
+        peak = math.sqrt(force / length * modulus / (math.pi * radius))
+        return max(peak, modulus * math.sqrt(0.5 * approach / radius))
+    peak = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
+    return max(peak, 2.0 / math.pi * modulus * math.sqrt(approach / radius))

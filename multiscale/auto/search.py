@@ -44,12 +44,11 @@ from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.couplings.reference import ReferenceCoupling
 from multiscale.inputs.cost import MemoryLacking
 from multiscale.inputs.loads import load_history_on
-from multiscale.inputs.scene_parts import Decision
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
 from multiscale.measured_errors import ZERO, ErrorProbe
-from multiscale.results.accuracy import relative_error
+from multiscale.results.accuracy import Decision, relative_error
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone
 from support.errors import InputError, NotConverged

@@ -12,77 +12,36 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from geometry import InputError, MaterialPair, PatchGrid, RigidPlane, Surface
+from geometry import InputError, PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
-from micro import HalfSpaceModel, MicroModel, micro_model
+from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.console import Clock
 from multiscale.couplings import describe, validity
 from multiscale.inputs.bodies import (
-    FIELD_CELLS,
-    LAW_BLOCK_CELLS,
-    BodyFacts,
-    Cells,
     SceneBody,
-    stated_cells,
 )
 from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
-from multiscale.inputs.scene_parts import SceneParts
+from multiscale.inputs.scene_parts import SceneParts, Source
 from multiscale.inputs.surfaces import located
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
-from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.machine import MemoryRequest
 from multiscale.readable import Detail, percent, quantity
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
 
-NOT_WITH_FRICTION = "the measure does not know what has slipped under laws"
-
-Facts = tuple[BodyFacts | None, BodyFacts | None]
-"""What is known of the meshes of a body and of its counter-body."""
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""
-
-
-class Source(NamedTuple):
-    """What a coupling is made from.
-
-    Attributes:
-        scene: The scene, without auto values.
-        facts: What is known of its bodies' meshes.
-        nodes: The nodes of the run.
-        like: A coupling with the same surface, which is taken from it.
-        cells: Cells of the half-space of contact problems; None when they are the surface's.
-    """
-
-    scene: Scene
-    facts: Facts
-    nodes: ClusterNodes
-    like: Coupling | None = None
-    cells: tuple[int, int] | None = None
-
-    def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
-        """Return the micro model that the scene states, on a half-space.
-
-        Args:
-            surface: The surface, or a sample of it.
-            materials: The materials on both sides.
-        """
-        micro, periodic = self.scene.micro, self.scene.surface.periodic
-        modulus = materials.contact_modulus
-        model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
-        if isinstance(model, HalfSpaceModel):
-            return replace(model, periodic=periodic, hardness=micro.hardness)
-        return model
 
 
 @dataclass(kw_only=True, eq=False)
@@ -102,15 +61,6 @@ class Coupling(SceneParts, ABC):
             None without laws.
         start: What the first load step starts from, see `state`; set it before the solver is made.
     """
-
-    tolerance_by_accuracy: ClassVar[bool] = False
-    """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
-    shows_contacts: ClassVar[bool] = False
-    """Whether fields of a block are those under its contacts, which take more cells."""
-    patches_interact: ClassVar[bool] = True
-    """Whether all patches interact in the compliance of the bodies."""
-    laws_made_by: ClassVar[str] = ""
-    """Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without."""
 
     micro: MicroModel | None = None
     plane_at_largest_load: RigidPlane | None = None
@@ -173,40 +123,6 @@ class Coupling(SceneParts, ABC):
         other = replace(self, **attributes)
         other.comm, other._meshes = self.comm, self._meshes
         return other
-
-    @classmethod
-    def unstated_cells(cls, scene: Scene) -> Cells:
-        """Return the cells of a block that a scene states none for: more under laws on its mesh.
-
-        Args:
-            scene: The scene.
-        """
-        return LAW_BLOCK_CELLS if cls.shows_contacts or scene.on_mesh else FIELD_CELLS
-
-    @classmethod
-    def block_cells(cls, scene: Scene) -> Cells | None:
-        """Return the cells of a flat block that is meshed: for laws, or for fields afterwards.
-
-        Args:
-            scene: The scene.
-        """
-        meshed = scene.on_mesh or (cls.has_body and bool(scene.output.fields))
-        if scene.block is None or not meshed:
-            return None
-        return stated_cells(scene, cls.unstated_cells(scene))
-
-    @classmethod
-    def patch_limits(cls, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
-        """Return what limits the numbers of patches along x and y, each with these limits.
-
-        Args:
-            scene: The scene.
-            surface: Its surface.
-        """
-        limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
-        if cells := cls.block_cells(scene):
-            limits["cells of the interface (block.cells)"] = cells[:2]
-        return limits
 
     @classmethod
     def requests(cls, scene: Scene) -> Iterator[MemoryRequest]:

@@ -9,7 +9,7 @@ from geometry.statistics import roughness
 from micro import MicroModel
 from multiscale.inputs.bodies import BodyFacts, block_section
 from multiscale.inputs.scene_parts import SceneParts
-from multiscale.inputs.surfaces import heights_per_wave
+from multiscale.inputs.surfaces import RegionSamples, heights_per_wave
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stages import BodyLoads
 from multiscale.readable import number, quantity
@@ -208,6 +208,14 @@ def body(parts: SceneParts) -> str:
     elif parts.both_elastic and parts.regions is not None:
         text += "; a half-space on the other side is displaced under the whole face"
     return text
+
+
+def samples(region: RegionSamples) -> str:
+    """Say what the laws of a region are made from."""
+    x, y = (quantity(side, "mm") for side in region.surfaces[0].lengths)
+    count = len(region.surfaces)
+    what = f"{count} periodic samples" if count > 1 else "a periodic sample"
+    return f"{region.name}: {what} of {x} × {y}"
 
 
 def _mesh(facts: BodyFacts) -> str:

@@ -24,10 +24,10 @@ from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import ContactSolver, plane_at_largest_load
-from multiscale.couplings.coupling import Source
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.inputs.bodies import FIELD_CELLS
 from multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work
+from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked

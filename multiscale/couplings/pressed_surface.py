@@ -12,10 +12,11 @@ import numpy as np
 from geometry import PatchGrid
 from geometry.materials import MaterialPair
 from geometry.patches import patch_means
-from multiscale.couplings.coupling import Coupling, Meshes, Source
+from multiscale.couplings.coupling import Coupling, Meshes
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.cost import check_memory
 from multiscale.inputs.loads import check_load, check_patches, load_history_on, patch_grid
+from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import located, make_surfaces
 from support.arrays import Array
 

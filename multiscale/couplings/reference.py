@@ -18,7 +18,7 @@ from geometry import RefinedShape
 from micro import HalfSpaceModel
 from multiscale.couplings import describe, validity
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
-from multiscale.couplings.coupling import Meshes, Source
+from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.pressed_surface import PressedSurface
 from multiscale.couplings.reference_estimates import (
     block_compliance,
@@ -35,6 +35,7 @@ from multiscale.inputs.reference_meshes import (
     reference_meshes,
     reference_requests,
 )
+from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count

@@ -16,15 +16,18 @@ import numpy as np
 
 from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
+from micro.closed_forms.hertz import crowned_peak
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
-from multiscale.couplings.coupling import NOT_WITH_FRICTION, Meshes, Source
+from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
 from multiscale.inputs.loads import check_load, load_history_on
+from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import (
     RegionSamples,
+    crown_depth,
     located,
     region_samples,
     sample_surface,
@@ -46,7 +49,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, with_errors
-from multiscale.readable import Observer, number, quantity
+from multiscale.readable import Observer, number
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -187,7 +190,7 @@ class RepresentativeCoupling(LawCoupling):
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
         if self.scene.rubs_on_mesh:
-            return NOT_WITH_FRICTION
+            return "the measure does not know what has slipped under laws"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     @property
@@ -309,22 +312,13 @@ class RepresentativeCoupling(LawCoupling):
 
         It is ten times the mean pressure on the face, or twice the largest pressure of the smooth
         crowned bodies, which roughness lowers.
-
-        Source:
-            Johnson, Contact Mechanics (1985), eq. 4.24, 4.25 and 4.45.
         """
         radii = [one for one in self.scene.law.crown or () if one != "inf"]
         if not radii:
             return 10.0 * mean
-        modulus, radius = self.materials.contact_modulus, math.sqrt(math.prod(radii))
-        if len(radii) == 1:
-            radius, length = radii[0], min(self.body.lengths)
-            peak = math.sqrt(force / length * modulus / (math.pi * radius))
-            under_approach = modulus * math.sqrt(0.5 * approach / radius)
-        else:
-            peak = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
-            under_approach = 2.0 / math.pi * modulus * math.sqrt(approach / radius)
-        return max(10.0 * mean, 2.0 * max(peak, under_approach))
+        modulus, length = self.materials.contact_modulus, min(self.body.lengths)
+        peak = crowned_peak(radii, modulus, length, force=force, approach=approach)
+        return max(10.0 * mean, 2.0 * peak)
 
     def _solver_of(self, table: LawTable) -> LawSolver:
         face = self.bodies.contact_face()
@@ -336,14 +330,13 @@ class RepresentativeCoupling(LawCoupling):
         """Return a face with laws at its points."""
         from macro import LawContactProblem
 
-        laws, crown, friction = table.together(), self._crown(), self.law_friction
         second = self.materials.second if self.both_elastic else None
         return LawContactProblem(
             face,
-            laws,
+            table.together(),
             mode="pointwise",
-            crown=crown,
-            friction=friction,
+            crown=crown_depth(self.scene, self.body.lengths),
+            friction=self.law_friction,
             opposite=second,
         )
 
@@ -358,20 +351,6 @@ class RepresentativeCoupling(LawCoupling):
             "needed"
         )
         return longer
-
-    def _crown(self) -> Callable[[Array, Array], Array] | None:
-        """Return the depth of a crowned face at points of its plane [mm]; None without a crown."""
-        radii = self.scene.law.crown
-        if radii is None:
-            return None
-        middle = 0.5 * np.asarray(self.body.lengths)
-        curvature = [0.0 if one == "inf" else 1.0 / float(one) for one in radii]
-
-        def depth(x: Array, y: Array) -> Array:
-            along, across = x - middle[0], y - middle[1]
-            return 0.5 * (curvature[0] * along**2 + curvature[1] * across**2)
-
-        return depth
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what a report says of the approximations behind load steps."""
@@ -389,28 +368,11 @@ class RepresentativeCoupling(LawCoupling):
 
     def describe(self) -> dict[str, str]:
         """Return what will be done and why, and what the laws are made from."""
-        parts = []
-        for region in self.samples:
-            x, y = (quantity(side, "mm") for side in region.surfaces[0].lengths)
-            count = len(region.surfaces)
-            samples = f"{count} periodic samples" if count > 1 else "a periodic sample"
-            parts.append(f"{region.name}: {samples} of {x} × {y}")
-        text = f"representative: {'; '.join(parts)}; the law holds at every point of the face"
+        made_from = "; ".join(map(describe.samples, self.samples))
+        text = f"representative: {made_from}; the law holds at every point of the face"
         return super().describe() | {"coupling": text, "body": describe.body(self)}
 
     def body_warnings(self) -> Iterator[str]:
         """Yield what is doubtful of the bodies, and whether samples can stand for the face."""
         yield from validity.of_meshes(self)
-        side = math.sqrt(self.body.area)
-        for region in self.samples:
-            largest = max(max(surface.lengths) for surface in region.surfaces)
-            if side < 4.0 * largest:
-                yield (
-                    f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face "
-                    f"about {quantity(side, 'mm')}: a sample stands for faces that are much larger"
-                )
-            if region.mirrored:
-                yield (
-                    f"the heights of {region.name} do not continue periodically: their sample is "
-                    "four mirror images, twice as long and wide"
-                )
+        yield from validity.of_samples(self.samples, self.body.area)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
 from geometry.meshes.block import misalignment
 from multiscale.inputs.scene_parts import SceneParts
+from multiscale.inputs.surfaces import RegionSamples
 from multiscale.readable import quantity
 from multiscale.scene.keys import bare_quantities
 
@@ -57,6 +59,28 @@ def of_meshes(parts: SceneParts) -> Iterator[str]:
     for facts in filter(None, (parts.body, parts.counter)):
         yield from facts.notes
         yield from locking(facts.poisson_ratio, facts.degree, "body", "element = 'quadratic'")
+
+
+def of_samples(samples: Sequence[RegionSamples], area: float) -> Iterator[str]:
+    """Yield what is doubtful of samples that stand for a face.
+
+    Args:
+        samples: The samples of all regions.
+        area: Area of the face [mm²].
+    """
+    side = math.sqrt(area)
+    for region in samples:
+        largest = max(max(surface.lengths) for surface in region.surfaces)
+        if side < 4.0 * largest:
+            yield (
+                f"the sample of {region.name} is {quantity(largest, 'mm')} long and the face "
+                f"about {quantity(side, 'mm')}: a sample stands for faces that are much larger"
+            )
+        if region.mirrored:
+            yield (
+                f"the heights of {region.name} do not continue periodically: their sample is "
+                "four mirror images, twice as long and wide"
+            )
 
 
 def proportions(parts: SceneParts) -> Iterator[str]:

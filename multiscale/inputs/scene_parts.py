@@ -2,79 +2,54 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from geometry import Asperities, MaterialPair, PatchGrid, Regions, Surface, find_asperities
 from geometry.zero import Zero
-from multiscale.inputs.bodies import BodyFacts
+from micro import HalfSpaceModel, MicroModel, micro_model
+from multiscale.inputs.bodies import FIELD_CELLS, LAW_BLOCK_CELLS, BodyFacts, Cells, stated_cells
 from multiscale.loading.load_history import LoadHistory
+from multiscale.machine import ClusterNodes
+from multiscale.results.accuracy import Decision
 from multiscale.scene.scene import Scene
 
+Facts = tuple[BodyFacts | None, BodyFacts | None]
+"""What is known of the meshes of a body and of its counter-body."""
 
-@dataclass(frozen=True, kw_only=True)
-class Decision:
-    """What was taken, and the errors that were measured for it before the run.
+
+class Source(NamedTuple):
+    """What a coupling is made from.
 
     Attributes:
-        accuracy: Relative error of the force that was requested.
-        taken: The coupling, and the cells, meshes or micro model that it works on.
-        why: Why this coupling was taken; empty where the scene states it or it was missed for.
-        errors: Measured errors of the force by cause, relative to it, at the load where they are
-            worst; empty where they cannot be measured beforehand. That of laws is among them only
-            after the run.
-        missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
-        work: What the choice took, counted, in words; empty where nothing was tried.
+        scene: The scene, without auto values.
+        facts: What is known of its bodies' meshes.
+        nodes: The nodes of the run.
+        like: A coupling with the same surface, which is taken from it.
+        cells: Cells of the half-space of contact problems; None when they are the surface's.
     """
 
-    accuracy: float
-    taken: str
-    errors: Mapping[str, float]
-    why: str = ""
-    missed: Mapping[str, float] = field(default_factory=dict)
-    work: str = ""
+    scene: Scene
+    facts: Facts
+    nodes: ClusterNodes
+    like: SceneParts | None = None
+    cells: tuple[int, int] | None = None
 
-    @property
-    def error(self) -> float:
-        """Measured relative error of the force; 0 where it was not measured."""
-        return sum(self.errors.values())
+    def micro_model(self, surface: Surface, materials: MaterialPair) -> MicroModel:
+        """Return the micro model that the scene states, on a half-space.
 
-    @property
-    def kept(self) -> bool:
-        """Whether the measured error is within the accuracy."""
-        return bool(self.errors) and self.error <= self.accuracy
-
-    @property
-    def sentence(self) -> str:
-        """What was taken, why, and what was measured for it."""
-        parts = [
-            self.taken + f" ({self.why})" * bool(self.why),
-            f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
-        ]
-        if self.missed:
-            parts.append(f"without meshing the roughness {_listed(self.missed)}")
-        if self.work:
-            parts.append(f"the choice took {self.work}")
-        return "; ".join(parts)
-
-    @property
-    def warning(self) -> str | None:
-        """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
-        if self.kept or not self.errors:
-            return None
-        largest = max(self.errors, key=lambda cause: self.errors[cause])
-        if self.error == math.inf:
-            return (
-                f"whether an accuracy of {100 * self.accuracy:.3g} % is kept is not known: the "
-                f"error by {largest} could not be measured at the largest load"
-            )
-        return (
-            f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
-            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
-        )
+        Args:
+            surface: The surface, or a sample of it.
+            materials: The materials on both sides.
+        """
+        micro, periodic = self.scene.micro, self.scene.surface.periodic
+        modulus = materials.contact_modulus
+        model = micro_model(micro.model, surface, contact_modulus=modulus, solver=micro.solver)
+        if isinstance(model, HalfSpaceModel):
+            return replace(model, periodic=periodic, hardness=micro.hardness)
+        return model
 
 
 @dataclass(kw_only=True, eq=False)
@@ -102,6 +77,14 @@ class SceneParts:
     """Whether load steps use laws."""
     meshes_roughness: ClassVar[bool] = False
     """Whether the roughness is meshed, so that there is no micro model."""
+    tolerance_by_accuracy: ClassVar[bool] = False
+    """Whether the tolerance of laws, where it is open, follows from the accuracy of the scene."""
+    shows_contacts: ClassVar[bool] = False
+    """Whether fields of a block are those under its contacts, which take more cells."""
+    patches_interact: ClassVar[bool] = True
+    """Whether all patches interact in the compliance of the bodies."""
+    laws_made_by: ClassVar[str] = ""
+    """Which ranks make laws of patches, ``"shared"`` or ``"root_only"``; empty without."""
 
     scene: Scene
     surface: Surface
@@ -113,6 +96,40 @@ class SceneParts:
     load_history: LoadHistory
     decision: Decision | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def unstated_cells(cls, scene: Scene) -> Cells:
+        """Return the cells of a block that a scene states none for: more under laws on its mesh.
+
+        Args:
+            scene: The scene.
+        """
+        return LAW_BLOCK_CELLS if cls.shows_contacts or scene.on_mesh else FIELD_CELLS
+
+    @classmethod
+    def block_cells(cls, scene: Scene) -> Cells | None:
+        """Return the cells of a flat block that is meshed: for laws, or for fields afterwards.
+
+        Args:
+            scene: The scene.
+        """
+        meshed = scene.on_mesh or (cls.has_body and bool(scene.output.fields))
+        if scene.block is None or not meshed:
+            return None
+        return stated_cells(scene, cls.unstated_cells(scene))
+
+    @classmethod
+    def patch_limits(cls, scene: Scene, surface: Surface) -> dict[str, Sequence[int]]:
+        """Return what limits the numbers of patches along x and y, each with these limits.
+
+        Args:
+            scene: The scene.
+            surface: Its surface.
+        """
+        limits: dict[str, Sequence[int]] = {"heights of the surface": surface.grid}
+        if cells := cls.block_cells(scene):
+            limits["cells of the interface (block.cells)"] = cells[:2]
+        return limits
 
     @property
     def regions(self) -> Regions | None:
@@ -169,13 +186,3 @@ class SceneParts:
     def meshes(self) -> list[BodyFacts]:
         """What is known of the bodies that are meshes of their own."""
         return [one for one in (self.body, self.counter) if one is not None and one.on_mesh]
-
-
-def _listed(errors: Mapping[str, float]) -> str:
-    if not errors:
-        return "which is not measured beforehand"
-    if math.inf in errors.values():
-        largest = max(errors, key=lambda cause: errors[cause])
-        return f"which is not known: the error by {largest} could not be measured"
-    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
-    return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"

@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -31,6 +31,7 @@ from geometry.files.reading import surface_of
 from geometry.preparation import Preparation, prepared
 from multiscale.scene.scene import Scene
 from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
+from support.arrays import Array
 from support.fields import part_of
 
 WHOLE = "face"
@@ -196,6 +197,28 @@ def region_samples(
         )
         found.append(region)
     return tuple(found)
+
+
+def crown_depth(
+    scene: Scene, lengths: tuple[float, float]
+) -> Callable[[Array, Array], Array] | None:
+    """Return the depth of a crowned face at points of its plane [mm]; None without a crown.
+
+    Args:
+        scene: The scene.
+        lengths: Sides of the face [mm].
+    """
+    radii = scene.law.crown
+    if radii is None:
+        return None
+    middle = 0.5 * np.asarray(lengths)
+    curvature = [0.0 if one == "inf" else 1.0 / float(one) for one in radii]
+
+    def depth(x: Array, y: Array) -> Array:
+        along, across = x - middle[0], y - middle[1]
+        return 0.5 * (curvature[0] * along**2 + curvature[1] * across**2)
+
+    return depth
 
 
 def _check_different(scene: Scene, surfaces: Sequence[Surface]) -> None:

@@ -13,7 +13,17 @@ import numpy as np
 from geometry import Control, InputError
 from geometry.shear_state import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
-from multiscale.loading.stages import Leg, Pairs, Quantity, Repeats, Stage, legs_of, shears_of
+from multiscale.loading.shear_path import ShearPath
+from multiscale.loading.stages import (
+    Leg,
+    Pairs,
+    Quantity,
+    Repeats,
+    Stage,
+    legs_of,
+    shears_of,
+    stated_shears,
+)
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example
 
@@ -23,7 +33,7 @@ Plane = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadHistory:
+class LoadHistory(ShearPath):
     """The motion of the rigid plane: turning points of its approach, or of the force on it.
 
     Args:
@@ -44,17 +54,6 @@ class LoadHistory:
             the plane turn until the pressures have no moment beside that of bolts.
         force_change: Largest change of the force in one step, relative to the largest force so far;
             a step that exceeds it is halved. When not given no step is halved.
-        shear: Shift of the plane along x and y from where it first touched, or a list of turning
-            points [mm]. Exactly one of ``shear`` and ``shear_force`` may be given, with a
-            coefficient of friction. A history of stages states it in them.
-        shear_force: Shear force on the plane along x and y, or a list of turning points [N].
-        shear_path: Whether the plane goes through the points of the shear ``after`` the load has
-            come to its end, which then stays, or ``along`` with the load: each of them is then
-            reached together with one of the load's turning points.
-        shear_steps: Load steps to every point of a shear that follows the load; ``steps`` when not
-            given.
-        shear_cycles: How often the plane goes through the points of a shear that follows the load,
-            of which it needs two at least.
         depth: How far the zero lies below the highest point of the surface. On a surface, where
             it is known, approaches count from first touch, which this is added for [mm].
         pulls: Pull of bolts before every stage and at its end, in turn, where the bodies are known;
@@ -73,11 +72,6 @@ class LoadHistory:
     cycles: Repeats = 1
     tilt: Tilt = (0.0, 0.0)
     force_change: Annotated[float, Limits(ge=1e-3, lt=1)] | None = None
-    shear: Annotated[Pairs, Unit("mm", pairs=True)] | None = None
-    shear_force: Annotated[Pairs, Unit("N", pairs=True)] | None = None
-    shear_path: Literal["after", "along"] = "after"
-    shear_steps: Repeats | None = None
-    shear_cycles: Repeats = 1
     depth: float = field(default=0.0, metadata={KEY: None})
     pulls: tuple[float, ...] = field(default=(), metadata={KEY: None})
 
@@ -102,42 +96,8 @@ class LoadHistory:
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
             )
-        self._check_shear()
-
-    def _check_shear(self) -> None:
-        """Refuse two shear loads, what belongs to none, and paths that make no sense."""
-        points = self._stated_shear
-        key = "shear" if self.shear_force is None else "shear_force"
-        if self.shear is not None and self.shear_force is not None:
-            problem, allowed = "is a second shear load", "either 'shear' or 'shear_force'"
-            raise InputError(problem, key=key, value=points, allowed=allowed)
-        if points and self.stage:
-            problem, allowed = "does not go beside stages", f"'{key}' of a stage"
-            raise InputError(problem, key=key, value=points, allowed=allowed)
-        in_stages = {key for one in self.stage for key in _SHEARS if getattr(one, key) is not None}
-        if len(in_stages) > 1:
-            problem, allowed = "state shifts and shear forces", "either 'shear' or 'shear_force'"
-            raise InputError(problem, key="stage", allowed=allowed)
-        along = self.shear_path == "along"
-        beside = {"shear_path": along, "shear_steps": self.shear_steps is not None}
-        beside["shear_cycles"] = self.shear_cycles > 1
-        for name, stated in beside.items():
-            if stated and not points:
-                raise InputError("needs 'shear' or 'shear_force'", key=name)
-            if stated and along and name != "shear_path":
-                problem = "does not go with shear_path = 'along', which has the steps of the load"
-                raise InputError(problem, key=name, allowed="leave it out")
-        if any(one == other for one, other in pairwise([(0.0, 0.0), *points])):
-            problem = "repeats a point, or starts without shear"
-            raise InputError(problem, key=key, value=points, allowed="points that differ")
-        if points and along and len(points) != len(self._stated_points):
-            problem = "has another number of points than the load that it goes along with"
-            raise InputError(
-                problem, key=key, value=points, allowed=f"{len(self._stated_points)} pairs"
-            )
-        if self.shear_cycles > 1 and len(points) < 2:
-            problem, allowed = "needs two points of the shear", "a list of pairs, or 1"
-            raise InputError(problem, key="shear_cycles", value=self.shear_cycles, allowed=allowed)
+        for problem in self.shear_problems(self.stage, self._stated_points):
+            raise problem
 
     @property
     def quantity(self) -> Quantity:
@@ -194,7 +154,7 @@ class LoadHistory:
         ends = pairwise((0.0, *points))
         ways = [Leg(0, self.quantity, start, end, self.steps) for start, end in ends]
         if self.shear_path == "after":
-            count = self.shear_cycles * len(self._stated_shear)
+            count = self.shear_cycles * len(self.stated_shear)
             steps = self.shear_steps or self.steps
             ways += [Leg(0, self.quantity, points[-1], points[-1], steps)] * count
         return tuple(ways)
@@ -204,19 +164,10 @@ class LoadHistory:
         """Turning points as they were stated; none of stages."""
         return self.approach or self.force or self.pressure or ()
 
-    @property
-    def _stated_shear(self) -> Pairs:
-        """Points of the shear as they were stated; none of stages."""
-        return self.shear or self.shear_force or ()
-
     @cached_property
     def shear_key(self) -> str:
         """Whether ``shear`` or ``shear_force`` is prescribed; empty without any."""
-        for one in (self, *self.stage):
-            for key in _SHEARS:
-                if getattr(one, key) is not None:
-                    return key
-        return ""
+        return next((key for one in (self, *self.stage) for key in stated_shears(one)), "")
 
     @cached_property
     def shear_points(self) -> Pairs:
@@ -224,7 +175,7 @@ class LoadHistory:
         if self.stage:
             return shears_of(self.stage, self.ways, self.shear_key) if self.shear_key else ()
         cycles = self.shear_cycles if self.shear_path == "after" else self.cycles
-        return cycles * self._stated_shear
+        return cycles * self.stated_shear
 
     def _shear_at(self, time: float) -> ShearControl | None:
         """Return the shear of a load step, counted as in `control_at`; None without any."""
@@ -424,7 +375,6 @@ class LoadHistory:
         return replace(control, approach=control.approach - self.depth)
 
 
-_SHEARS = ("shear", "shear_force")
 _LOADS = {
     "approach": ("mm", False),
     "force": ("N", True),

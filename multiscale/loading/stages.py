@@ -109,6 +109,7 @@ def _replaced(loads: Sequence[Any], later: Sequence[Any]) -> tuple[Any, ...]:
 Quantity = Literal["approach", "force"]
 Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
 Pairs = tuple[tuple[float, float], ...]
+_SHEARS = ("shear", "shear_force")
 _OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
@@ -159,9 +160,9 @@ class Stage:
                 f"a stage states {' and '.join(stated)} of the plane",
                 allowed=f"at most one of {', '.join(_OF_PLANE)}",
             )
-        for key in ("shear", "shear_force"):
+        for key in stated_shears(self):
             pairs = getattr(self, key)
-            if pairs is not None and len(pairs) != 1:
+            if len(pairs) != 1:
                 problem, allowed = "has several points", "one pair; a stage for every other one"
                 raise InputError(problem, key=key, value=list(pairs), allowed=allowed)
 
@@ -169,6 +170,15 @@ class Stage:
     def loads_bodies(self) -> bool:
         """Whether it changes loads of the bodies."""
         return any(one not in (None, BodyLoads()) for one in (self.body, self.counter_body))
+
+
+def stated_shears(load: Any) -> list[str]:
+    """Return which of ``shear`` and ``shear_force`` a stage, or a load history, states.
+
+    Args:
+        load: The stage or history.
+    """
+    return [key for key in _SHEARS if getattr(load, key) is not None]
 
 
 class Leg(NamedTuple):

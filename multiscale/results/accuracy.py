@@ -99,3 +99,75 @@ def verdict(
         why = f"the error by {largest} could not be measured at load step {step.step}"
         return AccuracyVerdict(requested=accuracy, step=step.step, unknown=why)
     return AccuracyVerdict(requested=accuracy, error=error, step=step.step, causes=causes)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Decision:
+    """What was taken, and the errors that were measured for it before the run.
+
+    Attributes:
+        accuracy: Relative error of the force that was requested.
+        taken: The coupling, and the cells, meshes or micro model that it works on.
+        why: Why this coupling was taken; empty where the scene states it or it was missed for.
+        errors: Measured errors of the force by cause, relative to it, at the load where they are
+            worst; empty where they cannot be measured beforehand. That of laws is among them only
+            after the run.
+        missed: Errors by cause of what was tried first and could not keep the accuracy, if any.
+        work: What the choice took, counted, in words; empty where nothing was tried.
+    """
+
+    accuracy: float
+    taken: str
+    errors: Mapping[str, float]
+    why: str = ""
+    missed: Mapping[str, float] = field(default_factory=dict)
+    work: str = ""
+
+    @property
+    def error(self) -> float:
+        """Measured relative error of the force; 0 where it was not measured."""
+        return sum(self.errors.values())
+
+    @property
+    def kept(self) -> bool:
+        """Whether the measured error is within the accuracy."""
+        return bool(self.errors) and self.error <= self.accuracy
+
+    @property
+    def sentence(self) -> str:
+        """What was taken, why, and what was measured for it."""
+        parts = [
+            self.taken + f" ({self.why})" * bool(self.why),
+            f"an accuracy of {100 * self.accuracy:.3g} % is asked for, {_listed(self.errors)}",
+        ]
+        if self.missed:
+            parts.append(f"without meshing the roughness {_listed(self.missed)}")
+        if self.work:
+            parts.append(f"the choice took {self.work}")
+        return "; ".join(parts)
+
+    @property
+    def warning(self) -> str | None:
+        """A warning that the accuracy is not kept; None where it is, or is not known beforehand."""
+        if self.kept or not self.errors:
+            return None
+        largest = max(self.errors, key=lambda cause: self.errors[cause])
+        if self.error == math.inf:
+            return (
+                f"whether an accuracy of {100 * self.accuracy:.3g} % is kept is not known: the "
+                f"error by {largest} could not be measured at the largest load"
+            )
+        return (
+            f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
+            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
+        )
+
+
+def _listed(errors: Mapping[str, float]) -> str:
+    if not errors:
+        return "which is not measured beforehand"
+    if math.inf in errors.values():
+        largest = max(errors, key=lambda cause: errors[cause])
+        return f"which is not known: the error by {largest} could not be measured"
+    causes = ", ".join(f"{cause} {100 * error:.2g} %" for cause, error in errors.items())
+    return f"measured at the largest load {100 * sum(errors.values()):.2g} % ({causes})"
