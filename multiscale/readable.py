@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from typing import Any
 
 Observer = Callable[[str, int, int], None]
 """Told what a run is at: a phase, or parts of one, how many are done, and of how many at most; 0 of
@@ -204,6 +205,16 @@ def _fitting(value: float, unit: str) -> tuple[str, float]:
     if not value:
         return plain
     return next((one for one in prefixes if abs(value) >= one[1] * (1.0 - 1e-12)), prefixes[-1])
+
+
+def times(counts: Any, sign: str = " × ") -> str:
+    """Return counts along axes as a text, such as ``16 × 16``.
+
+    Args:
+        counts: The counts.
+        sign: What stands between them.
+    """
+    return sign.join(map(str, counts))
 
 
 def listed(parts: Iterable[str]) -> str:

@@ -191,6 +191,11 @@ class FacePair(ContactFace):
         self.body = BodyPair(first.body, second.body)
         self.comm, self.patches = first.comm, first.patches
 
+    @property
+    def sides(self) -> tuple[LoadedFace, ...]:
+        """The faces of both bodies."""
+        return self.first, self.second
+
     @cached_property
     def areas(self) -> Array:
         """Areas of the patches on the first face, shape (N,) [mm²]."""

@@ -84,6 +84,11 @@ class ContactFace:
     in_all_directions: Any
     pull_moments: Any
 
+    @property
+    def sides(self) -> tuple[Any, ...]:
+        """The `LoadedFace` of the body, or of both, that of the counter-body last."""
+        return (self,)
+
     def load(self, pressures: Array) -> PETSc.Vec:
         """Return the nodal load of pressures that are uniform on every patch.
 

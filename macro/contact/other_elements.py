@@ -29,8 +29,7 @@ ChooseBody = Callable[[ElasticBody], ElasticBody]
 
 def bodies_of(face: ContactFace) -> list[ElasticBody]:
     """Return the body under a face, or both."""
-    pair = [face.body.body, face.body.counter] if isinstance(face, FacePair) else [face.body]
-    return list[ElasticBody](pair)
+    return [one.body for one in face.sides]
 
 
 def quadratic_dofs(body: ElasticBody) -> int:
@@ -63,10 +62,8 @@ def face_on(face: ContactFace, choose: ChooseBody, finer: bool = False) -> Conta
     Note:
         Collective.
     """
-    if isinstance(face, FacePair):
-        return FacePair(_one_on(face.first, choose, finer), _one_on(face.second, choose, finer))
-    assert isinstance(face, LoadedFace)
-    return _one_on(face, choose, finer)
+    first, *second = (_one_on(one, choose, finer) for one in face.sides)
+    return FacePair(first, *second) if second else first
 
 
 def _one_on(face: LoadedFace, choose: ChooseBody, finer: bool) -> LoadedFace:

@@ -85,9 +85,7 @@ class Bodies:
     def made_bodies(self) -> list[ElasticBody]:
         """The bodies whose contact face has been made."""
         face: Any = self.__dict__.get("_contact_face")
-        if face is None:
-            return []
-        return [face.body.body, face.body.counter] if hasattr(face, "first") else [face.body]
+        return [] if face is None else [one.body for one in face.sides]
 
     def _first_face(self) -> LoadedFace:
         """Return the patches, or regions under laws of samples, on the first body."""
@@ -259,10 +257,10 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import FacePair, displacements_under
+        from macro import displacements_under
 
-        face, total = self.contact_face(), 0.0
-        for one in (face.first, face.second) if isinstance(face, FacePair) else (face,):
+        total = 0.0
+        for one in self.contact_face().sides:
             moved = displacements_under(one, np.ones((1, one.patches.count)))[0]
             total += float(moved @ one.areas / one.areas.sum())
         return total
@@ -276,12 +274,11 @@ class Bodies:
         Note:
             Collective.
         """
-        from macro import FacePair, largest_rise
+        from macro import largest_rise
 
-        face = self.contact_face()
-        faces = (face.first, face.second) if isinstance(face, FacePair) else (face,)
         return sum(
-            max(largest_rise(one, state) for state in range(len(one.body.loads))) for one in faces
+            max(largest_rise(one, state) for state in range(len(one.body.loads)))
+            for one in self.contact_face().sides
         )
 
     def _as_text(self) -> tuple[Any, ...]:
@@ -403,15 +400,17 @@ def write_displaced(
     Note:
         Collective.
     """
-    from macro import FacePair, FieldStep
+    from macro import FieldStep
+
+    both = len(face.sides) > 1
 
     def halves(counter: bool) -> Iterator[FieldStep]:
         for number, (moved, loads) in sorted(states.items()):
-            own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
+            own = face.body.split(moved)[counter] if both else moved
             more = () if counter else further(number)
             yield FieldStep(number, own, pressures(number, counter), loads, more)
 
-    _write(path, face, lambda one: halves(one is getattr(face, "second", None)))
+    _write(path, face, lambda one: halves(both and one is face.sides[1]))
 
 
 def _write(
@@ -422,8 +421,7 @@ def _write(
 ) -> None:
     import macro
 
-    both: list[Any] = [whole.first, whole.second] if isinstance(whole, macro.FacePair) else [whole]
-    for one, name in zip(both, (path.name, f"counter_{path.name}"), strict=False):
+    for one, name in zip(whole.sides, (path.name, f"counter_{path.name}"), strict=False):
         face = one if parts is None else replace(one, patches=parts)
         macro.write_fields(path.with_name(name), face, fields(face))
 

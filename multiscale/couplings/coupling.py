@@ -34,7 +34,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.machine import MemoryRequest
-from multiscale.readable import Detail, percent, quantity
+from multiscale.readable import Detail, percent, quantity, times
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
@@ -157,7 +157,7 @@ class Coupling(SceneParts, ABC):
         """The coupling, and the cells, meshes or micro model that it works on, in few words."""
         kind, micro = self.scene.kind, self.micro
         if isinstance(micro, HalfSpaceModel):
-            return f"{kind} on {describe.times(micro.surface.grid)} cells"
+            return f"{kind} on {times(micro.surface.grid)} cells"
         return kind if micro is None else f"{kind}, {micro.name}"
 
     def interference(self, x: Array, y: Array, z: Array) -> Array:

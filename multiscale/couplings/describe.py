@@ -12,7 +12,7 @@ from multiscale.inputs.scene_parts import SceneParts
 from multiscale.inputs.surfaces import RegionSamples, heights_per_wave
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stages import BodyLoads
-from multiscale.readable import number, quantity
+from multiscale.readable import number, quantity, times
 from multiscale.scene.sections import MicroSection
 
 _INTERACTING = ("elliptic", "circular")
@@ -59,7 +59,7 @@ def surface(parts: SceneParts) -> str:
     lx, ly = (quantity(side, "mm") for side in rough_surface.lengths)
     continued = ", continued periodically" if parts.scene.surface.periodic else ""
     text = (
-        f"{rough_surface.source}; {rough_surface.grid[0]} × {rough_surface.grid[1]} heights on "
+        f"{rough_surface.source}; {times(rough_surface.grid)} heights on "
         f"{lx} × {ly}{continued}, "
         f"rms height {quantity(rough.sq, 'mm', 3)}, rms gradient {number(rough.sdq, 3)}"
     )
@@ -262,8 +262,3 @@ def block(parts: SceneParts) -> str:
         f"{text}, {sizes[0]} × {sizes[1]} and {sizes[2]} high, "
         f"{sides} sides, contact modulus {quantity(modulus, 'MPa')}"
     )
-
-
-def times(counts: tuple[int, ...]) -> str:
-    """Return counts with crosses between them."""
-    return " × ".join(map(str, counts))

@@ -31,6 +31,7 @@ from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
+from multiscale.readable import times
 from multiscale.shear_errors import shear_errors, with_shear_errors
 from support.arrays import Array
 from support.collective import on_root_alone
@@ -348,7 +349,7 @@ class ConcurrentCoupling(MicroCoupling):
         """Return what will be done and why."""
         return super().describe() | {
             "coupling": "concurrent: the whole surface on the block at every load step, no laws; "
-            f"{describe.times(self.patches.grid)} patches gather the results"
+            f"{times(self.patches.grid)} patches gather the results"
         }
 
 

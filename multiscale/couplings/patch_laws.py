@@ -17,7 +17,6 @@ from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import on_body
 from multiscale.couplings.contact_solver import plane_at_largest_load
-from multiscale.couplings.describe import times
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
 from multiscale.law_solvers.condensed import CondensedLaws, FreePlaneLaws
@@ -29,7 +28,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
 from multiscale.measured_errors import checked
-from multiscale.readable import Detail, Observer
+from multiscale.readable import Detail, Observer, times
 from multiscale.shear_errors import behind_laws, shear_errors, with_shear_errors
 from support.collective import on_root_alone
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from geometry import RefinedShape
 from micro import HalfSpaceModel
-from multiscale.couplings import describe, validity
+from multiscale.couplings import validity
 from multiscale.couplings.contact_solver import on_few_cells, plane_at_largest_load
 from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.pressed_surface import PressedSurface
@@ -40,6 +40,7 @@ from multiscale.inputs.surfaces import located
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.readable import times
 from multiscale.results.reference_record import ReferenceRecord, reference_record
 from multiscale.scene.scene import Scene
 from support.arrays import Array
@@ -272,7 +273,7 @@ class ReferenceCoupling(PressedSurface):
         scene, meshes = self.scene, self.rough_meshes.statement
         said = super().describe() | {
             "coupling": "reference: the rough surface itself, meshed and pressed by "
-            f"{scene.reference.method}; {describe.times(self.patches.grid)} patches gather the "
+            f"{scene.reference.method}; {times(self.patches.grid)} patches gather the "
             "results"
         }
         if scene.block is not None:

@@ -49,7 +49,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, with_errors
-from multiscale.readable import Observer, number
+from multiscale.readable import Observer, number, times
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -142,7 +142,7 @@ class RepresentativeCoupling(LawCoupling):
             for body in self.shown_bodies
         )
         slopes = " with finite slopes" * self.finite_slopes
-        return f"laws of samples on {describe.times(self.surface.grid)} heights{slopes}, {bodies}"
+        return f"laws of samples on {times(self.surface.grid)} heights{slopes}, {bodies}"
 
     @property
     def finite_slopes(self) -> bool:

@@ -13,6 +13,7 @@ from geometry import BlockShape, InputError, Material, PatchGrid, Surface
 from geometry.face_frame import FaceFrame
 from geometry.meshes.block import BlockMeshing
 from multiscale.inputs.surfaces import located
+from multiscale.readable import times
 from multiscale.scene.bodies import BlockSection
 from multiscale.scene.scene import Scene
 from support.fields import part_of
@@ -132,7 +133,7 @@ class BodyFacts:
             lengths=shape.interface,
             area=shape.interface[0] * shape.interface[1],
             depth=shape.height,
-            cells=f"{' × '.join(map(str, shape.cells))} {kind}",
+            cells=f"{times(shape.cells)} {kind}",
             unknowns=block_unknowns(shape),
             element=shape.element,
             materials=(block.material,),

@@ -17,7 +17,7 @@ from multiscale.inputs.bodies import BodyFacts, block_unknowns
 from multiscale.inputs.cost import check_memory
 from multiscale.inputs.surfaces import located
 from multiscale.machine import ClusterNodes, MemoryRequest
-from multiscale.readable import listed
+from multiscale.readable import listed, times
 from multiscale.scene.scene import Scene
 from support.arrays import Array
 
@@ -114,8 +114,7 @@ class ReferenceMeshes:
         """What the meshes are, in words."""
         finest = self.shapes[-1]
         if isinstance(finest, BlockShape):
-            cells = " × ".join(map(str, finest.cells))
-            kind = f"{cells} hexahedra ({finest.element}), grading {finest.grading:g}"
+            kind = f"{times(finest.cells)} hexahedra ({finest.element}), grading {finest.grading:g}"
             where, unknowns = "edges", [f"{count}" for count in self.unknowns]
         else:  # unknowns are an estimate, which is worth two digits
             by = " by gmsh" * (finest.mesher == "gmsh")

@@ -96,7 +96,7 @@ class FaceLeakObserver(LeakObserver):
         if self._face is None:
             coupling = self._coupling
             whole: Any = coupling.bodies.contact_face()
-            first = getattr(whole, "first", whole)
+            first = whole.sides[0]
             known = getattr(whole, "on_both", None)
             mesh, points = first.space.mesh, first.quadrature
             try:

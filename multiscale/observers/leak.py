@@ -19,7 +19,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.gap_flows import flow_solver, solved_gap_flow
 from multiscale.loading.leak import WAYS, Leak
@@ -94,11 +93,11 @@ class LeakObserver(StepObserver):
 
     def _with_errors(self, step: LoadStep, leaks: tuple[Leak, ...]) -> tuple[Leak, ...]:
         """Return the leaks with their errors."""
-        try:
-            varied = {cause: self._varied(step, cause) for cause in self.causes}
-        except NotConverged as error:
-            problem = f"error of the leak at load step {step.step} not measured: {error}"
-            self._failures[problem] = None
+        varied = self._tried(
+            f"error of the leak at load step {step.step} not measured",
+            lambda: {cause: self._varied(step, cause) for cause in self.causes},
+        )
+        if varied is None:
             return leaks
         return tuple(
             one.with_errors({cause: abs(rates[k] - one.rate) for cause, rates in varied.items()})

@@ -6,12 +6,13 @@ them, and has its figures. None knows of another; a run makes those that its sce
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
@@ -21,6 +22,8 @@ from multiscale.measured_errors import error_notes
 from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
+
+T = TypeVar("T")
 
 _AFTER_UNLOADING = (
     "errors of load steps after unloading are not measured: the plastic depth there is that of the "
@@ -95,6 +98,14 @@ class StepObserver:
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
 
+    def _tried(self, what: str, solve: Callable[[], T]) -> T | None:
+        """Return what is solved for; None where that does not converge, which is noted."""
+        try:
+            return solve()
+        except NotConverged as error:
+            self._failures[f"{what}: {error}"] = None
+            return None
+
     def _plastic_past(self, step: LoadStep, past: Sequence[LoadStep]) -> bool:
         """Tell whether the plastic depth is not that of rising loads, which checks solve for."""
         if self._coupling.scene.micro.hardness is None:
@@ -168,11 +179,8 @@ class ContactRecorder(StepObserver):
             return step
         if self._seen != step.step and not self._coupling.has_laws:
             return step  # a step of an earlier call, whose state is gone
-        try:
-            contact = self._coupling.contact(step, self._state)
-        except NotConverged as error:
-            self._failures[f"contact of load step {step.step} not found: {error}"] = None
-            return step
+        number, solve = step.step, partial(self._coupling.contact, step, self._state)
+        contact = self._tried(f"contact of load step {number} not found", solve)
         if contact is not None:
             step, detail = contact
             shown = step.counted_from(self._coupling.zero)
@@ -208,11 +216,8 @@ class ErrorCheck(StepObserver):
             self._failures[_AFTER_UNLOADING] = None
             return step
         with self._coupling.clock.phase("check"):
-            try:
-                return self._coupling.checked(step, past)
-            except NotConverged as error:
-                self._failures[f"errors of load step {step.step} not measured: {error}"] = None
-                return step
+            solve = partial(self._coupling.checked, step, past)
+            return self._tried(f"errors of load step {step.step} not measured", solve) or step
 
     def _asked(self, *, last: bool) -> bool:
         """Tell whether errors are to be measured at a load step."""

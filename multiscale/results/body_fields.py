@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from multiscale.readable import number
+from multiscale.readable import number, times
 from support.arrays import Array
 from support.displayed import Displayed, Table, dataset
 from support.errors import InputError
@@ -61,7 +61,7 @@ class BodyFields(Displayed):
         )
         fields = {name: getattr(self, name) for name in ("points_mm", *_NAMES.values())}
         rows = [
-            (name, " × ".join(map(str, one.shape)), number(one.min()), number(one.max()))
+            (name, times(one.shape), number(one.min()), number(one.max()))
             for name, one in fields.items()
             if one is not None
         ]

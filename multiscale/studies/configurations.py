@@ -23,6 +23,7 @@ from multiscale.inputs.bodies import LAW_BLOCK_CELLS, block_section
 from multiscale.inputs.cost import MemoryLacking
 from multiscale.inputs.loads import load_history_on, patch_grid
 from multiscale.inputs.surfaces import make_surface
+from multiscale.readable import times
 from multiscale.scene.reader import to_dict
 from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup
@@ -240,8 +241,3 @@ def _name(scene: Scene) -> str:
     cells = block_section(scene).cells
     name += f", {times(cells)} elements" if cells else ""
     return name + SMALL_SLOPES * (micro.finite_slopes is False)
-
-
-def times(counts: Any, sign: str = " × ") -> str:
-    """Return counts along the axes as a text."""
-    return sign.join(map(str, counts))

@@ -42,7 +42,8 @@ import numpy as np
 
 from geometry.patches import interval_overlaps
 from multiscale.inputs.bodies import block_section
-from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid, times
+from multiscale.readable import times
+from multiscale.studies.configurations import SMALL_SLOPES, Configuration, Grid
 from multiscale.studies.running import CaseResult
 from support.arrays import Array
 
