@@ -35,7 +35,7 @@ class PressedSurface(Coupling):
     def _parts(cls, source: Source) -> dict[str, Any]:
         """Return the attributes that all couplings of one surface have."""
         began, scene, like = time.perf_counter(), source.scene, source.like
-        check_memory(scene, source.nodes, cls.requests(scene))
+        check_memory(source.nodes, cls.requests(scene))
         if like is not None and like.regions is None:
             surface, counter_surface = like.surface, like.counter_surface
         else:

@@ -28,10 +28,10 @@ from multiscale.couplings.reference_estimates import (
 )
 from multiscale.couplings.reference_solver import ReferenceSolver, RoughMesh
 from multiscale.inputs.bodies import Cells, block_section
-from multiscale.inputs.cost import SET_UP_CYCLES, Work
+from multiscale.inputs.cost import SET_UP_CYCLES, Work, check_memory
 from multiscale.inputs.reference_meshes import (
     ReferenceMeshes,
-    check_reference_memory,
+    least_requests,
     reference_meshes,
     reference_requests,
 )
@@ -101,10 +101,10 @@ class ReferenceCoupling(PressedSurface):
         if self.load_history.quantity == "approach":  # the plane under a force stays as it is
             model, turns = HalfSpaceModel(surface, contact_modulus=modulus), scene.loading.tilt
             plane = plane_over_face(plane, model, compliance, turns=turns == "free")
-        check_reference_memory(scene, surface, plane, self.nodes)
+        check_memory(self.nodes, least_requests(scene, surface, plane))
         contact = contact_under(plane, surface, modulus)
         found = reference_meshes(scene, surface, self.body, plane, contact)
-        check_reference_memory(scene, surface, plane, self.nodes, found)
+        check_memory(self.nodes, reference_requests(scene, found))
         return found
 
     @property

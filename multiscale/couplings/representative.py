@@ -80,7 +80,7 @@ class RepresentativeCoupling(LawCoupling):
     def from_scene(cls, source: Source) -> Self:
         """Make the coupling of a scene on one process; see `Coupling.from_scene`."""
         began, scene, (body, counter) = time.perf_counter(), source.scene, source.facts
-        check_memory(scene, source.nodes, cls.requests(scene))
+        check_memory(source.nodes, cls.requests(scene))
         if body is None:
             sample = sample_surface(scene, scene.surface, "surface")
             body = BodyFacts.of_block(scene, sample, cls.unstated_cells(scene))

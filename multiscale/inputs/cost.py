@@ -27,11 +27,10 @@ class MemoryLacking(InputError):
     """What a scene asks for does not fit into the memory of the nodes; others may have more."""
 
 
-def check_memory(scene: Scene, nodes: ClusterNodes, requests: Iterable[MemoryRequest]) -> None:
+def check_memory(nodes: ClusterNodes, requests: Iterable[MemoryRequest]) -> None:
     """Refuse what does not fit into the memory of the nodes, before it is allocated.
 
     Args:
-        scene: The scene.
         nodes: The nodes of the run.
         requests: The memory that is needed.
 

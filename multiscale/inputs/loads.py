@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Any, Literal
 
@@ -118,6 +118,18 @@ def check_load(
         () if body is None else _beyond_body(scene, load_history, area, body),
         () if body is None else _beyond_edge(scene, load_history, surfaces[0], body),
     )
+    refuse(problems)
+
+
+def refuse(problems: Iterable[Problem]) -> None:
+    """Raise the first of some problems.
+
+    Args:
+        problems: The problems.
+
+    Raises:
+        InputError: When there is one; names key, value and what is allowed.
+    """
     for key, value, problem, allowed in problems:
         raise InputError(problem, key=key, value=value, allowed=allowed)
 

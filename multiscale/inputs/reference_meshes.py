@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from geometry import BlockShape, InputError, RefinedShape, RigidPlane, Surface
+from geometry import BlockShape, RefinedShape, RigidPlane, Surface
 from geometry.meshes.families import ContactMap, Shape, characteristic_size, reference_shapes
 from multiscale.inputs.bodies import BodyFacts, block_unknowns
-from multiscale.inputs.cost import check_memory
+from multiscale.inputs.loads import Problem, refuse
 from multiscale.inputs.surfaces import located
-from multiscale.machine import ClusterNodes, MemoryRequest
+from multiscale.machine import MemoryRequest
 from multiscale.readable import listed, times
 from multiscale.scene.scene import Scene
 from support.arrays import Array
@@ -170,7 +170,7 @@ def reference_meshes(
     Raises:
         InputError: When they cannot be made; names file and key.
     """
-    _check_body(scene)
+    refuse(_unfit(scene))
     reference = scene.reference
     hexahedral = reference.hexahedral
     approach, tilt = plane_at_largest_load.approach, plane_at_largest_load.tilt
@@ -202,40 +202,25 @@ def reference_meshes(
     )
 
 
-def check_reference_memory(
-    scene: Scene,
-    surface: Surface,
-    plane_at_largest_load: RigidPlane,
-    nodes: ClusterNodes,
-    meshes: ReferenceMeshes | None = None,
-) -> None:
-    """Refuse meshes that do not fit into the memory of the nodes.
+def least_requests(scene: Scene, surface: Surface, plane: RigidPlane) -> Iterator[MemoryRequest]:
+    """Yield the least memory that any meshes of a reference could need.
+
+    It is known before their sizes are arranged, which takes memory too.
 
     Args:
         scene: The scene.
         surface: Its surface.
-        plane_at_largest_load: The rigid plane at the largest load.
-        nodes: The nodes of the run.
-        meshes: The meshes; by default the least that any could be is checked, before their sizes
-            are arranged, which takes memory too.
-
-    Raises:
-        InputError: When they do not fit; names file and key.
+        plane: The rigid plane at the largest load.
     """
-    if meshes is not None:
-        check_memory(scene, nodes, reference_requests(scene, meshes))
-        return
     fine = scene.reference.fine
     if fine is None or scene.reference.hexahedral:
         return
-    with located(scene, _key(hexahedral=False)):
-        # the nodes of the top face where contact can occur alone
-        largest = _largest_approach(scene, plane_at_largest_load.approach)
-        plane = RigidPlane.above(surface, largest, plane_at_largest_load.tilt)
-        depth = surface.highest - surface.heights
-        share = float((plane.at(surface.x[:, None], surface.y) > depth).mean())
-        least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
-        check_memory(scene, nodes, [_request(scene, "the reference", shared=least)])
+    # the nodes of the top face where contact can occur alone
+    lowered = RigidPlane.above(surface, _largest_approach(scene, plane.approach), plane.tilt)
+    depth = surface.highest - surface.heights
+    share = float((lowered.at(surface.x[:, None], surface.y) > depth).mean())
+    least = 3.0 * BYTES_PER_UNKNOWN[1] * surface.area * share / fine / fine
+    yield _request(scene, "the reference", shared=least)
 
 
 def _plane_is_prescribed(scene: Scene) -> bool:
@@ -274,39 +259,23 @@ def _key(hexahedral: bool) -> str:
     return "reference.cells" if hexahedral else "reference.fine"
 
 
-def _check_body(scene: Scene) -> None:
-    """Refuse keys of the body that do not go with a reference."""
-    block = scene.block
-    if block is None:
-        if scene.reference.mesher == "gmsh":
-            raise InputError(
-                "does not go with [body], whose mesh of the file is bisected",
-                key="reference.mesher",
-                value="gmsh",
-                allowed="bisection",
-            )
-        if scene.reference.hexahedral:
-            raise InputError(
-                "does not go with [body], whose meshes of a reference are of tetrahedra",
-                key="reference.cells",
-                value=scene.reference.cells,
-                allowed="reference.fine, or neither",
-            )
-        return
-    if block.margin > 0.0:
-        raise InputError(
-            "does not go with coupling.kind = 'reference', whose rough surface is the whole top",
-            key="block.margin",
-            value=block.margin,
-            allowed="0",
-        )
-    if scene.reference.hexahedral and not block.element.startswith("Q"):
-        raise InputError(
-            "does not go with a reference of hexahedra",
-            key="block.element",
-            value=block.element,
-            allowed="Q1, Q2, or reference.mesh = 'tetrahedra'",
-        )
+def _unfit(scene: Scene) -> Iterator[Problem]:
+    """Yield keys of the body that do not go with a reference."""
+    block, reference = scene.block, scene.reference
+    if block is None and reference.mesher == "gmsh":
+        problem = "does not go with [body], whose mesh of the file is bisected"
+        yield "reference.mesher", "gmsh", problem, "bisection"
+    if block is None and reference.hexahedral:
+        problem = "does not go with [body], whose meshes of a reference are of tetrahedra"
+        yield "reference.cells", reference.cells, problem, "reference.fine, or neither"
+    if block is not None and block.margin > 0.0:
+        whole = "whose rough surface is the whole top"
+        problem = f"does not go with coupling.kind = 'reference', {whole}"
+        yield "block.margin", block.margin, problem, "0"
+    if block is not None and reference.hexahedral and not block.element.startswith("Q"):
+        problem, allowed = "does not go with a reference of hexahedra", "Q1, Q2"
+        allowed = f"{allowed}, or reference.mesh = 'tetrahedra'"
+        yield "block.element", block.element, problem, allowed
 
 
 def mesh_unknowns(shape: Shape, body: BodyFacts | None = None) -> int:

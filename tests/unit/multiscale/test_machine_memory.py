@@ -38,7 +38,7 @@ def requests(given):
 
 
 def check_memory(given, nodes):
-    cost.check_memory(given, nodes, requests(given))
+    cost.check_memory(nodes, requests(given))
 
 
 def of(count, *, ranks=1, memory=64.0):
