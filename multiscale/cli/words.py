@@ -156,7 +156,7 @@ def _add_runs(command: Callable[[str, str, str], argparse.ArgumentParser]) -> No
     _add_scene(run)
     compare = command(
         "compare",
-        "compare.compare_scene",
+        "studies.compare_scene",
         "Run a scene in every sensible configuration; draw error against time.",
     )
     _add_scene(compare, ending=COMPARE_ENDING)

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from helpers.scene_inputs import scenes, takes_long
-from multiscale.cli.compare import comparison_html
+from multiscale.cli.studies import comparison_html
 from multiscale.output.results import write_records
 from multiscale.scene.scene import Scene
 from multiscale.studies import AGAINST

@@ -11,7 +11,7 @@ import pytest
 
 from multiscale import compare
 from multiscale.cli.command_line import main
-from multiscale.cli.compare import compare_scene
+from multiscale.cli.studies import compare_scene
 from multiscale.cli.words import wall_time
 from multiscale.run import run
 from multiscale.scene.scene import Scene
@@ -201,7 +201,7 @@ def chosen(folder, **choice):
 
 @pytest.fixture
 def some_solved(monkeypatch):
-    monkeypatch.setattr("multiscale.cli.compare.compare", partial(compare, solve=solved))
+    monkeypatch.setattr("multiscale.cli.studies.compare", partial(compare, solve=solved))
 
 
 def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, some_solved):
@@ -230,7 +230,7 @@ def test_command_writes_table_figure_and_report(capsys, tmp_path, monkeypatch, s
         return solved(one)
 
     table = (tmp_path / "compare.csv").read_bytes()
-    monkeypatch.setattr("multiscale.cli.compare.compare", partial(compare, solve=none_again))
+    monkeypatch.setattr("multiscale.cli.studies.compare", partial(compare, solve=none_again))
     compare_scene(chosen(tmp_path), [], None)
     assert (tmp_path / "compare.csv").read_bytes() == table
 
