@@ -1,25 +1,29 @@
-"""Lines, progress and wall times of long tasks; only rank 0 prints, in terminals and notebooks."""
+"""Lines, tables, progress and times of tasks; only rank 0 prints, in terminals and notebooks."""
 
 from __future__ import annotations
 
+import html
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+import webbrowser
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from html import escape
 from math import ceil
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
-from multiscale.readable import Observer, duration, quantity
+from multiscale.machine import cores_statement, peak_memory
+from multiscale.readable import Caution, Observer, duration, quantity
 from support.collective import place_in
+from support.errors import PatchlawError
 
 if TYPE_CHECKING:
     from rich.console import Console
-
+    from rich.table import Table as RichTable
 
 _QUIET: ContextVar[bool] = ContextVar("quiet", default=False)
 
@@ -82,6 +86,17 @@ def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Cons
     return console
 
 
+def escape(text: str) -> str:
+    """Return a text that a console of rich shows as it is.
+
+    Args:
+        text: The text.
+    """
+    from rich.markup import escape as escape_markup
+
+    return escape_markup(text)
+
+
 Show = Callable[[str], None]
 """Shows a text."""
 
@@ -131,16 +146,14 @@ def following(comm: Any) -> Iterator[tuple[Show, Show]]:
     if speaks(comm) and _in_notebook():
         yield _notebook_line(), print
         return
-    from rich.markup import escape as escape_markup
-
     lines = console_of(comm)
     if comm is not None:  # mpirun passes a terminal on that takes no moving lines
-        yield lambda text: None, lambda text: lines.print(escape_markup(text))
+        yield lambda text: None, lambda text: lines.print(escape(text))
         return
     with lines.status("") as status:
         yield (
-            lambda text: status.update(escape_markup(text)),
-            lambda text: lines.print(escape_markup(text)),
+            lambda text: status.update(escape(text)),
+            lambda text: lines.print(escape(text)),
         )
 
 
@@ -220,7 +233,7 @@ def _notebook_line() -> Show:
     from IPython.display import display
 
     def content(text: str) -> dict[str, str]:
-        return {"text/plain": text, "text/html": f"<div>{escape(text)}</div>"}
+        return {"text/plain": text, "text/html": f"<div>{html.escape(text)}</div>"}
 
     handle = display(content(""), raw=True, display_id=True)
     return lambda text: handle.update(content(text), raw=True)
@@ -270,3 +283,161 @@ class Clock:
         """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
         rest = self._until - self._began - sum(self.seconds.values())
         return {**self.seconds, "other": max(rest, 0.0)}
+
+
+TABLE_WIDTH = 100
+"""Characters of a line that tables take at least, in a log file too."""
+
+
+def complain(comm: Any, error: PatchlawError) -> None:
+    """Print one error message on the error stream, as one line whatever it quotes.
+
+    Args:
+        comm: MPI communicator, or None.
+        error: The error.
+    """
+    line = escape(" ".join(str(error).splitlines()))
+    console_of(comm, stderr=True).print(f"[bold red]patchlaw:[/] {line}")
+
+
+def say(comm: Any, text: str) -> None:
+    """Print one line.
+
+    Args:
+        comm: MPI communicator, or None.
+        text: The line.
+    """
+    console_of(comm).print(escape(text))
+
+
+def show_pairs(comm: Any, pairs: Sequence[tuple[str, str]], warnings: Sequence[str] = ()) -> None:
+    """Print topics with a sentence each, then warnings.
+
+    Args:
+        comm: MPI communicator, or None.
+        pairs: Topics and sentences.
+        warnings: Sentences that a user should not miss.
+    """
+    console = console_of(comm, least_width=TABLE_WIDTH)
+    table = _rich_table(show_header=False)
+    for topic, sentence in pairs:
+        table.add_row(f"[bold]{escape(topic)}[/]", escape(sentence))
+    console.print(table)
+    for warning in warnings:
+        console.print(f"[yellow]note:[/] {escape(warning)}")
+
+
+def show_plan(
+    comm: Any,
+    coupling: Any,
+    cost: Sequence[tuple[str, str]] = (),
+    shortages: Sequence[str] = (),
+) -> None:
+    """Print what a run will do, and why.
+
+    Args:
+        comm: MPI communicator, or None.
+        coupling: The `multiscale.couplings.coupling.Coupling` of the scene.
+        cost: What it costs, in sentences with topics.
+        shortages: Sentences on the memory that these nodes lack.
+
+    Note:
+        Collective.
+    """
+    cores = cores_statement(comm)
+    if speaks(comm):
+        warnings = [*coupling.warnings(), *shortages]
+        show_pairs(comm, [*coupling.statements(cost), ("cores", cores)], warnings)
+
+
+def show_times(comm: Any, seconds: Mapping[str, float]) -> None:
+    """Print wall times and memory of a run.
+
+    Args:
+        comm: MPI communicator, or None.
+        seconds: Wall time of the phases [s].
+    """
+    total = duration(sum(seconds.values()))
+    phases = ", ".join(f"{phase} {duration(spent)}" for phase, spent in seconds.items())
+    text = f"took {total}: {phases}; memory {peak_memory() / 1e6:.0f} MB"
+    console_of(comm, least_width=TABLE_WIDTH).print(text, markup=False)
+
+
+def show_history(comm: Any, history: Any) -> None:
+    """Print the force–approach table and the notes of the run; quietly, its cautions alone.
+
+    Args:
+        comm: MPI communicator, or None.
+        history: The `multiscale.results.history.History`.
+    """
+    if not speaks(comm):
+        return
+    header, rows = history.table(most=60)
+    # A reference has one more column.
+    console = console_of(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
+    console.print(_table([name.replace(" [", "\n[") for name in header], rows))
+    if is_quiet():
+        console = console_of(comm, stderr=True)
+    for note in history.notes:
+        if is_quiet() and not isinstance(note, Caution):
+            continue
+        label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
+        console.print(f"{label} {escape(note)}")
+
+
+def show_table(comm: Any, table: tuple[Sequence[str], Sequence[Sequence[str]]]) -> None:
+    """Print a table whose first column is text.
+
+    Args:
+        comm: MPI communicator, or None.
+        table: Its headings and rows.
+    """
+    console_of(comm, least_width=TABLE_WIDTH).print(_table(*table, text_columns=1))
+
+
+def _table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], text_columns: int = 0
+) -> RichTable:
+    table = _rich_table()
+    for index, name in enumerate(header):
+        table.add_column(escape(name), justify="left" if index < text_columns else "right")
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table
+
+
+def _rich_table(**options: Any) -> RichTable:
+    from rich.table import Table
+
+    return Table(box=None, padding=(0, 2, 0, 0), **options)
+
+
+def show_files(comm: Any, files: Sequence[Path]) -> None:
+    """Print where results are.
+
+    Args:
+        comm: MPI communicator, or None.
+        files: The files written, all in one folder.
+    """
+    if files:
+        pictures = {path.stem for path in files if path.suffix == ".png"}
+        beside = {path for path in files if path.suffix == ".svg" and path.stem in pictures}
+        names = ", ".join(path.name for path in files if path not in beside)
+        also = "; pictures also as .svg" if beside else ""
+        say(comm, f"results in {files[0].parent}: {names}{also}")
+
+
+def open_page(comm: Any, files: Sequence[Path]) -> None:
+    """Show the page among files in the user's browser, or say why not.
+
+    Args:
+        comm: MPI communicator, or None.
+        files: The files written.
+    """
+    if not speaks(comm):
+        return
+    page = next((path for path in files if path.suffix == ".html"), None)
+    if page is None:
+        say(comm, "note: no report was written that could be opened")
+    elif not webbrowser.open(page.resolve().as_uri()):
+        say(comm, f"note: no browser was found to open {page} with")

@@ -24,12 +24,9 @@ from typing import Any
 
 import numpy as np
 import threadpoolctl
-from rich.console import Console
-from rich.markup import escape
 
-from multiscale.console import colours, speaks
+from multiscale.console import console_of, escape, say, speaks
 from multiscale.machine import cluster_nodes, cores_statement, detached_processes
-from multiscale.output import terminal
 from support.collective import on_root
 from support.cores import node_cores
 from support.errors import InputError, PatchlawError
@@ -381,7 +378,7 @@ def compile_ahead(choice: argparse.Namespace, options: list[str], comm: Any) -> 
         comm: MPI communicator; None for a process on its own.
     """
     folder, count = warm(choice.element, comm)
-    terminal.say(comm, f"{count} compiled forms in {folder}")
+    say(comm, f"{count} compiled forms in {folder}")
 
 
 def show(topic: str, result: CheckResult) -> None:
@@ -391,8 +388,7 @@ def show(topic: str, result: CheckResult) -> None:
         topic: What was checked.
         result: The result.
     """
-    console = Console(highlight=False, soft_wrap=True, color_system=colours())
-    colour = _COLOUR[result.state]
-    console.print(f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]{escape(result.text)}")
+    lines, colour = console_of(None), _COLOUR[result.state]
+    lines.print(f"[{colour}]{result.state:8}[/][bold]{topic:14}[/]{escape(result.text)}")
     if result.remedy:
-        console.print(f"{'':22}→ {escape(result.remedy)}")
+        lines.print(f"{'':22}→ {escape(result.remedy)}")

@@ -10,6 +10,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from multiscale import console
 from multiscale.cli.interruption import ended_if_told
 from multiscale.console import quietly
 from multiscale.machine import (
@@ -18,7 +19,6 @@ from multiscale.machine import (
     refuse_detached_processes,
     world,
 )
-from multiscale.output import terminal
 from support.collective import on_root
 from support.cores import hold_blas
 from support.errors import InputError, NotWritten, OutOfMemory, PatchlawError
@@ -47,7 +47,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         comm = world()
         hold_blas()
     except InputError as error:
-        terminal.complain(None, error)
+        console.complain(None, error)
         return error.exit_code
     meeting = None if comm is None else comm.Dup()  # for the barrier at the end alone
     try:
@@ -60,14 +60,14 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
             command(choice, _start_petsc(options), comm)
     except PatchlawError as error:
         together = _all_arrive(meeting)
-        terminal.complain(comm if together else None, error)
+        console.complain(comm if together else None, error)
         return error.exit_code if together else _end_all(comm, error.exit_code)
     except KeyboardInterrupt as error:
         if comm is None:
             raise
         return _end_all(comm, getattr(error, "exit_code", 1))
     except MemoryError as error:
-        terminal.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
+        console.complain(None, OutOfMemory(f"memory ran out: {error or 'none is left'}"))
         return _end_all(comm, OutOfMemory.exit_code)
     except Exception:
         if comm is not None:
@@ -119,7 +119,7 @@ def complain_of_stream(name: str, failure: OSError) -> int:
         failure: What the system said.
     """
     problem = failure.strerror or failure
-    terminal.complain(None, NotWritten(f"standard {name}: cannot be written: {problem}"))
+    console.complain(None, NotWritten(f"standard {name}: cannot be written: {problem}"))
     return NotWritten.exit_code
 
 

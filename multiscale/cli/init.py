@@ -13,10 +13,10 @@ from typing import Any
 from geometry.materials import Material
 from geometry.statistics import roughness
 from geometry.surface import Surface
+from multiscale import console
 from multiscale.inputs.bodies import block_section
 from multiscale.inputs.surfaces import make_surface
 from multiscale.machine import refuse_detached_processes
-from multiscale.output import terminal
 from multiscale.readable import quantity
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene import Scene
@@ -79,8 +79,8 @@ def write_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     refuse_detached_processes()
     path, remarks = on_root(comm, lambda: _write(choice))
     for remark in remarks:
-        terminal.say(comm, remark)
-    terminal.say(comm, f"wrote {path}; to run it: patchlaw run {path}")
+        console.say(comm, remark)
+    console.say(comm, f"wrote {path}; to run it: patchlaw run {path}")
 
 
 def _write(choice: argparse.Namespace) -> tuple[Path, list[str]]:

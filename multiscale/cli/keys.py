@@ -8,9 +8,9 @@ import json
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from multiscale import console
 from multiscale.cli.words import command_parser
 from multiscale.console import speaks
-from multiscale.output import terminal
 from multiscale.scene.keys import Key, scene_keys, scene_schema
 from support.errors import InputError
 
@@ -38,7 +38,7 @@ def explain_keys(choice: argparse.Namespace, options: list[str], comm: Any) -> N
         options: PETSc options given by the user.
         comm: MPI communicator; None for a process on its own.
     """
-    terminal.show_pairs(comm, list(_explained(choice.topic)))
+    console.show_pairs(comm, list(_explained(choice.topic)))
 
 
 def _explained(topic: str | None) -> Iterator[tuple[str, str]]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from geometry.statistics import roughness
+from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.console import counting, following
 from multiscale.couplings import describe
@@ -22,7 +23,6 @@ from multiscale.inputs.cost import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
-from multiscale.output import terminal
 from multiscale.output.results import surface_drawing
 from multiscale.output.results_folder import locked, refuse_other_results
 from multiscale.run import Run
@@ -49,7 +49,7 @@ def plan_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> Non
     coupling = planned(scene, comm)
     cost = on_root_alone(comm, lambda: list(coupling.cost_statements(memory, ranks)))
     shortages = list(shortage_warnings(coupling.memory_requests(), cluster_nodes(comm)))
-    terminal.show_plan(comm, coupling, cost, shortages)
+    console.show_plan(comm, coupling, cost, shortages)
 
 
 def planned(scene: Scene, comm: Any) -> Coupling:
@@ -78,7 +78,7 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     with _own_folder(choice, comm) as (scene, folder):
         coupling_class(scene).check_has_laws(scene)
         run = Run(scene, comm)
-        terminal.show_plan(comm, run.coupling)
+        console.show_plan(comm, run.coupling)
         with following(comm) as (begun, _):
             run.clock.observe = counting(begun)
             run.make_laws()
@@ -101,9 +101,9 @@ def tabulate_laws(choice: argparse.Namespace, options: list[str], comm: Any) -> 
                 write_text(folder / name, text)
             return files + [folder / name for name in {Path(path).parts[0]: 0 for path in exports}]
 
-        terminal.show_files(comm, on_root(comm, write))
+        console.show_files(comm, on_root(comm, write))
     for note in run.history().notes:
-        terminal.say(comm, f"note: {note}")
+        console.say(comm, f"note: {note}")
 
 
 def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -116,10 +116,10 @@ def describe_surface(choice: argparse.Namespace, options: list[str], comm: Any) 
     """
     with _own_folder(choice, comm) as (scene, folder):
         coupling = planned(scene, comm)
-        terminal.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
-        drawing, tell = surface_drawing(coupling), partial(terminal.say, None)
+        console.show_pairs(comm, _surface_facts(coupling), coupling.surface.notes)
+        drawing, tell = surface_drawing(coupling), partial(console.say, None)
         files = on_root(comm, lambda: write_figure(folder, drawing, tell))
-        terminal.show_files(comm, files)
+        console.show_files(comm, files)
 
 
 @contextmanager

@@ -6,10 +6,10 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
 from multiscale.console import following, run_progress
-from multiscale.output import terminal
 from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.output.field_files import write_fields
 from multiscale.output.results import RunFigures, write_results
@@ -39,9 +39,9 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
         with locked(folder, comm) as lock:
             kept, notice = on_root(comm, lambda: _earlier(choice, folder, scene))
             if choice.resume and kept is None and _is_finished(folder, scene, comm):
-                terminal.say(comm, f"this run is finished; its results are in {folder}")
+                console.say(comm, f"this run is finished; its results are in {folder}")
                 if choice.open:
-                    terminal.open_page(comm, sorted(folder.glob("report.html")))
+                    console.open_page(comm, sorted(folder.glob("report.html")))
                 return
             with RunFigures(scene, comm) as figures:
                 with following(comm) as (begun, _):
@@ -49,9 +49,9 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                     run = Run(scene, comm, None if kept is None else kept.resolved)
                 if kept is not None:
                     run.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
-                terminal.show_plan(comm, run.coupling)
+                console.show_plan(comm, run.coupling)
                 if notice:
-                    terminal.say(comm, notice)
+                    console.say(comm, notice)
                 with CheckpointWriter(folder, run, lock.hold) as checkpoints:
                     failure = _make_load_steps(run, checkpoints, figures, interruption)
                     if run.steps:
@@ -61,7 +61,7 @@ def run_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None
                         raise failure
                     checkpoints.remove()
             if choice.open:
-                terminal.open_page(comm, files)
+                console.open_page(comm, files)
 
 
 def _earlier(
@@ -132,13 +132,13 @@ def _write(
     """Write and show the results, also of a run that ended early; return their files."""
     comm, files = run.comm, list[Path]()
     if failure is not None and _is_finished(folder, run.given, comm):
-        terminal.say(comm, f"the results of an earlier run to the end stay in {folder}")
+        console.say(comm, f"the results of an earlier run to the end stay in {folder}")
     elif run.steps:
         run.finish()
         files = write_results(folder, run, options=options, figures=figures)
         if run.scene.output.fields:
             files += write_fields(folder, run)
-        terminal.show_history(comm, run.history())
-        terminal.show_times(comm, run.clock.times)
-        terminal.show_files(comm, files)
+        console.show_history(comm, run.history())
+        console.show_times(comm, run.clock.times)
+        console.show_files(comm, files)
     return files

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
 from multiscale.console import case_progress, following
@@ -19,7 +20,6 @@ from multiscale.figures.files import (
     pictures_of,
     write_pictures,
 )
-from multiscale.output import terminal
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.output.results_folder import locked
@@ -56,15 +56,15 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
             on_root(comm, lambda: _remove_results(folder))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
         ranks = parts * place_in(comm)[1]
-        terminal.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
+        console.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
         with case_progress(comm, cases, parts) as observe:
             done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
         files = on_root(comm, lambda: _write_sweep(folder, done, scene.output.figures))
     for text in _summary(done):
-        terminal.say(comm, text)
-    terminal.show_files(comm, files)
+        console.say(comm, text)
+    console.show_files(comm, files)
     if done.unfinished:
-        terminal.say(comm, f"{done.unfinished} of {len(done)} cases are left to other parts")
+        console.say(comm, f"{done.unfinished} of {len(done)} cases are left to other parts")
     if failures := done.failures:
         name, reason = next(iter(failures.items()))
         raise NotConverged(
@@ -141,12 +141,12 @@ def diff_results(choice: argparse.Namespace, options: list[str], comm: Any) -> N
     folder = choice.out or Path("results") / f"{joined}{DIFF_ENDING}"
     with locked(folder, comm):
         files = on_root(comm, lambda: _write_difference(folder, both))
-    terminal.show_table(comm, both.table())
+    console.show_table(comm, both.table())
     if len(both.loads) > 1:
-        terminal.say(comm, f"ratios, {both.names[1]} over {both.names[0]}:")
-        terminal.show_table(comm, both.load_table(most=12))
+        console.say(comm, f"ratios, {both.names[1]} over {both.names[0]}:")
+        console.show_table(comm, both.load_table(most=12))
     for note in both.notes:
-        terminal.say(comm, f"note: {note}")
+        console.say(comm, f"note: {note}")
     show_study(choice, comm, files)
 
 
@@ -183,7 +183,7 @@ def write_study(
     files = [write_records(folder / f"{table}.csv", iter(of)) for table, of in tables.items()]
     drawn = Pictures({}) if drawing is None else pictures_of(drawing)
     if drawn.problem:
-        terminal.say(None, drawn.problem)
+        console.say(None, drawn.problem)
     files += write_pictures(folder, drawn)
     if page is not None:
         files.append(write_text(folder / f"{name}.html", page(drawn.files)))
@@ -198,9 +198,9 @@ def show_study(choice: argparse.Namespace, comm: Any, files: list[Path]) -> None
         comm: MPI communicator, or None.
         files: The files written.
     """
-    terminal.show_files(comm, files)
+    console.show_files(comm, files)
     if choice.open:
-        terminal.open_page(comm, files)
+        console.open_page(comm, files)
 
 
 def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> None:
@@ -233,7 +233,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
                 raise
         files = on_root(comm, lambda: write_comparison(folder, done, scene.output.figures))
         for text in (*headline(done), *frontier_lines(done), *done.warnings):
-            terminal.say(comm, text)
+            console.say(comm, text)
         show_study(choice, comm, files)
     if done.measure is None or (choice.against and done.against != choice.against):
         raise NotConverged(

@@ -1,1 +1,1 @@
-"""What a run writes and prints: tables, figures, report, fields, checkpoint, lines; its folder."""
+"""What a run writes: tables, figures, report, fields, checkpoint; its folder."""

@@ -19,7 +19,7 @@ command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
     "surface": (sys.modules["multiscale.setup"], "on_root_alone"),
-    "plan": (command.terminal, "show_plan"),
+    "plan": (command.console, "show_plan"),
     "laws": (PatchLaws, "make_laws"),
     "block": (PatchLaws, "_solver_of"),
     "load step": (CondensedLaws, "press"),

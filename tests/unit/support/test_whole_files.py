@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from geometry.patches import PatchGrid
+from multiscale.console import show_history
 from multiscale.loading.load_step import LoadStep, PatchState
 from multiscale.output.results import write_tables
-from multiscale.output.terminal import show_history
 from multiscale.results.history import PATCH_COLUMNS, History
 from support.errors import NotWritten
 from support.whole_files import write_csv, write_text

@@ -9,13 +9,12 @@ from dataclasses import replace
 
 import pytest
 
-from multiscale import Run, Scene, make_setup
+from multiscale import Run, Scene, console, make_setup
 from multiscale.auto import search
 from multiscale.auto.keys import auto_keys, chosen_coupling, resolved_sections
 from multiscale.inputs import cost
 from multiscale.inputs.cost import SOLUTIONS_OF_LAWS
 from multiscale.machine import ClusterNodes
-from multiscale.output import terminal
 from multiscale.output.provenance import provenance
 from multiscale.output.report import report_html
 from multiscale.readable import Caution
@@ -138,7 +137,7 @@ def test_an_accuracy_that_stated_keys_do_not_keep_is_said_everywhere(kind, force
     recorded = provenance(run, options=[])["accuracy"]
     assert recorded["kept"] is False and recorded["error"] == verdict.error
     assert f'<p class="warning">{said}</p>' in report_html(run, {}, provenance(run, options=[]))
-    terminal.show_history(None, history)
+    console.show_history(None, history)
     assert "caution: the accuracy of 0.001 % is not kept" in " ".join(
         capsys.readouterr().out.split()
     )
