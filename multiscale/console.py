@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
@@ -42,11 +42,6 @@ def quietly(quiet: bool) -> Iterator[None]:
         _QUIET.reset(token)
 
 
-def is_quiet() -> bool:
-    """Tell whether nothing but errors and cautions is printed."""
-    return _QUIET.get()
-
-
 def speaks(comm: Any) -> bool:
     """Tell whether this process prints and writes files.
 
@@ -54,11 +49,6 @@ def speaks(comm: Any) -> bool:
         comm: MPI communicator, or None.
     """
     return comm is None or comm.rank == 0
-
-
-def colours() -> Literal["auto"] | None:
-    """Return which colours a console of rich has: none, nor bold letters, with ``NO_COLOR``."""
-    return None if os.environ.get("NO_COLOR") else "auto"
 
 
 def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Console:
@@ -79,7 +69,7 @@ def console_of(comm: Any, *, least_width: int = 0, stderr: bool = False) -> Cons
         soft_wrap=not least_width,
         highlight=False,
         quiet=not speaks(comm) or (_QUIET.get() and not stderr),
-        color_system=colours(),
+        color_system=None if os.environ.get("NO_COLOR") else "auto",  # nor bold letters without
     )
     if least_width:
         console.width = max(console.width, least_width)
@@ -376,10 +366,10 @@ def show_history(comm: Any, history: Any) -> None:
     # A reference has one more column.
     console = console_of(comm, least_width=TABLE_WIDTH + 16 * (history.reference is not None))
     console.print(_table([name.replace(" [", "\n[") for name in header], rows))
-    if is_quiet():
+    if _QUIET.get():
         console = console_of(comm, stderr=True)
     for note in history.notes:
-        if is_quiet() and not isinstance(note, Caution):
+        if _QUIET.get() and not isinstance(note, Caution):
             continue
         label = "[bold yellow]caution:[/]" if isinstance(note, Caution) else "note:"
         console.print(f"{label} {escape(note)}")
