@@ -125,13 +125,7 @@ class MeshTerms(FaceTerms):
         count, body = self._resolved(count), raised(self.body)
 
         def of(one: MeshedBody) -> FaceCompliance:
-            fields = RectangleFields(
-                lengths=self.lengths,
-                count=count,
-                material=self.material,
-                extended=self.around.free_sides,
-            )
-            loads = fields if self.around.below else None
+            loads = self._fields(count) if self.around.below else None
             return mesh_face_compliance(
                 one, self.facets, self.rectangle, self.material, count, loads
             )
@@ -152,16 +146,7 @@ class MeshTerms(FaceTerms):
         count, body = max(self.modes, 2), raised(self.body)
 
         def compute() -> dict[str, Any]:
-            fields = [
-                RectangleFields(
-                    lengths=lengths,
-                    count=count,
-                    material=material,
-                    extended=self.around.free_sides,
-                    axis=axis,
-                )
-                for axis in range(3)
-            ]
+            fields = [self._fields(count, axis) for axis in range(3)]
             loads = fields if self.around.below else None
             found = mesh_face_tractions(body, self.facets, self.rectangle, material, count, loads)
             return {"tractions": found}
@@ -170,6 +155,16 @@ class MeshTerms(FaceTerms):
         without = half_space_traction_modes(lengths, material.poisson_ratio, count)
         matrix = whole - without / material.contact_modulus
         return TractionModes(lengths, seen_from_behind(matrix) if self.behind else matrix)
+
+    def _fields(self, count: int, axis: int = 2) -> RectangleFields:
+        """Return the fields of a half-space under tractions along an axis."""
+        return RectangleFields(
+            lengths=self.lengths,
+            count=count,
+            material=self.material,
+            extended=self.around.free_sides,
+            axis=axis,
+        )
 
     def _resolved(self, count: int) -> int:
         """Return as many modes along a side, or as many as the mesh itself resolves."""

@@ -64,15 +64,13 @@ class ReferenceSolver(StepSolver):
         self._last = states = tuple(one.problem.solve(control) for one in self.meshes)
         patches = self._patches
         finest, nominal = states[-1], patches.area * patches.count
-        # patches count whole nodes; all together they have the area with its border in the facets
-        share = (finest.contact_area or 0.0) / finest.nodal_area if finest.nodal_area else 0.0
         return LoadStep.of_patches(
             patches,
             plane=(finest.approach, *finest.tilt),
             load=(finest.force, *finest.moment),
             closure=finest.patch_closure,
             pressure=finest.patch_pressure,
-            area_fraction=share * finest.patch_area / patches.area,
+            area_fraction=_area_share(finest) * finest.patch_area / patches.area,
             separation=finest.mean_separation,
             contacts=finest.contacts,
             newton_iterations=sum(state.iterations for state in states),
@@ -97,12 +95,11 @@ class ReferenceSolver(StepSolver):
         nodes = nodal_contact(self.finest, latest)
         touching = np.flatnonzero(nodes.region >= 0)
         region, count = nodes.region[touching], latest.contacts
-        share = (latest.contact_area or 0.0) / latest.nodal_area if latest.nodal_area else 0.0
         top = touching[peaks_of(region, nodes.pressure[touching], count)]
         some = nodes.area > 1e-9 * nodes.area.max()  # quadratic triangles: vertices have none
         spots = Spots(
             place=np.stack([nodes.x[top], nodes.y[top]], axis=1),
-            area=share * np.bincount(region, nodes.area[touching], minlength=count),
+            area=_area_share(latest) * np.bincount(region, nodes.area[touching], minlength=count),
             force=np.bincount(region, nodes.force[touching], minlength=count).astype(np.float64),
             peak_pressure=nodes.pressure[top],
         )
@@ -147,3 +144,8 @@ class ReferenceSolver(StepSolver):
     def unknowns(self) -> int:
         """Degrees of freedom of the finest mesh."""
         return self.finest.body.dofs
+
+
+def _area_share(state: FaceEquilibrium) -> float:
+    """Return the contact area with its border in facets over that of whole nodes, as in patches."""
+    return (state.contact_area or 0.0) / state.nodal_area if state.nodal_area else 0.0

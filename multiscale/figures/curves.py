@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -48,13 +49,29 @@ def history_figure(history: Any, kind: str) -> Figure:
     draw_path(gap, 1e3 * history.mean_separation_mm, history.mean_pressure_MPa, falls, look)
     if history.reference is not None:
         draw_error_band(force, area, history, colour=colour)
-    area.set(ylabel="contact area fraction [%]")
-    for axis in (force.yaxis, area.xaxis, gap.yaxis):
-        show_unit(axis, "mean pressure", "MPa", history.mean_pressure_MPa)
-    show_unit(force.xaxis, "approach", "mm", history.approach_mm, 1e-3)
-    show_unit(gap.xaxis, "mean separation", "mm", history.mean_separation_mm, 1e-3)
+    label_response(force, area, gap, [history])
     add_legend(figure)
     return figure
+
+
+def label_response(force: Any, area: Any, gap: Any, histories: Sequence[Any]) -> None:
+    """Label axes of mean pressure, contact area and mean separation in units that suit all runs.
+
+    Args:
+        force: Axes of mean pressure over approach.
+        area: Axes of contact area over mean pressure.
+        gap: Axes of mean pressure over mean separation.
+        histories: What is drawn.
+    """
+    pressures, approaches, gaps = (
+        np.concatenate([getattr(history, name) for history in histories])
+        for name in ("mean_pressure_MPa", "approach_mm", "mean_separation_mm")
+    )
+    area.set(ylabel="contact area fraction [%]")
+    for axis in (force.yaxis, area.xaxis, gap.yaxis):
+        show_unit(axis, "mean pressure", "MPa", pressures)
+    show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
+    show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
 
 
 def draw_path(axes: Any, x: Any, y: Any, falls: Any, look: dict[str, Any]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from multiscale.figures.curves import draw_path
+from multiscale.figures.curves import draw_path, label_response
 from multiscale.figures.style import (
     BLUE,
     COLOURS,
@@ -252,15 +252,7 @@ def difference_figure(both: Difference) -> Figure:
         draw_path(force, 1e3 * history.approach_mm, pressure, falls, look)
         draw_path(area, pressure, 100 * history.contact_area_fraction, falls, look)
         draw_path(gap, 1e3 * history.mean_separation_mm, pressure, falls, look)
-    pressures, approaches, gaps = (
-        np.concatenate([getattr(history, name) for history in both.histories])
-        for name in ("mean_pressure_MPa", "approach_mm", "mean_separation_mm")
-    )
-    area.set(ylabel="contact area fraction [%]")
-    for axis in (force.yaxis, area.xaxis, gap.yaxis):
-        show_unit(axis, "mean pressure", "MPa", pressures)
-    show_unit(force.xaxis, "approach", "mm", approaches, 1e-3)
-    show_unit(gap.xaxis, "mean separation", "mm", gaps, 1e-3)
+    label_response(force, area, gap, both.histories)
     gap.locator_params(axis="x", nbins=6)
     force.legend()
     _draw_ratios(ratios, both)
