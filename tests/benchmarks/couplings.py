@@ -88,7 +88,7 @@ def together(model):
     """Press eight steps."""
     patches = PatchGrid(grid=(4, 4), lengths=model.surface.lengths)
     coupling = ContactSolver(model, patches, patch_means(model.surface, patches))
-    return [coupling.solver.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
+    return [coupling.press(Control(approach=APPROACH * k / 8)) for k in range(1, 9)]
 
 
 def by_contacts(body, face, cells):

@@ -34,7 +34,7 @@ def main():
     patches = PatchGrid(grid=(4, 4), lengths=surface.lengths)
     model = Watched(micro_model("half-space", surface, contact_modulus=4000.0))
     coupling = ContactSolver(model, patches, patch_means(surface, patches), COMM)
-    step = coupling.solver.press(Control(force=2.0, tilt=None))
+    step = coupling.press(Control(force=2.0, tilt=None))
     spots = coupling.detail(coupling.latest).spots
     found = [
         step.approach_mm, *step.tilt, step.contact_area_fraction, *step.patches.pressure_MPa,

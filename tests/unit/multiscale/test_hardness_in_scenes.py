@@ -107,7 +107,7 @@ def test_fields_of_a_resumed_run_are_those_of_the_whole_path():
     asked = scene("concurrent", output={"fields": "all", "check": "none", "figures": False})
     whole = Run(asked)
     steps = list(whole.load_steps())
-    coupling, kept = whole.coupling, whole.fields.kept
+    coupling, kept = whole.coupling, whole.observers.fields.kept
     again = FieldRecorder(coupling)
     start, latest, _ = coupling.solver.past
     again._complete(steps)

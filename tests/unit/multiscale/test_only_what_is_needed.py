@@ -17,6 +17,7 @@ from geometry import Asperities, PatchGrid
 from micro import AsperityModel, HalfSpaceModel
 from multiscale import Run, Scene, make_setup
 from multiscale.cli.command_line import main
+from multiscale.observers.step_observers import FieldRecorder
 from multiscale.output.results import write_results
 from multiscale.results.contact_record import ContactRecord
 
@@ -88,7 +89,7 @@ def never(*given, **options):
 
 
 def test_only_the_force_curve(monkeypatch, tmp_path):
-    monkeypatch.setattr(Run, "write_fields", never)
+    monkeypatch.setattr(FieldRecorder, "write", never)
     monkeypatch.setattr(HalfSpaceModel, "stiffness", never)
     block, output = data()["block"] | {"cells": [4, 4, 4]}, data()["output"] | {"contact": "none"}
     run = Run(Scene.from_dict(data("concurrent", block=block, output=output)))

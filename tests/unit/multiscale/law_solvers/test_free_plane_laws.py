@@ -75,13 +75,13 @@ def test_any_partition_turns_as_the_contacts_do(grid):
     for force in (0.3, 1.1, 2.0):
         control = Control(force=force, tilt=None)
         plane = model.press(control, patches=patches, mean_heights=means).plane
-        step = coupling.solver.press(control)
+        step = coupling.press(control)
         assert step.force_N == pytest.approx(force, rel=1e-8)
         assert step.approach_mm == pytest.approx(plane.approach, rel=1e-3)
         np.testing.assert_allclose(step.tilt, plane.tilt, atol=3e-3 * np.abs(plane.tilt).max())
         assert np.abs(step.moment_N_mm).max() < 1e-6 * force
     with pytest.raises(NotConverged, match="LAW_RANGE"):
-        coupling.solver.press(Control(force=3.0, tilt=None))
+        coupling.press(Control(force=3.0, tilt=None))
     other = FreePlaneLaws(table, lambda pressures: 6.0 * pressures @ compliance.T)
     with pytest.raises(NotConverged, match=r"the patches at .*make the laws for this block"):
         other.press(Control(force=2.0, tilt=None))

@@ -41,7 +41,7 @@ def test_whole_surface_comes_back(surface, grid, name):
     law = max(table.laws, key=lambda one: len(one.rows))
     rows = law.rows.approach[[len(law.rows) // 2, -1]]
     for approach in (*rows, 0.537 * END):
-        step = coupling.solver.press(Control(approach=approach))
+        step = coupling.press(Control(approach=approach))
         whole = respond(model, [approach], patches=patches, mean_heights=means)
         # at rows the micro model's own tolerance; between them that of the tables
         allowed = 1e-6 if approach in rows else 1e-3
@@ -112,7 +112,7 @@ def test_any_macro_model_finds_the_rows_again(surface, macro, tilt):
         control = Control(force=force, tilt=tilt)
         whole = model.press(control, patches=patches, mean_heights=means, start=start)
         plane, start = whole.plane, whole.start
-        step = coupling.solver.press(control)
+        step = coupling.press(control)
         assert step.force_N == pytest.approx(force, rel=1e-9)
         # the tables' tolerance of the force, of which the approach takes two thirds (Hertz)
         touch = table_touch(table)

@@ -42,7 +42,7 @@ def test_a_model_solved_at_every_step_speaks_for_itself(parts, body):
     _, model, means = parts
     model = replace(model, body=body)
     coupling = ContactSolver(model, PATCHES, means)
-    few, many = (coupling.solver.press(Control(approach=approach)) for approach in (4e-3, END))
+    few, many = (coupling.press(Control(approach=approach)) for approach in (4e-3, END))
     whole = model.press(Control(approach=END), patches=PATCHES, mean_heights=means)
     assert few.warnings == () and many.warnings == (whole.warning,) != ("",)
     assert noted([few]) == []
