@@ -20,7 +20,7 @@ from multiscale.results.body_fields import read_fields as read_fields
 from multiscale.results.contact_history import ContactHistory as ContactHistory
 from multiscale.results.contact_history import read_contact as read_contact
 from multiscale.results.history import History as History
-from multiscale.results.reading import read_history as read_history
+from multiscale.results.history import read_history as read_history
 from multiscale.results.reference_record import extrapolated as extrapolated
 from multiscale.run import Run as Run
 from multiscale.run import run as run

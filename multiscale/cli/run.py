@@ -11,8 +11,7 @@ from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
 from multiscale.console import following, run_progress
 from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
-from multiscale.output.field_files import write_fields
-from multiscale.output.results import RunFigures, write_results
+from multiscale.output.results import RunFigures, write_fields, write_results
 from multiscale.output.results_folder import (
     find_checkpoint,
     is_finished,

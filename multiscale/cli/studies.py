@@ -26,12 +26,11 @@ from multiscale.output.results_folder import locked
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.studies import errors
-from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.difference import Difference, difference
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
-from multiscale.studies.sweep import Statistics, SweepResults, sweep
+from multiscale.studies.sweep import Statistics, SweepResults, sweep, sweep_cases, values_from_text
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
 from support.whole_files import remove, write_text

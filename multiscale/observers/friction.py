@@ -60,7 +60,7 @@ class FrictionObserver(StepObserver):
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
         contact = history.contact
         if contact is not None and contact.slipping is not None:
-            yield "shear", "shear.shear_figure", (history, contact)
+            yield "shear", "contact.shear_figure", (history, contact)
 
     @property
     def _by_shift(self) -> bool:

@@ -14,7 +14,7 @@ from multiscale.figures import by_matplotlib
 from multiscale.figures.contact_scales import ContactScales
 from multiscale.readable import column
 from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecord
-from multiscale.results.reading import csv_rows, read_history, result_of_a_run
+from multiscale.results.history import csv_rows, read_history, result_of_a_run
 from support.arrays import Array
 from support.checked_store import check_hdf5
 from support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread

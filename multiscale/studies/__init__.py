@@ -1,9 +1,9 @@
 """Runs many scenes: for many values of their keys, or in every sensible way to compute one.
 
-    SweepCases, Configurations      what is run                            `cases`, `configurations`
+    sweep_cases, configurations     what is run                            `sweep`, `configurations`
     run_cases, CaseResult           runs it on any number of ranks, and goes on after a kill
-                                                                           `sweep`, `process`
-    SweepResults                    rows, means and bands of a sweep       `results`
+                                                                           `running`, `measured_run`
+    SweepResults                    rows, means and bands of a sweep       `sweep`
     Comparison                      error over time of all ways            `comparison`, `errors`
     Difference                      two runs beside each other             `difference`
 

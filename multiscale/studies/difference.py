@@ -25,8 +25,7 @@ from multiscale.readable import (
     usual_unit,
     with_error,
 )
-from multiscale.results.history import History
-from multiscale.results.reading import read_history, result_of_a_run
+from multiscale.results.history import History, read_history, result_of_a_run
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import flat
 from multiscale.studies import AT

@@ -12,7 +12,7 @@ from micro.conductance import STEFAN_BOLTZMANN
 from multiscale import Run, Scene, make_setup, run
 from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.results.reading import read_history
+from multiscale.results.history import read_history
 from support.errors import InputError
 
 LAWS = ("isolated", "consistent")

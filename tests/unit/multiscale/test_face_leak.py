@@ -14,7 +14,7 @@ from multiscale import Run, Scene
 from multiscale.exports.export import csv_text
 from multiscale.laws.flow_rows import sample_transmissivity
 from multiscale.output.results import write_results
-from multiscale.results.reading import read_history
+from multiscale.results.history import read_history
 from support.errors import InputError
 
 OIL = {"viscosity": "10 mPa s", "pressures": ["5 bar", "1 bar"], "inlet": "left", "outlet": "right"}

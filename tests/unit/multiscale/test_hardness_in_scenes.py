@@ -14,7 +14,7 @@ from multiscale.loading.energy import BALANCE, missing_energy
 from multiscale.observers.step_observers import FieldRecorder
 from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.results.reading import read_history
+from multiscale.results.history import read_history
 from support.errors import InputError
 
 HARDNESS = 300.0

@@ -12,7 +12,7 @@ from multiscale.observers import leak as observer
 from multiscale.observers.leak import leak_text
 from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
-from multiscale.results.reading import read_history
+from multiscale.results.history import read_history
 from support.errors import InputError
 
 WATER = {"viscosity": "1 mPa s", "pressures": ["2 bar", "1 bar"]}
