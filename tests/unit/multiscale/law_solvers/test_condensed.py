@@ -158,7 +158,7 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
     monkeypatch.setattr("macro.write_fields", lambda path, *what: written.append(what))
     for whole in (full, condensed):
         list(whole.load_steps())
-        whole.write_fields(Path("fields.xdmf"))
+        whole.observers.fields.write(Path("fields.xdmf"), whole.steps, finished=whole.finished)
         interface, steps = written.pop()
         ((number, displacement, pressure, *_),) = steps
         assert number == len(whole.steps)
