@@ -1,4 +1,7 @@
-"""Elements of high order for a block: Legendre polynomials along every axis, graded in depth.
+"""Functions along the axes of a block, whose products are its elements.
+
+Elements of high order are Legendre polynomials along every axis, graded in depth; `nodal` are those
+of hexahedra.
 
 On an element, t from −1 to 1, the shape functions are (1 ∓ t)/2 and
 (P_k − P_{k−2}) / √(2(2k − 1)) for k = 2 … p (Szabó & Babuška 1991, ch. 3). The slopes of the latter
@@ -15,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
+from scipy import linalg
 
 from geometry.legendre_modes import gauss_rule, mode_values
 from support.arrays import Array
@@ -47,23 +51,46 @@ class Line(NamedTuple):
         weights: Weights of the points, shape (m,) [mm].
         values: Values of n functions at the points, shape (n, m).
         slopes: Their slopes, shape (n, m) [1/mm].
-        end: Index of the one function that does not vanish at the last point of the line, where it
-            is 1.
-        modes: Integrals of Legendre modes times the functions, shape (modes, n) [mm]; none along z.
+        last: Their values at the last point of the line, shape (n,).
+        modes: Integrals of modes times the functions, shape (modes, n) [mm]; none along z.
         mode_slopes: Integrals of the modes times the slopes of the functions, shape (modes, n).
     """
 
     weights: Array
     values: Array
     slopes: Array
-    end: int
+    last: Array
     modes: Array
     mode_slopes: Array
 
     def of_parity(self, odd: int) -> Line:
         """Return the even (0) or the odd (1) functions of a line across the top."""
-        parts = (self.values[odd::2], self.slopes[odd::2])
-        return Line(self.weights, *parts, 0, self.modes[:, odd::2], self.mode_slopes[:, odd::2])
+        return self.combined(np.eye(len(self.values))[:, odd::2])
+
+    def held(self) -> Line:
+        """Return the functions of one parity that vanish at both ends."""
+        return self.combined(np.eye(len(self.values))[:, self.last == 0.0])
+
+    def combined(self, weights: Array) -> Line:
+        """Return other functions, sums of these.
+
+        Args:
+            weights: Weights of the functions in every sum, shape (n, sums).
+        """
+        parts = (weights.T @ part for part in (self.values, self.slopes, self.last))
+        return Line(self.weights, *parts, self.modes @ weights, self.mode_slopes @ weights)
+
+    def diagonalised(self) -> tuple[Line, Array]:
+        """Return functions that are orthonormal, as are their slopes up to length, and its square.
+
+        Returns:
+            Functions f with ∫ f_i f_j = δ_ij and ∫ f_i' f_j' = κ_i δ_ij, and κ, shape (n,) [1/mm²].
+        """
+        if not len(self.values):
+            return self, np.zeros(0)
+        squares = [(part * self.weights) @ part.T for part in (self.slopes, self.values)]
+        stiffness, vectors = linalg.eigh(*squares)
+        return self.combined(vectors), np.maximum(stiffness, 0.0)
 
 
 def across(length: float, degree: int, count: int) -> Line:
@@ -82,7 +109,7 @@ def across(length: float, degree: int, count: int) -> Line:
     modes = mode_values(half * (1.0 + t), length, count) * weights
     odd = np.add.outer(np.arange(count), np.arange(degree + 1)) % 2  # of the product with values
     integrals = np.where(odd, 0.0, modes @ values.T), np.where(odd, modes @ slopes.T, 0.0)
-    return Line(weights, values, slopes, 0, *integrals)
+    return Line(weights, values, slopes, (np.arange(degree + 1) < 2) * 1.0, *integrals)
 
 
 def upwards(ticks: Array, degrees: Sequence[int]) -> Line:
@@ -108,10 +135,49 @@ def upwards(ticks: Array, degrees: Sequence[int]) -> Line:
         np.outer(halves, weights).ravel(),
         values.reshape(flat),
         slopes.reshape(flat),
-        int(first[-2]),
+        (np.arange(len(values)) == first[-2]) * 1.0,
         none,
         none,
     )
+
+
+def nodal(ticks: Array, degree: int, borders: Array) -> Line:
+    """Return the functions of elements of one degree across a top, even and odd in turn.
+
+    Their products are those of hexahedra. Modes are 1 between two borders and 0 elsewhere.
+
+    Args:
+        ticks: Borders of the elements, ascending, those of each half mirrored, shape (n + 1,) [mm].
+        degree: Degree of the elements, 1 or 2.
+        borders: Borders of the modes, ascending, within the ticks, shape (modes + 1,) [mm].
+    """
+    pieces = np.union1d(ticks, np.clip(borders, ticks[0], ticks[-1]))
+    halves, middles = 0.5 * np.diff(pieces), 0.5 * (pieces[1:] + pieces[:-1])
+    points, weights = legendre.leggauss(degree + 1)
+    element = np.searchsorted(ticks, middles) - 1
+    start, width = ticks[element][:, None], np.diff(ticks)[element][:, None]
+    place = (middles[:, None] + np.outer(halves, points) - start) / width  # 0 to 1 in the element
+    nodes = np.arange(degree + 1) / degree
+    values, slopes = np.zeros((2, degree * (len(ticks) - 1) + 1, *place.shape))
+    for k, node in enumerate(nodes):
+        shape = np.poly1d(np.delete(nodes, k), r=True)
+        shape /= shape(node)
+        at = degree * element + k, np.arange(len(element))
+        values[at], slopes[at] = shape(place), shape.deriv()(place) / width
+    count, last = len(values), np.eye(1, len(values), len(values) - 1)[0]
+    own = np.searchsorted(borders, middles) - 1 == np.arange(len(borders) - 1)[:, None]
+    areas = np.repeat(own, degree + 1, axis=1) * np.outer(halves, weights).ravel()
+    flat = (count, -1)
+    values, slopes = values.reshape(flat), slopes.reshape(flat)
+    line = Line(
+        np.outer(halves, weights).ravel(), values, slopes, last, areas @ values.T, areas @ slopes.T
+    )
+    mirrored = np.zeros((count, count))
+    for k in range(count):
+        sign, pair = 1.0 - 2.0 * (k % 2), k // 2
+        mirrored[pair, k] = sign
+        mirrored[count - 1 - pair, k] = 1.0
+    return line.combined(mirrored)
 
 
 def _shape_functions(t: Array, degree: int) -> tuple[Array, Array]:

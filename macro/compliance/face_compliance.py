@@ -17,12 +17,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse import csr_matrix
 
 from geometry.materials import Material
 from macro.compliance.cache import cached
 from macro.compliance.elements import Line, block_lines
+from macro.compliance.product_stiffness import ProductStiffness
 from support.arrays import Array, Indices
 from support.collective import shared
 from support.errors import InputError
@@ -32,6 +31,9 @@ if TYPE_CHECKING:
 
 Parity = tuple[int, int]
 """Parity of a pressure along x and along y: 0 even, 1 odd."""
+
+PARITIES: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
+"""All parities of a pressure; any pressure is the sum of four that have them."""
 
 
 class Response(NamedTuple):
@@ -76,18 +78,22 @@ class ParityBlock:
 
     def response(self) -> Response:
         """Return the displacements and strains of the top by the modes of the parity."""
-        (ux, uy, _), (vx, vy, _), (wx, wy, z) = self._lines
+        (ux, uy, _), (vx, vy, _), (wx, wy, _) = self._stiffness.lines
         odd_x, odd_y = self.parity
-        tops, growth = self._solved({2: -self._modes(2)}, z.end)
+        tops, solved = self._stiffness.solve({2: -self._modes(2)})
         sizes = len(wx.modes[odd_x::2]), len(wy.modes[odd_y::2])
 
         def seen(top: Array, along_x: Array, along_y: Array, *, shear: bool = False) -> Array:
             x, y = along_x[(odd_x + shear) % 2 :: 2], along_y[(odd_y + shear) % 2 :: 2]
-            return np.asarray(np.kron(x, y) @ top).reshape(len(x), len(y), *sizes)
+            return np.einsum("ka,lb,abm->klm", x, y, top, optimize=True).reshape(
+                len(x), len(y), *sizes
+            )
 
         u, v, w = tops
         along_y = seen(u, ux.modes, uy.mode_slopes, shear=True)
         along_x = seen(v, vx.mode_slopes, vy.modes, shear=True)
+        # derivative of the inverse stiffness when all elements grow in proportion
+        growth = -self._stiffness.growth(solved) / self.height
         return Response(
             normal=-seen(w, wx.modes, wy.modes),
             xx=seen(u, ux.mode_slopes, uy.modes),
@@ -107,16 +113,30 @@ class ParityBlock:
             times displacements, shape (k, l, m, n) each as in `Response` [mm³/MPa].
         """
         loads = [(-1.0 if axis == 2 else 1.0) * self._modes(axis) for axis in range(3)]
-        tops, _ = self._solved(dict(enumerate(loads)), self._lines[2][2].end)
+        tops, _ = self._stiffness.solve(dict(enumerate(loads)))
         splits = np.cumsum([len(load) for load in loads])[:2]
         shapes = [self._counts(axis) for axis in range(3)]
         return [
             [
-                (load @ part).reshape(*shapes[seen], *shapes[by])
-                for by, part in enumerate(np.split(top, splits, axis=1))
+                np.tensordot(load, part).reshape(*shapes[seen], *shapes[by])
+                for by, part in enumerate(np.split(top, splits, axis=2))
             ]
             for seen, (load, top) in enumerate(zip(loads, tops, strict=True))
         ]
+
+    def between_modes(self, loaded: Indices) -> Array:
+        """Return what the parts of this parity in modes without parity displace.
+
+        Args:
+            loaded: Indices of the modes of pressure among products of modes along x and y, (m,).
+
+        Returns:
+            Integrals of all products of modes times displacements downwards, shape (modes, m).
+        """
+        x, y, _ = self._stiffness.lines[2]
+        modes = _products(x.modes, y.modes)
+        (_, _, along_z), _ = self._stiffness.solve({2: modes[loaded]})
+        return np.tensordot(modes, along_z)
 
     def parity_of(self, axis: int) -> Parity:
         """Return the parity of displacements and tractions along an axis: 0 x, 1 y, 2 z."""
@@ -124,134 +144,33 @@ class ParityBlock:
         return (odd_x + (axis == 0)) % 2, (odd_y + (axis == 1)) % 2
 
     def _modes(self, axis: int) -> Array:
-        """Return the forces of modes of traction on the unknowns (ix, iy) of a component."""
-        (x, y, _), (odd_x, odd_y) = self._lines[axis], self.parity_of(axis)
-        return np.kron(x.modes[odd_x::2], y.modes[odd_y::2])
+        """Return the forces of modes of traction on functions of a component, (modes, nx, ny)."""
+        (x, y, _), (odd_x, odd_y) = self._stiffness.lines[axis], self.parity_of(axis)
+        return _products(x.modes[odd_x::2], y.modes[odd_y::2])
 
     def _counts(self, axis: int) -> tuple[int, int]:
         """Return how many modes along x and y a traction has."""
-        (x, y, _), (odd_x, odd_y) = self._lines[axis], self.parity_of(axis)
+        (x, y, _), (odd_x, odd_y) = self._stiffness.lines[axis], self.parity_of(axis)
         return len(x.modes[odd_x::2]), len(y.modes[odd_y::2])
 
-    def _solved(self, loads: dict[int, Array], end: int) -> tuple[list[Array], Array]:
-        """Solve for the displacements by loads on the top.
-
-        Args:
-            loads: By component forces on its unknowns (ix, iy) of the top, shape (m, n) [N].
-            end: Index iz of the unknowns of the top.
-
-        Returns:
-            The displacements of the top by component, shape (unknowns, m), and the derivative of
-            the work of every load along every displacement with respect to the height, (m, m).
-        """
-        sizes = [part.shape for part in self._free]
-        splits = np.cumsum([part.size for part in self._free])
-        free = np.concatenate([part.ravel() for part in self._free])
-        count, first = sum(map(len, loads.values())), 0
-        forces = np.zeros((len(free), count))
-        for axis, load in loads.items():
-            own = np.split(forces, splits[:2])[axis].reshape(-1, sizes[axis][2], count)
-            own[:, end, first : first + len(load)] = load.T
-            first += len(load)
-        solved = _solution(self._stiffness()[free][:, free], forces[free])
-        displacements = np.zeros_like(forces)  # also where a roller constrains
-        displacements[free] = solved
-        tops = [
-            part.reshape(-1, size[2], count)[:, end]
-            for part, size in zip(np.split(displacements, splits[:2]), sizes, strict=True)
-        ]
-        # derivative of the inverse stiffness when all elements grow in proportion
-        change = self._stiffness(by_height=True)[free][:, free]
-        return tops, -solved.T @ (change @ solved)
-
     @cached_property
-    def _lines(self) -> list[tuple[Line, Line, Line]]:
-        """Shape functions along x, y and z by component of the displacement."""
+    def _stiffness(self) -> ProductStiffness:
+        """The stiffness, on functions of the parity of each component."""
         x, y, z = self.lines
-        return [
-            (x.of_parity(odd_x), y.of_parity(odd_y), z)
+        lines = [
+            [x.of_parity(odd_x), y.of_parity(odd_y), z]
             for odd_x, odd_y in map(self.parity_of, range(3))
         ]
-
-    @cached_property
-    def _free(self) -> list[NDArray[np.bool_]]:
-        """Which unknowns (ix, iy, iz) no roller constrains, by component."""
-        free = [np.ones([len(line.values) for line in lines], bool) for lines in self._lines]
         if self.sides == "roller":
             for axis in (0, 1):
-                np.moveaxis(free[axis], axis, 0)[self._lines[axis][axis].end] = False
-        return free
-
-    def _stiffness(self, *, by_height: bool = False) -> csr_matrix:
-        """Return the stiffness of all unknowns (component, ix, iy, iz) [N/mm].
-
-        Args:
-            by_height: Return its derivative with respect to the block's height instead [N/mm²].
-        """
-        lame, shear = self.material.lame
-        sizes = [math.prod(len(line.values) for line in lines) for lines in self._lines]
-        starts = np.cumsum([0, *sizes])
-        entries: list[tuple[Array, Indices, Indices]] = []
-
-        def add(row: int, column: int, slopes: tuple[int, int], weight: float) -> None:
-            values, at, other = self._product((row, column), slopes, by_height)
-            entry = weight * values, starts[row] + at, starts[column] + other
-            entries.append(entry)
-            if row != column:
-                entries.append((entry[0], entry[2], entry[1]))
-
-        for row in range(3):
-            for axis in range(3):
-                add(row, row, (axis, axis), lame + 2.0 * shear if axis == row else shear)
-            for column in range(row):
-                add(row, column, (row, column), lame)
-                add(row, column, (column, row), shear)
-        values, rows, columns = (np.concatenate(part) for part in zip(*entries, strict=True))
-        return csr_matrix((values, (rows, columns)), shape=(starts[-1], starts[-1]))
-
-    def _product(
-        self, components: tuple[int, int], slopes: tuple[int, int], by_height: bool
-    ) -> tuple[Array, Indices, Indices]:
-        """Return the integrals of products of two components' slopes, or their derivative.
-
-        Args:
-            components: Component of the rows, and of the columns.
-            slopes: Axis of the slopes of the rows' component, and of the columns'.
-            by_height: Return the derivative with respect to the height instead.
-
-        Returns:
-            The integrals that are not zero, with their rows and columns, shape (n,) each.
-        """
-        # with the height λ of elements integrals over z grow as λ, and slopes along z as 1/λ
-        share = (1.0 - slopes.count(2)) / self.height if by_height else 1.0
-        values, rows, columns = np.array([share]), np.zeros(1, np.intp), np.zeros(1, np.intp)
-        for axis in range(3):
-            one, other = (self._lines[component][axis] for component in components)
-            left = one.slopes if axis == slopes[0] else one.values
-            right = other.slopes if axis == slopes[1] else other.values
-            matrix = (left * one.weights) @ right.T
-            # smaller entries are the rounding of integrals that are zero
-            at, where = np.nonzero(np.abs(matrix) > 1e-13 * np.abs(matrix).max(initial=0.0))
-            # the Kronecker product
-            values = np.multiply.outer(values, matrix[at, where]).ravel()
-            rows = np.add.outer(rows * len(matrix), at).ravel()
-            columns = np.add.outer(columns * matrix.shape[1], where).ravel()
-        return values, rows, columns
+                lines[axis][axis] = lines[axis][axis].held()
+        return ProductStiffness(lines, self.material)
 
 
-def _solution(stiffness: csr_matrix, right: Array) -> Array:
-    """Solve for many right-hand sides."""
-    from petsc4py import PETSc  # a compliance that is in the cache takes none
-
-    from macro.linear_solvers.solvers import solved_at_once
-
-    pattern = (part.astype(PETSc.IntType) for part in (stiffness.indptr, stiffness.indices))
-    csr = (*pattern, stiffness.data)
-    matrix = PETSc.Mat().createAIJ(stiffness.shape, csr=csr, comm=PETSc.COMM_SELF)
-    matrix.setOption(PETSc.Mat.Option.SPD, True)
-    solution = solved_at_once(matrix, right)
-    matrix.destroy()
-    return solution
+def _products(along_x: Array, along_y: Array) -> Array:
+    """Return the products of functions (k, a) along x and (l, b) along y, shape (k l, a, b)."""
+    products = along_x[:, None, :, None] * along_y[None, :, None, :]
+    return np.asarray(products.reshape(-1, *products.shape[2:]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -337,8 +256,7 @@ def face_compliance(
     if count < 1:
         raise InputError("a top has one mode at least", value=count, allowed="K ≥ 1")
     lines = block_lines(lengths, height, count)
-    parities: tuple[Parity, ...] = ((0, 0), (0, 1), (1, 0), (1, 1))
-    families = [parity for parity in parities if max(parity) < count]
+    families = [parity for parity in PARITIES if max(parity) < count]
     alike = lengths[0] == lengths[1]
     if alike and count > 1:
         families.remove((1, 0))

@@ -15,7 +15,7 @@ import numpy as np
 from geometry.materials import Material
 from macro.compliance.cache import cached
 from macro.compliance.elements import block_lines
-from macro.compliance.face_compliance import Parity, ParityBlock
+from macro.compliance.face_compliance import PARITIES, Parity, ParityBlock
 from support.arrays import Array
 from support.collective import shared
 
@@ -50,16 +50,16 @@ def face_tractions(
     """
 
     def compute() -> dict[str, Array]:
-        lines, families = block_lines(lengths, height, count), ((0, 0), (0, 1), (1, 0), (1, 1))
+        lines = block_lines(lengths, height, count)
 
         def block(parity: Parity) -> ParityBlock:
             return ParityBlock(
                 lines=lines, height=height, material=material, sides=sides, parity=parity
             )
 
-        parts = shared(comm, 4, lambda index: block(families[index]).traction_response())
+        parts = shared(comm, 4, lambda index: block(PARITIES[index]).traction_response())
         total = np.zeros((3, 3, *4 * (count,)))
-        for parity, response in zip(families, parts, strict=True):
+        for parity, response in zip(PARITIES, parts, strict=True):
             odd = [block(parity).parity_of(axis) for axis in range(3)]
             for seen, row in enumerate(response):
                 for by, part in enumerate(row):

@@ -175,13 +175,10 @@ class Bodies:
         from macro import displacements_under
 
         def displacements(pressures: Array) -> Array:
-            loaded = np.flatnonzero(pressures.any(axis=0)).tolist()
+            loaded = np.flatnonzero(pressures.any(axis=0))
             if len(loaded) > solutions:
                 return displacements_under(self.contact_face(), pressures)
-            total = np.zeros(pressures.shape)
-            for patch in loaded:
-                total += pressures[:, [patch]] * self._by_unit_load(patch)
-            return total
+            return np.asarray(pressures @ self.loaded_compliance(loaded).T)
 
         return displacements
 
@@ -194,28 +191,47 @@ class Bodies:
         Note:
             Collective; one solution of the mesh for each patch that has not been loaded before.
         """
+        new = [patch for patch in loaded.tolist() if patch not in self._columns]
+        if new:
+            found = self._cached("columns", tuple(new), lambda: self._under(np.array(new)))
+            self._columns.update(zip(new, found.T, strict=True))
         compliance = np.zeros(2 * (self.parts.patches.count,))
         for patch in loaded.tolist():
-            compliance[:, patch] = self._by_unit_load(patch)
+            compliance[:, patch] = self._columns[patch]
         return compliance
 
-    def _by_unit_load(self, patch: int) -> Array:
-        """Return the mean displacements of the mesh by unit pressure on one patch, shape (N,)."""
-        from mpi4py import MPI
+    def _under(self, loaded: Indices) -> Array:
+        """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
+        parts = self.parts
+        if self.needs_no_mesh:
+            from macro.compliance.lattice_patches import lattice_compliance
 
+            shape, sides = parts.body.shape, block_section(parts.scene).sides
+            assert shape is not None
+            material = parts.materials.first
+            return lattice_compliance(shape, material, sides, parts.patches, loaded, self.comm)
         from macro import displacements_under
+
+        loads = np.eye(parts.patches.count)[loaded]
+        return displacements_under(self.contact_face(), loads).T
+
+    @property
+    def needs_no_mesh(self) -> bool:
+        """Whether patches are solved for without a mesh: on one block of hexahedra."""
+        shape = self.parts.body.shape
+        return self.counter is None and shape is not None and shape.hexahedral
+
+    def _cached(self, kind: str, more: Any, compute: Callable[[], Array]) -> Array:
+        """Return an array that depends on the meshes and patches, from the cache if it is there."""
         from macro.compliance.cache import cached
-        from macro.linear_solvers.options import users_options
 
-        def compute() -> dict[str, Array]:
-            one = np.eye(1, self.parts.patches.count, patch)
-            return {"column": displacements_under(self.contact_face(), one)[0]}
+        options: tuple[Any, ...] = ()
+        if not self.needs_no_mesh:
+            from macro.linear_solvers.options import users_options
 
-        if patch not in self._columns:
-            key = (*self._as_text(), self.parts.patches, users_options(), patch)
-            found = cached("column", key, compute, self.comm or MPI.COMM_SELF)
-            self._columns[patch] = found["column"]
-        return self._columns[patch]
+            options = users_options()
+        key = (*self._as_text(), self.parts.patches, options, more)
+        return cached(kind, key, lambda: {kind: compute()}, self.comm)[kind]
 
     @cached_property
     def _columns(self) -> dict[int, Array]:
@@ -242,14 +258,13 @@ class Bodies:
         if self.parts.scene.decomposed:
             return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
         from macro import patch_compliance_matrix
-        from macro.compliance.cache import cached
-        from macro.linear_solvers.options import users_options
 
-        def compute() -> dict[str, Array]:
-            return {"compliance": patch_compliance_matrix(self.contact_face())}
+        def compute() -> Array:
+            if self.needs_no_mesh:
+                return self._under(np.arange(self.parts.patches.count))
+            return patch_compliance_matrix(self.contact_face())
 
-        key = (*self._as_text(), self.parts.patches, users_options())
-        return cached("plain", key, compute, self.comm)["compliance"]
+        return self._cached("plain", (), compute)
 
     def mean_compliance(self) -> float:
         """Return the mean displacement of the face by a uniform unit pressure [mm/MPa].
