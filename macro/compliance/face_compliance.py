@@ -135,8 +135,13 @@ class ParityBlock:
         """
         x, y, _ = self._stiffness.lines[2]
         modes = _products(x.modes, y.modes)
-        (_, _, along_z), _ = self._stiffness.solve({2: modes[loaded]})
-        return np.tensordot(modes, along_z)
+        # of a mode and its mirror image the parts of one parity are alike, up to their sign
+        (x_of, x_sign), (y_of, y_sign) = _alike(x.modes), _alike(y.modes)
+        alike = np.add.outer(x_of * len(y_of), y_of).ravel()[loaded]
+        different, which = np.unique(alike, return_inverse=True)
+        (_, _, along_z), _ = self._stiffness.solve({2: modes[different]})
+        signs = np.multiply.outer(x_sign, y_sign).ravel()[loaded]
+        return np.asarray(np.tensordot(modes, along_z)[:, which] * signs)
 
     def parity_of(self, axis: int) -> Parity:
         """Return the parity of displacements and tractions along an axis: 0 x, 1 y, 2 z."""
@@ -165,6 +170,18 @@ class ParityBlock:
             for axis in (0, 1):
                 lines[axis][axis] = lines[axis][axis].held()
         return ProductStiffness(lines, self.material)
+
+
+def _alike(modes: Array) -> tuple[Indices, Array]:
+    """Return for every mode the first one that is equal up to its sign, and the sign, (n,) both."""
+    slack = 1e-12 * np.abs(modes).max(initial=0.0)
+    first, sign = np.arange(len(modes)), np.ones(len(modes))
+    for n, mode in enumerate(modes):
+        for way in (-1.0, 1.0):
+            alike = np.all(np.abs(modes[:n] - way * mode) <= slack, axis=1)
+            if alike.any():
+                first[n], sign[n] = np.argmax(alike), way
+    return first, sign
 
 
 def _products(along_x: Array, along_y: Array) -> Array:

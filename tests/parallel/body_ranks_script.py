@@ -8,8 +8,10 @@ from unittest import mock
 import numpy as np
 from mpi4py import MPI
 
+from geometry import BlockShape, PatchGrid
 from macro import Material, face_compliance
 from macro.compliance import face_compliance as module
+from macro.compliance.lattice_patches import lattice_compliance
 
 COMM = MPI.COMM_WORLD
 MATERIAL = Material(young_modulus=1.0, poisson_ratio=0.3)
@@ -50,6 +52,11 @@ if __name__ == "__main__":
     result = {name: made(face_compliance, *block) for name, block in BLOCKS.items()}
     result["kept, first"] = made(partial(face_compliance, use_cache=True), *BLOCKS["square"])
     result["kept, again"] = made(partial(face_compliance, use_cache=True), *BLOCKS["square"])
+    shape = BlockShape(interface=(1.0, 1.0), height=0.7, cells=(6, 6, 4))
+    patches = PatchGrid(grid=(5, 5), lengths=(1.0, 1.0))
+    on_lattice = lattice_compliance(shape, MATERIAL, "free", patches, np.arange(25), COMM)
+    assert all((on_lattice == other).all() for other in COMM.allgather(on_lattice))
+    result["patches"] = on_lattice.tolist()
     errors = failed()
     if COMM.rank == 0:
         sys.stdout.write(json.dumps({"values": result, "errors": errors}) + "\n")
