@@ -3,7 +3,7 @@
 The displacements are those of the elements in the block's mesh, as all their functions are
 products of functions along the axes.
 
-Theory: section 11 of ``docs/theory.md``.
+Theory: sections 6 and 11 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

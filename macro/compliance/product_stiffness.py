@@ -10,7 +10,7 @@ shape of the block and on Poisson's ratio, not on elements. To a residual of 1e-
 on a free cube with ν = 0.15, 26 on a block three times as tall as wide with 0.3, and 24 on one
 of 0.3 of its width with 0.45. No matrix is assembled.
 
-Theory: section 11 of ``docs/theory.md``.
+Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations

@@ -161,10 +161,10 @@ class Bodies:
         Note:
             Collective.
         """
-        if dense:
+        if dense and not self._by_patch:
             compliance = self.patch_compliance()
             return lambda pressures: np.asarray(pressures @ compliance.T)
-        return self._by_loaded_patches(solutions)
+        return self._by_loaded_patches(self.parts.patches.count if dense else solutions)
 
     def _by_loaded_patches(self, solutions: int) -> Displacements:
         """Return what gives displacements of the mesh, from those by patches that carry a load.
@@ -199,6 +199,23 @@ class Bodies:
         for patch in loaded.tolist():
             compliance[:, patch] = self._columns[patch]
         return compliance
+
+    def compliance_under(self, loaded: Indices) -> Array:
+        """Return the compliance of both sides where only some patches can carry load, (N, N).
+
+        Args:
+            loaded: Indices of these patches; columns of others may be zero.
+
+        Note:
+            Collective.
+        """
+        return self.loaded_compliance(loaded) if self._by_patch else self.patch_compliance()
+
+    @property
+    def _by_patch(self) -> bool:
+        """Whether the compliance is cheapest patch by patch."""
+        rigid = self.parts.materials.second is None
+        return self.needs_no_mesh and rigid and not self.parts.scene.decomposed
 
     def _under(self, loaded: Indices) -> Array:
         """Return the mean displacements of the mesh by unit pressures one at a time, (N, m)."""
