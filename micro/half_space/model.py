@@ -26,24 +26,15 @@ from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.solver import touches_few_cells
-from micro.complementarity.tangent import approach_stiffness
 from micro.half_space.cell_sums import summed
+from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices
 from support.cores import blas_threads
-from support.errors import InputError, NotConverged
+from support.errors import InputError
 
-_BACK, _SAFETY = 0.05, 1.5
-"""Part of the largest interference that the plane goes back by where cells yield anew, and error of
-the stiffness over what going back half and twice as far changes it by. On 24 surfaces of 64² cells,
-of which half or nearly all that touch yield, the error was 1.5 times that or less on 21 and at most
-twice that. As single cells come and go, it is 10 % in the median where 40 cells yield."""
-_ROUGH = 1e-5
-"""Residual of the solutions there. Stiffnesses then differ by 4e-6 at most from those with 1e-8."""
 _QUICK_CELLS = 2**14
 """Cells of a period on which a solution from one nearby takes milliseconds."""
-_ROUNDING = 1e-7
-"""Plastic depth, relative to the largest interference, that counts as none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,7 +213,7 @@ class HalfSpaceModel:
         if control.force == 0.0:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
-        solved, plane = self._solved(control, start, depth, displaced)
+        solved, plane = self.pressures_under(control, start, depth, displaced)
         yielding, pressure = self._bound.reached(solved.pressure), solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
@@ -259,7 +250,7 @@ class HalfSpaceModel:
         interference = self.interference(
             RigidPlane.moved(self.surface, control.prescribed(np.zeros(3)))
         )
-        if not touches_few_cells(self._problem(interference, control.free, control.loads)):
+        if not touches_few_cells(self.problem(interference, control.free, control.loads)):
             return None
         count = np.count_nonzero(interference > 0.0)
         return replace(self, few=np.argsort(-interference, axis=None, kind="stable")[:count])
@@ -281,37 +272,8 @@ class HalfSpaceModel:
         return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
-        """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`.
-
-        It follows from a linear solution, unless cells yield further. Then the plane is withdrawn
-        by finite increments, because cells keep entering that soon carry the hardness, which the
-        derivative for a fixed set of cells leaves out.
-        """
-        largest = float(self.interference(state.plane, state.earlier_depth).max())
-        if not self._yields_anew(state, largest):
-            value, used = self._elastic_stiffness(state, turns=turns)
-            return Stiffness(value if np.isfinite(value) else None, used)
-        tilt, rates, used = None if turns else state.tilt, [], 0
-        here = start = replace(state.guess, plastic_depth=state.earlier_depth)
-        cell = float(np.prod(self.surface.spacing))
-        for part in (0.5, 1.0, 2.0):
-            back = part * _BACK * largest
-            behind = Control(approach=state.approach - back, tilt=tilt)
-            try:
-                found, plane = self._solved(behind, start, here.plastic_depth, tolerance=_ROUGH)
-            except NotConverged as error:
-                return Stiffness(None, used + error.iterations)
-            pressure = found.pressure * self.contact_modulus
-            rates.append((state.force - float(pressure.sum()) * cell) / back)
-            used += found.iterations
-            # the next one is twice as far away
-            there = Start(plane=plane, values=pressure, by_slopes=found.by_slopes)
-            start = replace(here.towards(there, 2.0), nearby=())
-        # one cell that enters, up to the hardness or as far as it is displaced
-        bears = (self.hardness or 0.0) * cell / (_BACK * largest)
-        one = min(bears, self.contact_modulus * float(np.sqrt(cell)))
-        change = max(one, float(np.abs(np.diff(rates)).max()))
-        return Stiffness(rates[1], used, _SAFETY * change)
+        """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`."""
+        return stiffness(self, state, turns=turns)
 
     def interface_stiffness(self, state: ContactState) -> float:
         """Return the elastic dF/dδ of the contacts on half-spaces, without body and slopes [N/mm].
@@ -322,7 +284,7 @@ class HalfSpaceModel:
             state: A solution of this model.
         """
         alone = replace(self, sides=None, body=None, slopes=())
-        return alone._elastic_stiffness(state, turns=False)[0]
+        return elastic_stiffness(alone, state, turns=False)[0]
 
     @cached_property
     def compliance(self) -> Compliance:
@@ -337,7 +299,7 @@ class HalfSpaceModel:
             few=self.few,
         )
 
-    def _solved(
+    def pressures_under(
         self,
         control: Control,
         start: Start | None,
@@ -345,9 +307,14 @@ class HalfSpaceModel:
         displaced: Array | None = None,
         tolerance: float = 0.0,
     ) -> tuple[ContactPressures, RigidPlane]:
-        """Return pressures / E* and the plane, on a surface with a plastic depth.
+        """Return the solution of a contact problem without its sums: pressures / E* and the plane.
 
-        Where a tolerance is larger than the model's, the solution is no more accurate than that.
+        Args:
+            control: What is prescribed.
+            start: What the solution may start from.
+            depth: Plastic depth of the surface, shape (nx, ny) [mm]; None: none.
+            displaced: As for `press`.
+            tolerance: Largest residual, where it is larger than the model's.
         """
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
@@ -355,7 +322,7 @@ class HalfSpaceModel:
             interference = interference - displaced
         if self.periodic:
             self._check_periodic(control, interference)
-        problem, first = self._problem(interference, control.free, control.loads), None
+        problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
@@ -381,29 +348,6 @@ class HalfSpaceModel:
         moved = grid.displacement(np.divide(pressure, self.contact_modulus))
         return moved if by_slopes is None else moved + by_slopes
 
-    def _elastic_stiffness(self, state: ContactState, *, turns: bool) -> tuple[float, int]:
-        """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.
-
-        It is that of unloading: cells that yield bear less than the hardness then.
-        """
-        free = np.array([False, turns, turns])
-        interference = self.interference(state.plane, state.earlier_depth)
-        problem = self._problem(interference, free, np.zeros(3))
-        if state.by_slopes is not None:
-            lowered = state.by_slopes
-            problem = replace(problem, interference=interference - lowered, lowered=lowered)
-        with blas_threads(1):
-            rate, products = approach_stiffness(problem, state.pressures / self.contact_modulus)
-        return rate * self.contact_modulus * float(np.prod(self.surface.spacing)), products
-
-    def _yields_anew(self, state: ContactState, largest: float) -> bool:
-        """Tell whether the load of a state has left plastic depth; ``largest`` is interference."""
-        if state.plastic_depth is None:
-            return False
-        before = 0.0 if state.earlier_depth is None else state.earlier_depth
-        anew = float((state.plastic_depth - before).max())
-        return anew > max(_ROUNDING, 10.0 * self.tolerance) * largest
-
     @property
     def _bound(self) -> PressureBound:
         """Largest pressures over E*."""
@@ -415,7 +359,7 @@ class HalfSpaceModel:
         """Motions of the plane, approach and slopes, that move its corners by 1 mm, shape (3,)."""
         return motion_units(0.5 * float(np.hypot(*self.surface.lengths)))
 
-    def _problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
+    def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
         """Return the contact problem of a plane.
 
         Args:

@@ -172,11 +172,12 @@ class Bodies:
         Args:
             solutions: Patches that are loaded one by one, at most.
         """
-        from macro import displacements_under
 
         def displacements(pressures: Array) -> Array:
             loaded = np.flatnonzero(pressures.any(axis=0))
             if len(loaded) > solutions:
+                from macro import displacements_under
+
                 return displacements_under(self.contact_face(), pressures)
             return np.asarray(pressures @ self.loaded_compliance(loaded).T)
 
@@ -274,11 +275,12 @@ class Bodies:
         """Return the compliance of the meshes under the patches, of the first body or of both."""
         if self.parts.scene.decomposed:
             return self.terms(side_term=True).patch_compliance(self.parts.patches, self.comm)
-        from macro import patch_compliance_matrix
 
         def compute() -> Array:
             if self.needs_no_mesh:
                 return self._under(np.arange(self.parts.patches.count))
+            from macro import patch_compliance_matrix
+
             return patch_compliance_matrix(self.contact_face())
 
         return self._cached("plain", (), compute)
