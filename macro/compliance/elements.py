@@ -77,8 +77,9 @@ class Line(NamedTuple):
         Args:
             weights: Weights of the functions in every sum, shape (n, sums).
         """
-        parts = (weights.T @ part for part in (self.values, self.slopes, self.last))
-        return Line(self.weights, *parts, self.modes @ weights, self.mode_slopes @ weights)
+        values, slopes, last = (weights.T @ part for part in (self.values, self.slopes, self.last))
+        modes, mode_slopes = self.modes @ weights, self.mode_slopes @ weights
+        return Line(self.weights, values, slopes, last, modes, mode_slopes)
 
     def diagonalised(self) -> tuple[Line, Array]:
         """Return functions that are orthonormal, as are their slopes up to length, and its square.

@@ -6,19 +6,18 @@ Theory: docs/theory.md, section 4.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 
-from geometry import Control
+from geometry import Control, RigidPlane, Surface
 from geometry.contact_state import ContactState, Start
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.tangent import approach_stiffness
 from micro.model import Stiffness
+from support.arrays import Array, Flags
 from support.cores import blas_threads
 from support.errors import NotConverged
-
-if TYPE_CHECKING:
-    from micro.half_space.model import HalfSpaceModel
 
 _BACK, _SAFETY = 0.05, 1.5
 """Part of the largest interference that the plane goes back by where cells yield anew, and error of
@@ -31,7 +30,45 @@ _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
 
 
-def stiffness(model: HalfSpaceModel, state: ContactState, *, turns: bool) -> Stiffness:
+class ModelOfCells(Protocol):
+    """What the stiffness follows from; see `HalfSpaceModel`."""
+
+    @property
+    def surface(self) -> Surface:
+        """The surface."""
+        ...
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* [MPa]."""
+        ...
+
+    @property
+    def tolerance(self) -> float:
+        """Largest residual of a solution."""
+        ...
+
+    @property
+    def hardness(self) -> float | None:
+        """Hardness of the softer body [MPa]."""
+        ...
+
+    def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
+        """Return the interference of a plane and the surface [mm]."""
+        ...
+
+    def problem(self, interference: Array, free: Flags, loads: Array) -> CellProblem:
+        """Return the contact problem of a plane."""
+        ...
+
+    def pressures_under(
+        self, control: Control, start: Start | None, depth: Array | None, *, tolerance: float
+    ) -> tuple[ContactPressures, RigidPlane]:
+        """Return pressures / E* and the plane."""
+        ...
+
+
+def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiffness:
     """Return dF/dδ on the side that the plane came from.
 
     It follows from a linear solution, unless cells yield further. Then the plane is withdrawn
@@ -73,7 +110,7 @@ def stiffness(model: HalfSpaceModel, state: ContactState, *, turns: bool) -> Sti
 
 
 def elastic_stiffness(
-    model: HalfSpaceModel, state: ContactState, *, turns: bool
+    model: ModelOfCells, state: ContactState, *, turns: bool
 ) -> tuple[float, int]:
     """Return dF/dδ of the cells in contact [N/mm], and the products of the compliance.
 
@@ -95,7 +132,7 @@ def elastic_stiffness(
     return rate * model.contact_modulus * float(np.prod(model.surface.spacing)), products
 
 
-def _yields_anew(model: HalfSpaceModel, state: ContactState, largest: float) -> bool:
+def _yields_anew(model: ModelOfCells, state: ContactState, largest: float) -> bool:
     """Tell whether the load of a state has left plastic depth; ``largest`` is interference."""
     if state.plastic_depth is None:
         return False
