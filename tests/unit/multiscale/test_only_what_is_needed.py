@@ -70,13 +70,15 @@ def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(tmp_path,
     assert not names.intersection(FINITE_ELEMENTS + PICTURES)
 
 
-def test_a_block_whose_compliance_is_in_the_cache_loads_no_finite_elements(tmp_path, monkeypatch):
-    monkeypatch.setenv("PATCHLAW_CACHE", str(tmp_path / "cache"))
-    first, second = tmp_path / "first", tmp_path / "second"
-    first.mkdir(), second.mkdir()
-    packages = {"dolfinx", "petsc4py", "gmsh", "mpi4py"}
-    assert {"petsc4py", "mpi4py"} <= loaded(first, "run", data("concurrent"))
-    assert not packages & loaded(second, "run", data("concurrent"))
+@pytest.mark.parametrize(
+    ("kind", "element", "few"),
+    [("concurrent", "P1", True), ("isolated", "Q1", True), ("isolated", "P1", False)],
+)
+def test_only_laws_on_tetrahedra_load_finite_elements(tmp_path, monkeypatch, kind, element, few):
+    monkeypatch.setenv("PATCHLAW_CACHE", "off")
+    names = loaded(tmp_path, "run", data(kind, block=data()["block"] | {"element": element}))
+    assert {"dolfinx", "petsc4py"}.isdisjoint(names) == few
+    assert "gmsh" not in names
 
 
 def test_figures_load_the_pictures_that_others_do_without(tmp_path):
