@@ -209,12 +209,17 @@ class OppositeHalfSpace:
             rest = found - forces
             apart, largest = self.moved(rest), np.abs(self.moved(found)).max()
             left = np.abs(apart).max()
+            if not np.isfinite(left):
+                break
             if left <= _TOLERANCE * largest:
                 self.forces = forces
                 return
             on_held, last = on_held and left < _GAINED * last, left
             if on_held:
-                settled = self._settled(forces, contact, _INNER * _GAINED * min(left, largest))
+                try:
+                    settled = self._settled(forces, contact, _INNER * _GAINED * min(left, largest))
+                except NotConverged:  # the plane, on closures that are out of all proportion
+                    settled = None
                 change = rest if settled is None else settled - forces
                 on_held = settled is not None and float(np.vdot(apart, change)) > 0.0
             if not on_held:
@@ -391,6 +396,8 @@ def _accelerated(
     for _ in range(_MOST):
         points.append(x)
         residuals.append(remaining(x))
+        if not np.isfinite(residuals[-1]).all():
+            break
         if np.abs(residuals[-1]).max() <= tolerance * np.abs(x).max():
             return x + residuals[-1], True
         x = x + residuals[-1]

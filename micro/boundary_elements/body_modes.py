@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from geometry import PatchGrid
 from geometry.legendre_modes import mode_means, mode_values, modes_within
 from micro.boundary_elements.grid_compliance import CellGrid
+from micro.boundary_elements.mode_matrices import first_modes, in_other_modes, modes_along, sum_of
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
 from support.errors import InputError
@@ -61,7 +62,7 @@ class BodyModes:
     @property
     def count(self) -> int:
         """Modes K along a side."""
-        return int(np.sqrt(len(self.matrix)) + 0.5)
+        return modes_along(self.matrix)
 
     def on(
         self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float = 1.0
@@ -103,8 +104,7 @@ class BodyModes:
         if not 1 <= count <= self.count:
             allowed = f"1 … {self.count}"
             raise InputError("so many modes are not there", value=count, allowed=allowed)
-        some = self.matrix.reshape(4 * (self.count,))[:count, :count, :count, :count]
-        return BodyModes(self.lengths, some.reshape(count**2, count**2), self.origin)
+        return BodyModes(self.lengths, first_modes(self.matrix, count), self.origin)
 
     def within(self, lengths: tuple[float, float]) -> BodyModes:
         """Return the compliance of a rectangle of the top, in modes of its own.
@@ -115,13 +115,8 @@ class BodyModes:
         if lengths == self.lengths and self.origin == (0.0, 0.0):
             return self
         change = modes_within(lengths, self.lengths, self.origin, self.count)
-
-        def changed(matrix: Array) -> Array:
-            found = change @ matrix @ change.T
-            return np.asarray(0.5 * (found + found.T))
-
-        rough = None if self.rough is None else changed(self.rough)
-        return BodyModes(lengths, changed(self.matrix), rough=rough)
+        rough = None if self.rough is None else in_other_modes(self.rough, change)
+        return BodyModes(lengths, in_other_modes(self.matrix, change), rough=rough)
 
     def plus(self, other: BodyModes) -> BodyModes:
         """Return the compliance of this body and of another one on the same rectangle.
@@ -129,20 +124,11 @@ class BodyModes:
         Args:
             other: That of the other body, whose modes may be more or fewer.
         """
-        count = max(self.count, other.count)
-
-        def total(own: Array, others: Array) -> Array:
-            found = np.zeros(4 * (count,))
-            for one in (own, others):
-                few = round(len(one) ** 0.5)
-                found[:few, :few, :few, :few] += one.reshape(4 * (few,))
-            return found.reshape(2 * (count**2,))
-
         rough = None
         if self.rough is not None or other.rough is not None:
             parts = (one.matrix if one.rough is None else one.rough for one in (self, other))
-            rough = total(*parts)
-        return BodyModes(self.lengths, total(self.matrix, other.matrix), self.origin, rough)
+            rough = sum_of(*parts)
+        return BodyModes(self.lengths, sum_of(self.matrix, other.matrix), self.origin, rough)
 
     def coarser(self) -> BodyModes | None:
         """Return the compliance from a coarser discretisation; None where there is none."""

@@ -14,6 +14,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.legendre_modes import mode_means, modes_within
+from micro.boundary_elements.mode_matrices import (
+    first_modes,
+    in_other_modes,
+    modes_along,
+    sum_of,
+    transposed,
+)
 from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from support.arrays import Array, Indices
 from support.errors import InputError
@@ -75,7 +82,7 @@ class TractionModes:
         if matrix.shape != (3, 3, self.count**2, self.count**2):
             problem = "the compliance is not one of K × K modes"
             raise InputError(problem, value=matrix.shape, allowed=allowed)
-        apart = float(np.abs(matrix - matrix.transpose(1, 0, 3, 2)).max())
+        apart = float(np.abs(matrix - transposed(matrix)).max())
         if not apart <= 1e-9 * float(np.abs(matrix).max()):
             problem = "the compliance is not finite and symmetric"
             raise InputError(problem, value=apart, allowed=allowed)
@@ -83,7 +90,7 @@ class TractionModes:
     @property
     def count(self) -> int:
         """Modes K along a side."""
-        return round(self.matrix.shape[-1] ** 0.5)
+        return modes_along(self.matrix)
 
     def fewer(self, count: int) -> TractionModes:
         """Return the compliance of the first modes alone, which shows how well K modes resolve it.
@@ -91,9 +98,7 @@ class TractionModes:
         Args:
             count: Modes along a side, at most K.
         """
-        some = self.matrix.reshape(3, 3, *4 * (self.count,))
-        some = some[:, :, :count, :count, :count, :count].reshape(3, 3, count**2, count**2)
-        return TractionModes(self.lengths, some, self.origin)
+        return TractionModes(self.lengths, first_modes(self.matrix, count), self.origin)
 
     def within(self, lengths: tuple[float, float]) -> TractionModes:
         """Return the compliance of a rectangle of the top, in modes of its own.
@@ -104,8 +109,7 @@ class TractionModes:
         if lengths == self.lengths and self.origin == (0.0, 0.0):
             return self
         change = modes_within(lengths, self.lengths, self.origin, self.count)
-        found = change @ self.matrix @ change.T
-        return TractionModes(lengths, 0.5 * (found + found.transpose(1, 0, 3, 2)))
+        return TractionModes(lengths, in_other_modes(self.matrix, change))
 
     def plus(self, other: TractionModes) -> TractionModes:
         """Return the compliance of this body and of another one on the same rectangle.
@@ -113,14 +117,7 @@ class TractionModes:
         Args:
             other: That of the other body, whose modes may be more or fewer.
         """
-        count = max(self.count, other.count)
-        total = np.zeros((3, 3, *4 * (count,)))
-        for one in (self, other):
-            few = one.count
-            part = one.matrix.reshape(3, 3, *4 * (few,))
-            total[:, :, :few, :few, :few, :few] += part
-        matrix = total.reshape(3, 3, count**2, count**2)
-        return TractionModes(self.lengths, matrix, self.origin)
+        return TractionModes(self.lengths, sum_of(self.matrix, other.matrix), self.origin)
 
     def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
         """Return the compliance of cells of uniform tractions, by means over the cells.

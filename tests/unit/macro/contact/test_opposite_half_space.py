@@ -11,6 +11,7 @@ from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
 from micro.friction.goodman import CrossCompliance
 from micro.friction.tangential_grid import cerruti_kernels
+from support.errors import NotConverged
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
 NU = 0.3
@@ -98,6 +99,24 @@ def test_a_soft_half_space_opens_the_middle_of_the_face():
     assert state.force == pytest.approx(2.0, rel=1e-9)
     assert state.sample_pressure.min() >= 0.0
     assert state.sample_pressure.max() > 3.0 * state.force  # of a flat punch, at its corners
+
+
+class Explosive:
+    """A law that leaves all numbers behind at the closures of a first guess."""
+
+    def pressure(self, closure):
+        return 1e-2 * np.expm1(np.clip(closure / 4e-4, 0.0, 200.0))
+
+    def stiffness(self, closure):
+        return np.where(closure > 0.0, 25.0 * np.exp(np.clip(closure / 4e-4, 0.0, 200.0)), 0.0)
+
+
+def test_numbers_out_of_all_proportion_end_as_other_failures_do():
+    face, other = face_of(4, modulus=2e5), half_space_of(5e-3)
+    problem = LawContactProblem(face, [Explosive()], "pointwise", opposite=other)
+    with np.errstate(over="ignore", invalid="ignore"):
+        with pytest.raises(NotConverged, match=r"the half-space at approach 0\.05 mm"):
+            problem.solve(Control(approach=0.05))
 
 
 def test_a_stiff_body_is_solved_a_few_times_alone(monkeypatch):
