@@ -43,6 +43,7 @@ from support.collective import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from macro.contact.law_problem import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
 """The causes, in their order."""
@@ -54,6 +55,9 @@ OF_LINEAR, OF_QUADRATIC, OF_HALF = 1.3, 0.3, 1.0
 and of linear ones over the change from half as many cells along every side."""
 CHECKS_OF_SAMPLE = 4
 """Contact problems that measure the errors of one sample: 3 to 6."""
+COUPLED_ON_SAMPLE = 20
+"""Contact problems that a way of the shear is worth on the cells of one sample and on fewer: 6 to 9
+passes, each with a contact and with tractions, on 1.3 times its cells."""
 _SHARE = 0.975
 """Share of sets of samples whose mean lies less than the stated error too low, or too high."""
 _LEAST_SEPARATION = 1e-3
@@ -104,11 +108,26 @@ class LawErrorProbe:
         if not self.state.force:
             return MeasuredErrors(parts=dict.fromkeys(causes, 0.0), stiffness=0.0)
         response = self.problem.approach_response()
+        mesh, quadrature = (float(error[0]) for error in self.discretisation())
+        parts = {"mesh": mesh, "quadrature": quadrature} | {
+            cause: float(response.force_changes(errors).sum())
+            for cause, errors in self.pressure_errors(response).items()
+        }
+        return MeasuredErrors(
+            parts={cause: parts[cause] for cause in causes}, stiffness=response.stiffness
+        )
+
+    def pressure_errors(self, response: ApproachResponse) -> dict[str, Array]:
+        """Return by cause what the laws err by at this rank's samples, shapes (n,) [MPa].
+
+        Args:
+            response: The contact at the load step.
+
+        Note:
+            Collective.
+        """
         closure, patch = response.closure, response.sampling.patch
         pressure = self.state.sample_pressure
-
-        def changed(errors: Array) -> float:
-            return float(response.force_changes(errors).sum())
 
         def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
             found = np.zeros_like(closure)
@@ -117,55 +136,47 @@ class LawErrorProbe:
                 found[here] = function(law, closure[here])
             return found
 
-        mesh, quadrature = self.discretisation()
         factors = np.array([mean_error(region.surfaces) for region in self.samples])
-        scatter = by_region(lambda law, c: law.pressure_scatter(c))
-        parts = {
-            "mesh": mesh,
-            "quadrature": quadrature,
-            "laws": changed(by_region(interpolation_errors) * (pressure > 0.0)),
-            "samples": changed(factors[patch] * scatter),
-        }
         forces = response.sampling.patch_sums(pressure)
         weighted = response.sampling.patch_sums(pressure * closure)
         means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
-        of_samples = self._of_samples(means, forces)
-        for row, cause in enumerate(("grid", "slopes")):
-            share = of_samples[row][patch]
-            # without load an unknown error is none
-            parts[cause] = changed(np.where(pressure > 0.0, share, 0.0) * pressure)
-        return MeasuredErrors(
-            parts={cause: parts[cause] for cause in causes}, stiffness=response.stiffness
-        )
+        grid, slopes = self._of_samples(means, forces)
+        # without load an unknown error is none
+        return {
+            "laws": by_region(interpolation_errors) * (pressure > 0.0),
+            "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
+            "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
+            "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
+        }
 
     # --- elements
 
-    def discretisation(self) -> tuple[float, float]:
-        """Return the errors of the force by elements and by quadrature [N].
+    def discretisation(self) -> tuple[Array, Array]:
+        """Return the errors of what `answer_on` returns by elements and by quadrature.
 
-        The first is infinite where the elements are linear and quadratic ones too many.
+        The first are infinite where the elements are linear and quadratic ones too many.
 
         Note:
             Collective.
         """
         from macro.contact.other_elements import bodies_of, face_on
 
-        own, force = bodies_of(self.face), self.state.force
-        points = self._force_on(face_on(self.face, lambda body: body, finer=True))
-        mesh = 0.0
+        own, known = bodies_of(self.face), self.answer
+        points = self.answer_on(face_on(self.face, lambda body: body, finer=True))
+        mesh = np.zeros_like(known)
         if any(body.degree == 2 for body in own):
             lowered = face_on(self.face, lambda body: body.linear if body.degree == 2 else body)
-            mesh += OF_QUADRATIC * abs(self._force_on(lowered) - force)
+            mesh += OF_QUADRATIC * np.abs(self.answer_on(lowered) - known)
         if any(body.degree == 1 for body in own):
             mesh += self._of_linear(own, points)
-        return mesh, abs(points - force)
+        return mesh, np.abs(points - known)
 
-    def _of_linear(self, own: Sequence[Any], points: float) -> float:
-        """Return the error of linear elements [N]; infinite where it is not measured.
+    def _of_linear(self, own: Sequence[Any], points: Array) -> Array | float:
+        """Return the errors of linear elements; infinite where they are not measured.
 
         Args:
             own: The bodies.
-            points: Force on them with a finer quadrature [N].
+            points: The answer on them with a finer quadrature.
         """
         from macro.contact.other_elements import face_on, face_on_half, quadratic_dofs
 
@@ -178,19 +189,24 @@ class LawErrorProbe:
 
         if sum(map(quadratic_dofs, own)) <= MOST_CHECKED_UNKNOWNS:
             other: Any = face_on(self.face, raised, finer=True)
-            error = OF_LINEAR * abs(self._force_on(other) - points)
+            error = OF_LINEAR * np.abs(self.answer_on(other) - points)
         else:
             other = face_on_half(self.face)
             if other is None:
                 return math.inf
             made.append(other.body)
-            error = OF_HALF * abs(self._force_on(other, same=False) - self.state.force)
+            error = OF_HALF * np.abs(self.answer_on(other, same=False) - self.answer)
         del other
         free_bodies(made)
         return error
 
-    def _force_on(self, face: Any, *, same: bool = True) -> float:
-        """Return the force under the same plane on another face [N].
+    @property
+    def answer(self) -> Array:
+        """What discretisation may be off by: the force, shape (1,) [N]."""
+        return np.array([self.state.force])
+
+    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+        """Return the answer on another face, under the same plane.
 
         Args:
             face: The face.
@@ -203,7 +219,7 @@ class LawErrorProbe:
             start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
             problem.start_from(self.state.patch_pressure)
-        return problem.solve(self.control).force
+        return np.array([problem.solve(self.control).force])
 
     # --- samples
 
@@ -225,8 +241,8 @@ class LawErrorProbe:
             number, sample = tasks[task]
             probe = self.probe_of(self.samples[number], sample)
             reference = probe.model.reference_height - sample.mean_height
-            separation = self.laws[number].initial_separation - float(closures[number])
-            approach = reference - max(separation, _LEAST_SEPARATION * reference)
+            law, closure = self.laws[number], float(closures[number])
+            approach = reference - separation_of(law, closure, reference)
             force = probe.on_body(probe.model, probe.order).press(Control(approach=approach)).force
             if not force:  # the closure is that of others of the samples
                 return 0.0, 0.0, 0.0
@@ -280,6 +296,17 @@ def check_requests(bodies: Mapping[str, BodyFacts | None]) -> Iterator[MemoryReq
             asked = body_request(key, f"{body.element[0]}2", raised[body], 0, in_parts=True)
             purpose = f"[{key}] with quadratic elements, which tell the error (output.check),"
             yield replace(asked, key="output.check", purpose=purpose)
+
+
+def separation_of(law: PatchLaw, closure: float, reference: float) -> float:
+    """Return the height of the plane over the mean plane of samples at a closure [mm].
+
+    Args:
+        law: Their law.
+        closure: The closure [mm].
+        reference: Height of the plane at zero approach over the mean plane [mm].
+    """
+    return max(law.initial_separation - closure, _LEAST_SEPARATION * reference)
 
 
 def interpolation_errors(law: PatchLaw, closure: Array) -> Array:

@@ -236,6 +236,11 @@ class LawContactProblem:
         return shear
 
     @property
+    def sampling(self) -> Sampling:
+        """Where the laws are evaluated."""
+        return self._sampling
+
+    @property
     def memory(self) -> SliderMemory | None:
         """What the load steps so far left behind of friction; set it to take load steps back."""
         return self.forces.memory if isinstance(self.forces, FrictionalForces) else None
@@ -309,6 +314,12 @@ class LawContactProblem:
         total = float(forces.total(stresses(way)) @ ahead)
         compat.collect_garbage(load.comm)
         return total, iterations
+
+    def sticking_stiffness(self) -> float:
+        """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
+        forces = self.forces
+        assert isinstance(forces, FrictionalForces)
+        return float(forces.total(self._stuck[:, None])[0])
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.

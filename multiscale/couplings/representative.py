@@ -17,6 +17,7 @@ import numpy as np
 from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from micro.closed_forms.hertz import crowned_peak
+from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.coupling import Meshes
@@ -34,6 +35,7 @@ from multiscale.inputs.surfaces import (
 )
 from multiscale.law_errors import (
     CHECKS_OF_SAMPLE,
+    COUPLED_ON_SAMPLE,
     LawErrorProbe,
     causes_of,
     check_cycles,
@@ -50,6 +52,7 @@ from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
 from multiscale.measured_errors import ErrorProbe, with_errors
 from multiscale.readable import Observer, number, times
+from multiscale.shear_errors import path_of, with_shear_errors
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -171,13 +174,17 @@ class RepresentativeCoupling(LawCoupling):
         rows = laws * SOLUTIONS_OF_LAWS * max(len(self.rough_surfaces), 1)
         unknowns = sum(facts.unknowns for facts in self.meshes) or self.body.unknowns
         cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
+        each, checked = CHECKS_OF_SAMPLE, check_cycles(self.shown_bodies)
+        if self.scene.friction is not None:
+            ways = len(self.load_history.shear_points) + 1
+            each, checked = each + ways * COUPLED_ON_SAMPLE, 2.0 * ways * checked
         return Work(
             size=int(self.surface.heights.size),
-            solutions=float(rows + checks * CHECKS_OF_SAMPLE * len(self.rough_surfaces)),
+            solutions=float(rows + checks * each * len(self.rough_surfaces)),
             rows=rows,
             finite_slopes=self.finite_slopes,
             unknowns=unknowns,
-            cycles=cycles + checks * check_cycles(self.shown_bodies),
+            cycles=cycles + checks * checked,
             ranks=ranks,
         )
 
@@ -189,14 +196,13 @@ class RepresentativeCoupling(LawCoupling):
 
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
-        if self.scene.rubs_on_mesh:
-            return "the measure does not know what has slipped under laws"
         return "output.check = 'none'" if self.scene.output.check == "none" else ""
 
     @property
     def error_causes(self) -> str:
         """The causes of errors that a run measures."""
-        return ", ".join(causes_of(self.samples))
+        shear = "; those of the shear as well" * (self.scene.friction is not None)
+        return f"{', '.join(causes_of(self.samples))}{shear}"
 
     # --- errors
 
@@ -205,18 +211,42 @@ class RepresentativeCoupling(LawCoupling):
         solver = self.solver
         assert isinstance(solver, ExtendedLaws)
         problem, state = solver.solved
-        probe = LawErrorProbe(
-            problem=problem,
-            face=solver.face,
-            state=state,
-            problem_of=lambda face: self._problem(face, solver.table),
-            laws=solver.table.laws,
-            samples=self.samples,
-            probe_of=self._probe_of,
-            comm=self.comm,
-        )
         by_force = problem.forces.control.force is not None
-        return with_errors(step, probe.measure(), by_force=by_force)
+        known: dict[str, Any] = {
+            "problem": problem,
+            "face": solver.face,
+            "state": state,
+            "problem_of": lambda face: self._problem(face, solver.table),
+            "laws": solver.table.laws,
+            "samples": self.samples,
+            "probe_of": self._probe_of,
+            "comm": self.comm,
+        }
+        if self.scene.friction is None:
+            return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
+        from multiscale.law_shear_errors import LawShearProbe  # others do without
+
+        probe = LawShearProbe(
+            **known,
+            path=path_of([*past, step], self.load_history, every_load=True),
+            table=solver.table,
+            problem_with=self._problem,
+            friction_of=self._friction_of,
+        )
+        normal, shear = probe.measure_both()
+        step = with_errors(step, normal, by_force=by_force)
+        return with_shear_errors(step, shear, by_shift=probe.by_shift)
+
+    def _friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
+        """Return the friction of a sample's cells, whose pressures and tractions see each other."""
+        assert self.scene.friction is not None
+        return FrictionModel(
+            materials=region.materials,
+            coefficient=self.scene.friction.coefficient,
+            spacing=sample.spacing,
+            periodic=True,
+            coupled=True,
+        )
 
     def _probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
         """Return what measures the errors of one sample."""

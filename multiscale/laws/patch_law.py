@@ -218,6 +218,14 @@ class PatchLaw(Displayed):
             )
         return self.transmissivity.at(self.at(closure, extend=True).separation)
 
+    def multiplied(self, factor: float) -> PatchLaw:
+        """Return the law with other pressures at the same closures.
+
+        Args:
+            factor: What they are multiplied by.
+        """
+        return replace(self, rows=replace(self.rows, pressure=factor * self.rows.pressure))
+
     def shifted(self, distance: float) -> PatchLaw:
         """Return the law with approach and closure counted from a plane that is higher.
 

@@ -1,6 +1,7 @@
 """Are the errors of the shear that runs state those that they have?
 
-    .venv/bin/python tests/benchmarks/shear_error_study.py [--scenes N] [--seed S] [--laws]
+    .venv/bin/python tests/benchmarks/shear_error_study.py [--scenes N] [--seed S]
+        [--laws | --samples]
 
 Scenes are drawn anew for every seed: rough half-spaces and blocks on 48² or 64² cells, with any
 Poisson's ratio up to 0.45 and a coefficient of friction from 0.1 to 0.8, pressed to 1 to 15 %
@@ -10,36 +11,42 @@ Every second scene is also judged with what the coupling changes, by a coupled r
 cells.
 
 With ``--laws`` the scenes have patch laws on 48² cells (consistent or isolated, 1 to 4 × 4
-patches), and are judged by coupled cells on the block, on twice as many a side. Run it from the
-project's root.
+patches), and are judged by coupled cells on the block, on twice as many a side. With ``--samples``
+a law of a sample on 16² cells stands for a face of 4 × 4 of them on a block, which is judged by
+coupled cells on twice as many a side of every sample. Run it from the project's root.
 """
 
 import argparse
 import os
+import tempfile
 import time
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from geometry import NotConverged
+from geometry import NotConverged, Spectrum, synthesise
 from multiscale import Scene, run
 
-FINER, COUPLED_ON = 4, 2
-"""Cells a side of the runs that judge, over those of the scene."""
+FINER, COUPLED_ON, TILES = 4, 2, 4
+"""Cells a side of the runs that judge, over those of the scene, and samples along a face."""
 BLOCK = {"young_modulus": 4000.0}
 ALLOWED = 1.5
 """True errors over stated ones that count as kept."""
 
 
-def scene_of(random, *, laws):
+def scene_of(random, kind):
     """Return one scene as nested dictionaries, without its shear, and how it will be sheared."""
     slope, waves = float(random.uniform(0.05, 0.2)), (2, int(random.integers(4, 9)))
     nu, mu = float(random.uniform(0.0, 0.45)), float(random.uniform(0.1, 0.8))
     modulus, area = BLOCK["young_modulus"] / (1.0 - nu**2), float(random.uniform(0.01, 0.15))
+    laws, samples = kind == "laws", kind == "samples"
     kinds = ("consistent", "isolated") if laws else ("analytic", "concurrent")
-    kind = str(random.choice(kinds))
+    coupling = str(random.choice(kinds))
     cells = 48 if laws else int(random.choice([48, 64]))
+    if samples:
+        cells, waves = 16, (1, int(random.integers(2, 4)))
     spectrum = {
         "hurst": float(random.uniform(0.5, 1.0)),
         "waves": list(waves),
@@ -50,7 +57,7 @@ def scene_of(random, *, laws):
         "surface": {"spectrum": spectrum, "grid": [cells, cells], "lengths": [1.0, 1.0]},
         "block": BLOCK | {"poisson_ratio": nu, "height": float(random.choice([0.5, 1.0, 3.0]))},
         "micro": {"model": "half-space"},
-        "coupling": {"kind": kind},
+        "coupling": {"kind": coupling},
         "friction": {"coefficient": mu},
         "load": {"force": 0.5 * area * slope * modulus, "steps": 1},
         "output": {"check": "last", "figures": False, "report": False},
@@ -59,6 +66,12 @@ def scene_of(random, *, laws):
     if laws:
         data["patches"] = {"grid": [patches, patches]}
         data["block"]["cells"] = [8, 8, 6]
+    if samples:
+        del data["coupling"]
+        data["law"] = {"kind": "representative"}
+        data["surface"]["periodic"] = True
+        data["block"] |= {"lengths": [float(TILES)] * 2, "cells": [8, 8, 5]}
+        data["load"]["force"] *= TILES**2
     legs = [float(random.uniform(0.2, 0.95)), float(random.uniform(-0.9, 0.9))]
     turns = np.radians([float(random.uniform(0, 360)), float(random.choice([0.0, 0.0, 90.0]))])
     ways = np.cumsum(turns)[: 1 + int(random.integers(2))]
@@ -83,12 +96,29 @@ def sheared(data, points, *, by_force, by_approach):
     return data | {"load": load}
 
 
-def response(data, by_force, **changes):
-    """Return the shear of the last load step of a scene with some changes."""
-    surface = data["surface"] | {"grid": [changes.pop("cells")] * 2}
+def finer(data, cells, **changes):
+    """Return the last load step of a scene on other cells, with some changes."""
+    surface = data["surface"] | {"grid": [cells] * 2}
     output = data["output"] | {"check": "none"}
-    step = run(Scene.from_dict(data | {"surface": surface, "output": output} | changes)).steps[-1]
-    return of(step, by_force)
+    return run(Scene.from_dict(data | {"surface": surface, "output": output} | changes)).steps[-1]
+
+
+def on_cells_of_face(data, cells):
+    """Return the last load step of a face of samples, each on some cells, pressures coupled."""
+    said = dict(data["surface"]["spectrum"])
+    heights = synthesise(Spectrum(**said), grid=(cells, cells), lengths=(1.0, 1.0)).heights
+    # a law knows no edge of the face: its phase is that which has the lowest heights there
+    lowest = [int(np.argmin(heights.max(axis=axis))) for axis in (1, 0)]
+    heights = np.roll(heights, [-one for one in lowest], axis=(0, 1))
+    coupled = {"friction": data["friction"] | {"coupled": True}}
+    alike = {key: data[key] for key in ("micro", "load")} | {"coupling": {"kind": "concurrent"}}
+    block = {key: data["block"][key] for key in ("young_modulus", "poisson_ratio", "height")}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "face.npy"
+        np.save(path, np.tile(heights, (TILES, TILES)))
+        surface = {"file": str(path), "height_unit": "mm", "lengths": [float(TILES)] * 2}
+        face = {"surface": surface, "block": block, "output": data["output"] | {"check": "none"}}
+        return run(Scene.from_dict(alike | coupled | face)).steps[-1]
 
 
 def of(step, by_force):
@@ -96,33 +126,47 @@ def of(step, by_force):
     return np.array([getattr(step, name) for name in names])
 
 
-def judged(number, random, *, laws):
-    """Run one scene; print it, and return true and stated error by (cells, coupling), or None."""
+def judged(number, random, kind):
+    """Run one scene; print it, and return true and stated error by what it is judged by."""
     began = time.perf_counter()
-    data, points, by_force, by_approach = scene_of(random, laws=laws)
+    data, points, by_force, by_approach = scene_of(random, kind)
     how = {"by_force": by_force, "by_approach": by_approach}
     data = sheared(data, points, **how)
     step = run(Scene.from_dict(data)).steps[-1]
     own, parts = of(step, by_force), dict(step.shear_errors)
     cells, size = data["surface"]["grid"][0], float(np.hypot(*own))
     rows = {}
-    if not laws:
-        exact = response(data, by_force, cells=FINER * cells)
+    if kind == "cells":
+        exact = of(finer(data, FINER * cells), by_force)
         stated = sum(error for cause, error in parts.items() if cause != "coupling")
         rows["cells"] = float(np.hypot(*(exact - own))), stated
-    if laws or number % 2 == 0:
+    if kind != "cells" or number % 2 == 0:
         on = {"friction": data["friction"] | {"coupled": True}}
-        if laws:
+        if kind == "laws":
             on["coupling"] = {"kind": "concurrent"}
-        exact = response(data, by_force, cells=COUPLED_ON * cells, **on)
-        rows["coupling"] = float(np.hypot(*(exact - own))), sum(parts.values())
+        if kind == "samples":
+            exact = on_cells_of_face(data, COUPLED_ON * cells)
+            by_load = not by_approach
+            name = "approach_mm" if by_load else "force_N"
+            off = abs(getattr(exact, name) - getattr(step, name))
+            stated = step.approach_error_mm if by_load else step.force_error_N
+            rows["normal"] = off, stated
+        else:
+            exact = finer(data, COUPLED_ON * cells, **on)
+        off = float(np.hypot(*(of(exact, by_force) - own)))
+        rows["coupling"] = off, sum(parts.values())
     told = ", ".join(f"{cause} {error / size:.2%}" for cause, error in parts.items())
-    found = "; ".join(f"{name} {off / size:.2%}" for name, (off, _) in rows.items())
+    if "normal" in rows:
+        off, stated = (one / getattr(step, name) for one in rows["normal"])
+        told += f" ({name[:-3].strip('_')} {off:.2%} off, {stated:.2%} stated)"
+    found = "; ".join(f"{name} {off / size:.2%}" for name, (off, _) in rows.items()
+                      if name != "normal")  # fmt: skip
+    step_kind = data.get("coupling", data.get("law"))["kind"]
     nu, mu = data["block"]["poisson_ratio"], data["friction"]["coefficient"]
     load = f"{'force' if by_force else 'shift'}{', approach' * by_approach}"
     missed = any(off > ALLOWED * stated for off, stated in rows.values())
     print(
-        f"{number:3d} {data['coupling']['kind']:10s} {cells}² ν {nu:.2f} µ {mu:.2f} "
+        f"{number:3d} {step_kind:10s} {cells}² ν {nu:.2f} µ {mu:.2f} "
         f"{len(points)} legs, {load}: true {found}; stated {told} "
         f"({time.perf_counter() - began:.0f} s){' MISSED' * missed}",
         flush=True,
@@ -135,19 +179,26 @@ def main():
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--scenes", type=int, default=60)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--laws", action="store_true", help="patch laws in place of cells")
+    others = parser.add_mutually_exclusive_group()
+    others.add_argument("--laws", action="store_true", help="patch laws in place of cells")
+    others.add_argument("--samples", action="store_true", help="laws of samples in place of cells")
     given = parser.parse_args()
-    found = {"cells": [], "coupling": []}
+    kind = "laws" if given.laws else "samples" if given.samples else "cells"
+    found = {"cells": [], "coupling": [], "normal": []}
     for number in range(given.first, given.first + given.scenes):
         try:
             random = np.random.default_rng([given.seed, number])
-            rows = judged(number, random, laws=given.laws)
+            rows = judged(number, random, kind)
         except NotConverged as error:
             print(f"{number:3d} not converged: {error}", flush=True)
             continue
         for name, row in rows.items():
             found[name].append(row)
-    names = {"cells": "by grid and body", "coupling": "with the coupling"}
+    names = {
+        "cells": "by grid and body",
+        "coupling": "with the coupling",
+        "normal": "of the normal load",
+    }
     for name, what in names.items():
         if not found[name]:
             continue

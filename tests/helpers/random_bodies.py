@@ -353,7 +353,7 @@ def stated_and_true(body, comm, *, refinements=2):
         probe_of=None,
         comm=comm,
     )
-    mesh, quadrature = probe.discretisation()
+    mesh, quadrature = (float(error[0]) for error in probe.discretisation())
     dofs, forces = [face.body.dofs], [state.force]
     same = Control(approach=state.approach, tilt=body.tilt)
     for _ in range(refinements):

@@ -62,6 +62,7 @@ FLOORS = {
         "bodies",
         "law_solvers measured_errors",
         "law_errors shear_errors",
+        "law_shear_errors",
         "couplings",
         "auto observers",
         "setup",

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers.pressed_cells import pressed_cells
 
-from multiscale import run
+from multiscale import Scene, run
 from multiscale.shear_errors import turning_points
 
 SPECTRUM = {"hurst": 0.8, "waves": [2, 5], "rms_slope": 0.1, "seed": 12}
@@ -131,6 +131,56 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
         way = abs(own.approach_mm - exact.approach_mm)
         assert own.approach_error_mm >= 0.7 * way  # by the stiffness of a frictionless contact
     assert "its shift the shear force is within" in " ".join(laws.notes)
+
+
+SLAB = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "lengths": [5.0, 4.0], "height": 2.0}
+
+
+@cache
+def of_samples(*, by_force=False, approach=False, shear=True, law=(), check="last"):
+    """A slab with the law of a sample on its face, sheared."""
+    surface = {"spectrum": SPECTRUM | {"waves": [2, 4]}, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    loads = {"approach": 9e-3} if approach else {"force": 110.0}
+    shears = {"shear_force": [[14.0, 6.0]]} if by_force else {"shear": [[1e-3, 2e-4]]}
+    load = loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
+    data = {
+        "surface": surface,
+        "law": {"kind": "representative"} | dict(law),
+        "block": SLAB | {"cells": [4, 4, 3]},
+        "friction": {"coefficient": 0.3},
+        "load": load,
+        "output": {"check": check, "figures": False, "report": False},
+    }
+    return run(Scene.from_dict(data))
+
+
+@pytest.mark.parametrize(("by_force", "approach"), [(True, False), (False, True)])
+def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, approach):
+    history = of_samples(by_force=by_force, approach=approach)
+    step = history.steps[-1]
+    for parts in (dict(step.errors), dict(step.shear_errors)):
+        assert list(parts) == ["mesh", "quadrature", "laws", "grid", "slopes"]
+        assert all(0.0 < error < np.inf for error in parts.values())
+    shear, size = sum(dict(step.shear_errors).values()), response(step, by_force=by_force)
+    columns = step.shear_force_error_N, step.shear_error_mm
+    assert columns == pytest.approx((0.0, shear) if by_force else (shear, 0.0))
+    assert 0.01 < shear / np.hypot(*size) < 0.5
+    assert (step.force_error_N > 0.0) is approach
+    assert (step.approach_error_mm > 0.0) is not approach
+    assert "under its shear force the shift is within" in " ".join(history.notes) or not by_force
+
+
+def test_several_samples_add_their_scatter_to_the_error_of_the_shear():
+    parts = dict(of_samples(law=(("seeds", (12, 5, 8)),), approach=True).steps[-1].shear_errors)
+    assert list(parts) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes"]
+    assert parts["samples"] > parts["slopes"] > 0.0
+
+
+def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
+    step = of_samples(shear=False).steps[-1]
+    assert np.hypot(*response(step)) < 1e-3 * step.force_N  # the face is as symmetric as its mesh
+    assert step.shear_force_error_N >= 0.0
+    assert step.approach_error_mm > 0.0
 
 
 def test_laws_without_shear_state_what_holds_their_face():

@@ -1,0 +1,362 @@
+"""Errors of load steps under laws of samples with friction: what the path of a shear has left.
+
+Shear depends on its path. The path is gone once more through its turning points: on the same
+elements, on those that `multiscale.law_errors` compares with, and with laws whose pressures are
+higher by what they may be off.
+
+What the springs of a law leave out is told by the cells of its samples, under the mean closure and
+slip (or shear stress) of their region at every turning point. Pressures and tractions see each
+other there, and the same path on fewer cells tells the error of the grid. Errors of the slip under
+a known shear stress are errors of the shift. Errors of the shear stress at a known slip change the
+shear force as in a series of two springs: that of the interface, and that of the body.
+
+How far that can be trusted: docs/accuracy.md, measured errors, and
+tests/benchmarks/shear_error_study.py --samples.
+
+Theory: docs/theory.md, sections 13 and 15.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from geometry import Control, NotConverged, Surface
+from geometry.shear_state import ShearControl
+from geometry.sliders import Sliders
+from micro.friction.friction_model import FrictionModel
+from multiscale.inputs.surfaces import RegionSamples
+from multiscale.law_errors import LawErrorProbe, causes_of, separation_of
+from multiscale.laws.law_table import LawTable
+from multiscale.laws.patch_law import PatchLaw
+from multiscale.measured_errors import MeasuredErrors
+from multiscale.shear_errors import BY_NORMAL, FEWEST_CELLS, gone, grid_error, resampled
+from support.arrays import Array
+from support.collective import shared
+
+if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
+    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+
+
+class _Point(NamedTuple):
+    """The means of every region at a turning point, weighted by pressure.
+
+    Attributes:
+        closure: Closures, shape (R,) [mm]; −∞ where nothing touches.
+        slip: Displacements of the plane along the face against it, shape (R, 2) [mm].
+        force: Normal forces, shape (R,) [N].
+    """
+
+    closure: Array
+    slip: Array
+    force: Array
+
+
+class _OnCells(NamedTuple):
+    """What cells tell of laws at the last turning point, by region.
+
+    Attributes:
+        pressure: Error of the pressure at the closure, relative, shape (R,).
+        springs: Error of the shear stress over the pressure at the slip where the shift is
+            prescribed, of the slip at this stress [mm] where the shear force is, shape (R,).
+        grid: The same by the cells, shape (R,).
+        size: Shear stress over the pressure, or slip, that they are errors of, shape (R,).
+    """
+
+    pressure: Array
+    springs: Array
+    grid: Array
+    size: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LawShearProbe(LawErrorProbe):
+    """Measures the errors of the latest load step on a face with laws of samples and friction.
+
+    Args:
+        path: What the turning points of the shear prescribed, the latest load step last.
+        table: The laws.
+        problem_with: Returns the problem on a face of the same bodies, with other laws.
+        friction_of: Returns the friction of a sample's cells, whose pressures and tractions see
+            each other.
+    """
+
+    path: Sequence[Control]
+    table: LawTable
+    problem_with: Callable[[LoadedFace | FacePair, LawTable], LawContactProblem]
+    friction_of: Callable[[RegionSamples, Surface], FrictionModel]
+
+    @property
+    def by_shift(self) -> bool:
+        """Whether the shift is prescribed, and not the shear force."""
+        shear = self.path[-1].shear
+        return shear is None or shear.force is None
+
+    def measure_both(self) -> tuple[MeasuredErrors, dict[str, float]]:
+        """Measure the errors of the normal force at the approach, and those of the shear.
+
+        Returns:
+            The errors of the normal force, and by cause those of the shear force where the shift
+            is prescribed [N], of the shift where the shear force is [mm].
+
+        Raises:
+            NotConverged: When one of the contact problems cannot be solved.
+
+        Note:
+            Collective.
+        """
+        causes = causes_of(self.samples)
+        none = dict.fromkeys(causes, 0.0)
+        if not self.state.force:
+            return MeasuredErrors(parts=none, stiffness=0.0), none
+        response = self.problem.approach_response()
+        per_answer = 1.0 if self.path[-1].force is None else response.stiffness
+        mesh, quadrature = self.discretisation()
+        errors = self.pressure_errors(response)
+        sums, forces = response.sampling.patch_sums, self._points[-1].force
+        cells, floor = self._on_cells(), sums(errors["grid"]) / np.where(forces > 0.0, forces, 1.0)
+        # the cells know the error between rows at their closure, and what tractions lift
+        of_cells = cells.pressure[response.sampling.patch] * self.state.sample_pressure
+        errors["laws"] = np.maximum(errors["laws"], of_cells)
+        parts = {"mesh": per_answer * mesh[0], "quadrature": per_answer * quadrature[0]} | {
+            cause: float(response.force_changes(error).sum()) for cause, error in errors.items()
+        }
+        shear = {"mesh": math.hypot(*mesh[1:]), "quadrature": math.hypot(*quadrature[1:])}
+        shear |= self._by_pressures({cause: sums(error) for cause, error in errors.items()})
+        grid = np.maximum(cells.grid, BY_NORMAL * floor * cells.size)
+        for cause, error in (("laws", cells.springs), ("grid", grid)):
+            shear[cause] += self._by_interface(error)
+        normal = {cause: float(parts[cause]) for cause in causes}
+        return (
+            MeasuredErrors(parts=normal, stiffness=response.stiffness),
+            {cause: float(shear[cause]) for cause in causes},
+        )
+
+    # --- the path on the bodies
+
+    @cached_property
+    def _own(self) -> tuple[LawContactProblem, FaceEquilibrium, list[_Point]]:
+        """The path on the same elements: the problem, its end, and all turning points."""
+        points: list[_Point] = []
+        problem = self.problem_of(self.face)
+        return problem, self._gone(problem, points), points
+
+    @property
+    def _points(self) -> list[_Point]:
+        return self._own[2]
+
+    def _gone(self, problem: LawContactProblem, points: list[_Point] | None = None) -> Any:
+        """Go the path on a problem, and return its end.
+
+        Args:
+            problem: The problem, on which nothing has touched yet.
+            points: Receives the means of the regions.
+        """
+        state = None
+        for control in self.path:
+            state = problem.solve(control)
+            if points is not None:
+                points.append(_means(problem, state))
+        return state
+
+    @property
+    def answer(self) -> Array:
+        """The force under a prescribed approach, or the approach, and the shear, shape (3,)."""
+        return self._answer_of(self._own[1])
+
+    def answer_on(self, face: Any, *, same: bool = True) -> Array:
+        """Return the answer on another face, at the end of the same path."""
+        return self._answer_of(self._gone(self.problem_of(face)))
+
+    def _answer_of(self, state: FaceEquilibrium) -> Array:
+        normal = state.force if self.path[-1].force is None else state.approach
+        shear = state.shear
+        assert shear is not None
+        return np.array([normal, *(shear.force if self.by_shift else shear.shift)])
+
+    def _by_pressures(self, errors: dict[str, Array]) -> dict[str, float]:
+        """Return what errors of the laws' pressures change in the shear, by cause.
+
+        Args:
+            errors: Their integrals over the regions, shapes (R,) [N].
+        """
+        forces = self._points[-1].force
+        loaded = np.where(forces > 0.0, forces, 1.0)
+        known = [error for error in errors.values() if np.isfinite(error).all()]
+        share = np.where(forces > 0.0, sum(known, np.zeros_like(forces)) / loaded, 0.0)
+        changed, whole = 0.0, float(sum(error.sum() for error in known))
+        if whole > 0.0:
+            changed = max(self._with_pressures(1.0 + sign * share) for sign in (1.0, -1.0))
+        return {
+            cause: changed * float(error.sum()) / whole if whole > 0.0 else 0.0
+            for cause, error in errors.items()
+        } | {cause: math.inf for cause, error in errors.items() if not np.isfinite(error).all()}
+
+    def _with_pressures(self, factors: Array) -> float:
+        """Return what the shear changes where pressures are multiplied; infinite where it slides.
+
+        Args:
+            factors: Those of every region, shape (R,).
+        """
+        pairs = zip(self.table.laws, np.maximum(factors, 0.5), strict=True)
+        laws = tuple(law.multiplied(float(factor)) for law, factor in pairs)
+        problem = self.problem_with(self.face, replace(self.table, laws=laws))
+        try:
+            moved = self._answer_of(self._gone(problem)) - self.answer
+        except NotConverged:
+            return math.inf
+        return math.hypot(*moved[1:])
+
+    def _by_interface(self, errors: Array) -> float:
+        """Return what errors of the interface alone change in the shear.
+
+        Args:
+            errors: Those of `_OnCells`, shape (R,).
+        """
+        problem, forces = self._own[0], self._points[-1].force
+        whole = float(np.where(forces > 0.0, errors, 0.0) @ forces)
+        if not self.by_shift:
+            return whole / float(forces.sum())
+        sticking = problem.sticking_stiffness()
+        body = problem.tangential_stiffness()[0] / sticking if sticking else 1.0
+        return whole * min(body, 1.0)
+
+    # --- the cells of samples
+
+    def _on_cells(self) -> _OnCells:
+        """Go the path of every region's means on the cells of its samples; collective."""
+        paths = [self._path_of(number, law) for number, law in enumerate(self.table.laws)]
+        tasks = [
+            (number, sample)
+            for number, region in enumerate(self.samples)
+            for sample in region.surfaces
+            if paths[number]
+        ]
+
+        def go(task: int) -> Array:
+            number, sample = tasks[task]
+            return self._of_sample(number, sample, paths[number])
+
+        found = shared(self.comm, len(tasks), go)
+        errors = np.zeros((4, len(self.samples)))
+        for number in {number for number, _ in tasks}:
+            own = [one for (of, _), one in zip(tasks, found, strict=True) if of == number]
+            areas = np.array([sample.area for sample in self.samples[number].surfaces])
+            errors[:, number] = _errors_of(paths[number][-1], own, areas, by_shift=self.by_shift)
+        return _OnCells(*errors)
+
+    def _path_of(self, number: int, law: PatchLaw) -> list[_Reached]:
+        """Return what a law reaches along the means of its region, from where that touches."""
+        forces: Any = self._own[0].forces
+        mu, one = forces.friction.coefficient, np.zeros(1, np.intp)
+        sliders = Sliders([law.springs], np.array([law.stiffness_ratio]), one, mu)
+        path, state = list[_Reached](), sliders.at_rest
+        for point in self._points:
+            closure, slip = point.closure[number : number + 1], point.slip[number]
+            if not np.isfinite(closure[0]):
+                path, state = [], sliders.at_rest
+                continue
+            pressure, stiffness = law.pressure(closure), law.stiffness(closure)
+            found = sliders.respond(state, closure, slip[None], pressure, stiffness)
+            state, p = found.after, float(pressure[0])
+            reached = float(closure[0]), p, float(stiffness[0]), slip, found.stress[0] / p
+            path.append(_Reached(*reached))
+        return path
+
+    def _of_sample(self, number: int, sample: Surface, path: Sequence[_Reached]) -> Array:
+        """Return how a sample ends a path, on its cells and on fewer, shape (3, 4).
+
+        Its normal forces are those at the closures of the law, without shear. The columns are this
+        force [N], how much nearer the plane is where pressures and tractions see each other [mm],
+        and the shear force over the normal one, or the shift [mm], along x and y. The rows are
+        those of its cells, and of half and a quarter as many along a side; NaN where these are too
+        few, or a contact is not found.
+        """
+        probe = self.probe_of(self.samples[number], sample)
+        reference = probe.model.reference_height - sample.mean_height
+        friction, law = self.friction_of(self.samples[number], sample), self.table.laws[number]
+        normal, own = resampled(probe, friction, sample.grid)
+        controls = []
+        for reached in path:
+            approach = reference - separation_of(law, reached.closure, reference)
+            force = normal.press(Control(approach=approach)).force
+            x, y = map(float, reached.slip if self.by_shift else force * reached.rate)
+            load = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
+            controls.append(Control(force=force, shear=load))
+        found = np.full((3, 4), np.nan)
+        for row, times in enumerate((1, 2, 4)):
+            grid = sample.grid[0] // times, sample.grid[1] // times
+            if row and min(grid) < FEWEST_CELLS // 4:
+                continue
+            try:
+                on_cells = (normal, own) if row == 0 else resampled(probe, friction, grid)
+                state, shear = gone(*on_cells, controls)
+            except NotConverged:
+                continue
+            end = np.array(shear.force) / state.force if self.by_shift else shear.shift
+            found[row] = state.force, state.approach - approach, *end
+        return found
+
+
+class _Reached(NamedTuple):
+    """What a law reaches at the means of a region.
+
+    Attributes:
+        closure: The closure [mm].
+        pressure: The pressure there [MPa].
+        stiffness: Its derivative [MPa/mm].
+        slip: The displacement of the plane along the face against it, shape (2,) [mm].
+        rate: Shear stresses over the pressure, shape (2,).
+    """
+
+    closure: float
+    pressure: float
+    stiffness: float
+    slip: Array
+    rate: Array
+
+
+def _errors_of(
+    law: _Reached, samples: Sequence[Array], areas: Array, *, by_shift: bool
+) -> list[float]:
+    """Return what `_OnCells` has of one region.
+
+    Args:
+        law: What its law reaches.
+        samples: How its samples end the path, see `LawShearProbe._of_sample`.
+        areas: Their areas [mm²].
+        by_shift: Whether the shift is prescribed.
+    """
+    ends = np.array(samples)
+    forces = ends[:, 0, 0]
+    weights = forces / forces.sum() if forces.sum() > 0.0 else np.full(len(forces), np.nan)
+    on_cells = np.tensordot(weights, ends[:, :, 2:], axes=1)
+    by_law = law.rate if by_shift else law.slip
+    springs, half, quarter = (
+        math.hypot(*(one - other))
+        for one, other in zip(on_cells, (by_law, *on_cells[:2]), strict=True)
+    )
+    if math.isnan(quarter):
+        quarter = 0.0
+    nearer = float(weights @ ends[:, 0, 1])
+    pressure = forces.sum() / areas.sum() - law.stiffness * nearer
+    errors = abs(pressure / law.pressure - 1.0), springs, grid_error(half, quarter)
+    known = [float(error) if math.isfinite(error) else math.inf for error in errors]
+    return [*known, math.hypot(*by_law)]
+
+
+def _means(problem: LawContactProblem, state: FaceEquilibrium) -> _Point:
+    """Return the means of every region at a load step just solved; collective."""
+    sampling, memory = problem.sampling, problem.memory
+    assert memory is not None
+    pressure = state.sample_pressure
+    force = sampling.patch_sums(pressure)
+    loaded = np.where(force > 0.0, force, 1.0)
+    closure = sampling.patch_sums(pressure * state.sample_closure) / loaded
+    slips = [sampling.patch_sums(pressure * along) / loaded for along in memory.sliders.slip.T]
+    return _Point(np.where(force > 0.0, closure, -np.inf), np.stack(slips, axis=1), force)
