@@ -13,7 +13,7 @@ cells.
 With ``--laws`` the scenes have patch laws on 48² cells (consistent or isolated, 1 to 4 × 4
 patches), and are judged by coupled cells on the block, on twice as many a side. With ``--samples``
 a law of a sample on 16² cells stands for a face of 4 × 4 of them on a block, which is judged by
-coupled cells on twice as many a side of every sample. Run it from the project's root.
+coupled cells on 24² of every sample. Run it from the project's root.
 """
 
 import argparse
@@ -145,7 +145,7 @@ def judged(number, random, kind):
         if kind == "laws":
             on["coupling"] = {"kind": "concurrent"}
         if kind == "samples":
-            exact = on_cells_of_face(data, COUPLED_ON * cells)
+            exact = on_cells_of_face(data, 3 * cells // 2)
             by_load = not by_approach
             name = "approach_mm" if by_load else "force_N"
             off = abs(getattr(exact, name) - getattr(step, name))

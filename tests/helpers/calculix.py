@@ -80,7 +80,7 @@ class Solution:
     shear: np.ndarray
 
 
-def solve(folder, face, laws, control, crown=None, shifts=()):
+def solve(folder, face, laws, control, crown=None, shifts=(), *, pairs="NODE TO SURFACE"):
     """Press a block under exported laws with CalculiX, then shift the plane along it.
 
     Args:
@@ -90,8 +90,9 @@ def solve(folder, face, laws, control, crown=None, shifts=()):
         control: Approach and tilt of the plane.
         crown: Depth of the face at (x, y) [mm], by which its nodes are lowered; None: flat.
         shifts: Shifts (x, y) of the plane one after the other [mm].
+        pairs: CalculiX' type of contact pairs.
     """
-    lines = _deck(face, laws, control, crown, shifts)
+    lines = _deck(face, laws, control, crown, shifts, pairs)
     (folder / "block.inp").write_text("\n".join(lines) + "\n")
     return _read(printed(folder, "block"))
 
@@ -111,7 +112,7 @@ def printed(folder, deck):
     return (folder / f"{deck}.dat").read_text()
 
 
-def _deck(face, laws, control, crown, shifts):
+def _deck(face, laws, control, crown, shifts, pairs):
     """Yield the lines of the input deck."""
     block, nodes = face.body, face.space.tabulate_dof_coordinates().copy()
     top = np.abs(nodes[:, 2]) < _TOP
@@ -144,7 +145,7 @@ def _deck(face, laws, control, crown, shifts):
         name = "{}_{}".format(*face.patches.unravel(index))
         yield f"*SURFACE, NAME=FACE_{name}, TYPE=ELEMENT"
         yield from (f"{cell + 1}, S{side + 1}" for cell, side, patch in faces if patch == index)
-        yield f"*CONTACT PAIR, INTERACTION=PATCH_{name}, TYPE=NODE TO SURFACE"
+        yield f"*CONTACT PAIR, INTERACTION=PATCH_{name}, TYPE={pairs}"
         yield f"FACE_{name}, MASTER"
     yield "*NSET, NSET=BOTTOM"
     yield from (f"{i + 1}," for i in np.flatnonzero(nodes[:, 2] < nodes[:, 2].min() + _TOP))
