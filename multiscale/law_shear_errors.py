@@ -263,7 +263,7 @@ class LawShearProbe(LawErrorProbe):
                 continue
             pressure, stiffness = law.pressure(closure), law.stiffness(closure)
             found = sliders.respond(state, closure, slip[None], pressure, stiffness)
-            state, p = found.after, float(pressure[0])
+            state, p = sliders.step(state, found).after, float(pressure[0])
             reached = float(closure[0]), p, float(stiffness[0]), slip, found.stress[0] / p
             path.append(_Reached(*reached))
         return path
