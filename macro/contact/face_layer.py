@@ -30,9 +30,10 @@ from macro.linear_solvers.options import conjugate_gradients, shell
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-_OFF = 0.02
+_OFF = 0.005
 """Change of a pressure, relative to that where most of the force is, from which laws are solved for
-on the layer. Smaller changes Newton's method finds itself."""
+on the layer. Smaller changes Newton's method finds itself. With 0.02 two laws on a nearly
+incompressible pad took 6 steps in place of 5, in the same CPU time."""
 _LAYERS = 2
 """Layers of nodes around those of the samples that are off."""
 _MOST_STEPS = 10
