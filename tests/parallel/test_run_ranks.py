@@ -23,7 +23,7 @@ SCENES = {
     # most of the block lies beside the interface: a rank of three owns none of it
     "wide block, tilted": [
         "block.cells=[4, 4, 4]", "block.margin=4 mm", "block.margin_cells=6",
-        "load.tilt=['2 um/mm', '-1 um/mm']",
+        "load.tilt=['2 um/mm', '-1 um/mm']", "coupling.newton=full",
     ],
     "half-space with slopes, tilted": [
         "coupling.kind=analytic", "micro.model=half-space", "micro.finite_slopes=true",
