@@ -6,7 +6,7 @@ problem on the surface's cells. `AsperityModel` sees its summits alone. `micro_m
 them by name.
 
     closed_forms                                      Hertz, Love
-    compliance → contact → half_space                 the contact problem on cells
+    boundary_elements → complementarity → half_space  the contact problem on cells
     friction                                          tractions, stick and slip on the cells
     asperities                                        summits that interact pair by pair
 """

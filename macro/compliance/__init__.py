@@ -1,1 +1,1 @@
-"""What pressures on a face displace there, in smooth modes, and the cache on disk."""
+"""What loads on a face displace there, in smooth modes or by patches, and the cache on disk."""

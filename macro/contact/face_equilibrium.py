@@ -65,8 +65,8 @@ def _no_numbers() -> Array:
 class FaceEquilibrium:
     """Equilibrium of a meshed body whose face is in contact with a rigid plane.
 
-    It is not the contact itself. A `geometry.ContactState` holds the contact of a whole surface on
-    one process, with its spots and fields. Here the unknowns are displacements that are distributed
+    It is not the contact itself. A `ContactState` holds the contact of a whole surface on one
+    process, with its spots and fields. Here the unknowns are displacements that are distributed
     over ranks: displacements, samples of laws and nodes are those of this rank, and all else is the
     same on every rank. Of meshed roughness, `macro.nodal_contact` gathers what a `ContactState` is
     made of.

@@ -89,7 +89,7 @@ def clearance(interference: Array, motions: Motions) -> Clearance:
 
     It is a linear programme in the motions and the largest interference, with one condition for
     every cell. Cells that violate the motions found so far most are added one by one. The start of
-    a plane on few peaks (`micro.asperities.plane_on_peaks`) is the same programme with all
+    a plane on few peaks (`Peaks`) is the same programme with all
     conditions at once.
 
     Args:

@@ -179,7 +179,7 @@ class Bodies:
                 from macro import displacements_under
 
                 return displacements_under(self.contact_face(), pressures)
-            return np.asarray(pressures @ self.loaded_compliance(loaded).T)
+            return np.asarray(pressures[:, loaded] @ self._unit_displacements(loaded).T)
 
         return displacements
 
@@ -192,14 +192,18 @@ class Bodies:
         Note:
             Collective; one solution of the mesh for each patch that has not been loaded before.
         """
+        compliance = np.zeros(2 * (self.parts.patches.count,))
+        compliance[:, loaded] = self._unit_displacements(loaded)
+        return compliance
+
+    def _unit_displacements(self, loaded: Indices) -> Array:
+        """Return displacements by single unit pressures, solved for once, (N, m) [mm/MPa]."""
         new = [patch for patch in loaded.tolist() if patch not in self._columns]
         if new:
             found = self._cached("columns", tuple(new), lambda: self._under(np.array(new)))
             self._columns.update(zip(new, found.T, strict=True))
-        compliance = np.zeros(2 * (self.parts.patches.count,))
-        for patch in loaded.tolist():
-            compliance[:, patch] = self._columns[patch]
-        return compliance
+        columns = [self._columns[patch] for patch in loaded.tolist()]
+        return np.reshape(columns, (len(loaded), self.parts.patches.count)).T
 
     def compliance_under(self, loaded: Indices) -> Array:
         """Return the compliance of both sides where only some patches can carry load, (N, N).

@@ -24,9 +24,7 @@ from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
 from multiscale.console import Clock
 from multiscale.couplings import describe, validity
-from multiscale.inputs.bodies import (
-    SceneBody,
-)
+from multiscale.inputs.bodies import SceneBody
 from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
 from multiscale.inputs.scene_parts import SceneParts, Source
 from multiscale.inputs.surfaces import located

@@ -1,1 +1,1 @@
-"""What the sections of a scene become: surfaces, samples, loads, meshes, and the memory of them."""
+"""What the sections of a scene become: surfaces, samples, loads, meshes; their work and memory."""

@@ -120,7 +120,7 @@ class LawTable(Displayed):
 
     @property
     def zero(self) -> str:
-        """What closures count from, see `geometry.Zero`."""
+        """What closures count from, see `geometry.zero.Zero`."""
         return self.made_by.get("zero", FIRST_TOUCH)
 
     def counted_from(self, name: str, zero: float) -> LawTable:

@@ -1,1 +1,1 @@
-"""What a run found: load steps, values at mesh size zero with error bars, ranges of validity."""
+"""What a run found, and how it is read back: load steps, contacts, fields, error bars, accuracy."""

@@ -146,7 +146,7 @@ def test_coupled_friction_says_so_and_goes_on_where_it_was(tmp_path, kind):
     write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
     first.close()
     stored, second = read_checkpoint(path), Run(made)
-    second.resume(stored.steps, stored.position, stored.state, stored.laws, stored.contacts)
+    second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)
     rest = list(second.load_steps())
     second.close()
     for name in ("shear_force_x_N", "dissipated_mJ", "approach_mm"):
