@@ -127,9 +127,8 @@ ERROR, LAWS = "error measured in the run", "`patchlaw laws` (for other programs)
 
 INTRO = """# What works with what
 
-Which choice goes with which coupling? `docs/what_works.py` writes this page from what the code
-refuses; a refusal also says what would do instead. Columns are values of `coupling.kind`, and laws
-of samples (`law.kind = "representative"`).
+`docs/what_works.py` writes this page from what the code refuses; a refusal also says what would do
+instead. Columns are values of `coupling.kind`, and laws of samples (`law.kind = "representative"`).
 
 ## One choice
 
