@@ -43,7 +43,7 @@ from support.collective import shared
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
-    from macro.contact.law_problem import ApproachResponse
+    from macro.contact.contact_response import ApproachResponse
 
 CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
 """The causes, in their order."""

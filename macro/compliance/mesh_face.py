@@ -1,28 +1,21 @@
 """Compliance of a rectangle on the contact face of a meshed body, in Legendre modes.
 
 The displacement by a mode of pressure is that of a half-space, in closed form, and a correction u:
-the half-space's tractions are taken off the body's outer surface, its displacements off the
-supports, and where the body has other elastic constants than under the rectangle, its stresses
-count with the difference. The correction is smooth, so that the user's mesh resolves it. Where the
-body rises above the plane of its face the half-space ends there; then the modes load the mesh
-itself, and their displacements are as good as the mesh under them.
+`HalfSpaceCorrections` load the body for it. The correction is smooth, so that the user's mesh
+resolves it. Where the body rises above the plane of its face the half-space ends there; then the
+modes load the mesh itself, and their displacements are as good as the mesh under them.
 
 Theory: section 6 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
-import ufl
-from dolfinx import fem
-from numpy.typing import NDArray
 from petsc4py import PETSc
-from scipy.sparse import csr_matrix
 
 from geometry.face_frame import FaceFrame
 from geometry.materials import Material
@@ -30,42 +23,18 @@ from geometry.patches import PatchGrid
 from macro import compat
 from macro.bodies import MeshedBody
 from macro.compliance.face_compliance import FaceCompliance, stresses_in_face
+from macro.compliance.half_space_corrections import HalfSpaceCorrections, HalfSpaceFields
 from macro.compliance.surroundings import FaceMoments
-from macro.elastic_body import ElasticBody, stiffness_form
+from macro.elastic_body import ElasticBody
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import FACTORISED
 from macro.linear_solvers.solvers import solve_linear, solved_at_once
-from macro.mesh.block import FLAT
 from macro.mesh.contact_face import ContactFacets
-from macro.mesh.facets import OuterFacets, outer_facets
 from support.arrays import Array
 from support.errors import InputError
 
 MOST_DOFS = 500_000
 """Degrees of freedom up to which linear elements are raised to quadratic ones."""
-_BATCH = 20_000
-"""Points of the surface whose fields are evaluated at once."""
-
-
-class HalfSpaceFields(Protocol):
-    """Fields in a half-space under the modes, in the coordinates of the rectangle."""
-
-    @property
-    def count(self) -> int:
-        """Modes K along a side."""
-        ...
-
-    def __call__(self, points: Array, /) -> tuple[Array, Array]:
-        """Return displacements (n, 3, K²) [mm] and stresses (n, 3, 3, K²) [MPa] at points."""
-        ...
-
-    def modes(self) -> tuple[Array, Array]:
-        """Return displacements (K², K²) [mm/N] and stresses (3, K², K²) [1/mm²] in modes."""
-        ...
-
-    def displacement_modes(self) -> Array:
-        """Return displacements along x, y and downwards in modes, shape (3, K², K²) [mm/N]."""
-        ...
 
 
 def from_outside(facets: ContactFacets, length: float) -> ContactFacets:
@@ -137,15 +106,12 @@ def mesh_face_compliance(
     if count < 1 or (fields is not None and fields.count != count):
         raise InputError("a face has one mode at least", value=count, allowed="K ≥ 1")
     moments = FaceMoments(body, facets, rectangle, count)
-    corrections = (
-        None if fields is None else _Corrections(body, facets, rectangle, material, fields)
-    )
+    loads: Sequence[_Load] = [_Tractions(moments, 2)]
+    if fields is not None:
+        loads = [HalfSpaceCorrections(body, facets, rectangle, material, fields)]
     responses = np.zeros((4, count**2, count**2))
-    for mode, values in _solutions(body, corrections or moments, count**2):
-        total = body.function(values)
-        if corrections is not None:
-            total.x.array[:] += corrections.prescribed(mode)
-        responses[:, :, mode] = moments.of(total)
+    for _, mode, displacement in _displacements(body, loads, count**2):
+        responses[:, :, mode] = moments.of(displacement)
     area = float(np.prod(rectangle.lengths))
     # per unit moment: a mode has the moment A, and its own displacements' moments are over A
     return _gathered(responses / area, area, material, fields)
@@ -181,15 +147,12 @@ def mesh_face_tractions(
         Collective. One solve for each of the 3 K² modes.
     """
     moments = FaceMoments(body, facets, rectangle, count)
-    corrections = [_Corrections(body, facets, rectangle, material, field) for field in fields or ()]
-    loads = _InTurn(corrections or [_Tractions(moments, axis) for axis in range(3)], count**2)
+    loads: Sequence[_Load] = [_Tractions(moments, axis) for axis in range(3)]
+    if fields is not None:
+        loads = [HalfSpaceCorrections(body, facets, rectangle, material, field) for field in fields]
     total = np.zeros((3, 3, count**2, count**2))
-    for number, values in _solutions(body, loads, 3 * count**2):
-        axis, mode = divmod(number, count**2)
-        moved = body.function(values)
-        if corrections:
-            moved.x.array[:] += corrections[axis].prescribed(mode)
-        total[:, axis, :, mode] = moments.displacements(moved)
+    for axis, mode, displacement in _displacements(body, loads, count**2):
+        total[:, axis, :, mode] = moments.displacements(displacement)
     total /= float(np.prod(rectangle.lengths))
     if fields is not None:
         total += np.stack([field.displacement_modes() for field in fields], axis=1)
@@ -238,133 +201,46 @@ class _Tractions:
         """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
         return self._moments.load(mode, self._axis)
 
+    def prescribed(self, _mode: int) -> float:
+        """Return the displacements that supports prescribe: none."""
+        return 0.0
 
-class _InTurn:
-    """Modes along three axes in turn, as loads of the mesh.
+
+_Load = _Tractions | HalfSpaceCorrections
+
+
+def _displacements(
+    body: ElasticBody, loads: Sequence[_Load], count: int
+) -> Iterator[tuple[int, int, Any]]:
+    """Yield the number of a load, that of a mode, and the displacements by it as a function.
 
     Args:
-        parts: The loads by axis.
+        body: The body.
+        loads: The loads.
         count: Modes of each.
     """
 
-    def __init__(self, parts: Sequence[_Tractions | _Corrections], count: int) -> None:
-        self._parts, self._count = parts, count
+    def load(number: int) -> Array:
+        return loads[number // count].load(number % count)
 
-    def load(self, number: int) -> Array:
-        """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
-        axis, mode = divmod(number, self._count)
-        return self._parts[axis].load(mode)
-
-
-class _Corrections:
-    """What a half-space under the modes does wrong on a body's surface, as loads of the body."""
-
-    def __init__(
-        self,
-        body: ElasticBody,
-        facets: ContactFacets,
-        rectangle: PatchGrid,
-        material: Material,
-        fields: HalfSpaceFields,
-    ) -> None:
-        frame = facets.frame.moved(*rectangle.origin)
-        outer = outer_facets(body.space, 2 * body.degree + 4)
-        level = np.abs(frame.height(outer.points)).max(axis=1, initial=0.0)
-        outer = outer.among(level > FLAT * max(rectangle.lengths))
-        self._body, self._nodes = body, np.unique(outer.nodes[outer.on_facet])
-        self._frame, self._fields, self._material = frame, fields, material
-        self._tractions = self._integrated(outer)
-        self._held = fem.Function(body.space)
-        self._supported = np.flatnonzero(body.supported)
-        self._support_nodes, self._row = np.unique(self._supported // 3, return_inverse=True)
-        self._displacements = self._displacement(self._support_nodes)
-        self._product = compat.compile_form(ufl.action(body.form, self._held))
-
-    def load(self, mode: int) -> Array:
-        """Return the nodal forces of a mode at this rank's owned degrees of freedom [N]."""
-        local = np.zeros((len(self._held.x.array) // 3, 3))
-        local[self._nodes] = self._tractions[..., mode]
-        forces = compat.sum_of_ranks(self._body.space, local.ravel())
-        self._held.x.array[:] = self.prescribed(mode)
-        forces -= compat.assemble_vector(self._product).array_r
-        if self._elsewhere is not None:
-            form, function, nodes, displacements = self._elsewhere
-            function.x.array.reshape(-1, 3)[nodes] = displacements[..., mode]
-            forces -= compat.assemble_vector(form).array_r
-        return forces
-
-    def prescribed(self, mode: int) -> Array:
-        """Return the displacements that supports prescribe, this rank's with ghosts."""
-        values = np.zeros(len(self._held.x.array))
-        values[self._supported] = -self._displacements[self._row.ravel(), self._supported % 3, mode]
-        return values
-
-    def _integrated(self, outer: OuterFacets) -> Array:
-        """Return the forces at the nodes by the half-space's tractions, (nodes, 3, K²) [N]."""
-        count, points = outer.weights.shape
-        total = np.zeros((len(self._nodes), 3 * self._fields.count**2))
-        place = np.searchsorted(self._nodes, outer.nodes)
-        for part in np.array_split(np.arange(count), -(-count * points // _BATCH) or 1):
-            stress = self._fields(self._local_places(outer.points[part].reshape(-1, 3)))[1]
-            normals = outer.normals[part].reshape(-1, 3) @ self._frame.axes.T
-            tractions = np.einsum("nijk,nj->nik", stress, normals)
-            tractions = np.einsum("ia,nik->nak", self._frame.axes, tractions)
-            tractions *= -outer.weights[part].reshape(-1, 1, 1)
-            values = outer.values[outer.side[part]] * outer.on_facet[part][:, None]
-            rows = np.repeat(place[part], points, axis=0)
-            starts = np.arange(len(rows) + 1) * rows.shape[1]
-            flat = (values.reshape(rows.shape).ravel(), rows.ravel() % len(self._nodes), starts)
-            shape = csr_matrix(flat, shape=(len(rows), len(self._nodes)))
-            total += shape.T @ tractions.reshape(len(rows), -1)
-        return total.reshape(len(self._nodes), 3, -1)
-
-    def _displacement(self, nodes: NDArray[np.intp]) -> Array:
-        """Return the half-space's displacements of nodes, shape (n, 3, K²) [mm]."""
-        places = self._body.space.tabulate_dof_coordinates()[nodes]
-        displacements = np.empty((len(nodes), 3, self._fields.count**2))
-        for part in np.array_split(np.arange(len(nodes)), -(-len(nodes) // _BATCH) or 1):
-            local = self._fields(self._local_places(places[part]))[0]
-            displacements[part] = np.einsum("ia,nik->nak", self._frame.axes, local)
-        return displacements
-
-    def _local_places(self, points: Array) -> Array:
-        """Return points in the coordinates of the rectangle."""
-        return np.column_stack([self._frame.in_plane(points), self._frame.height(points)])
-
-    @cached_property
-    def _elsewhere(self) -> tuple[Any, Any, NDArray[np.intp], Array] | None:
-        """Where the body has other elastic constants: the form of the difference.
-
-        It acts on a function, whose nodes there get the displacements of the half-space.
-        """
-        body = self._body
-        differences = [
-            np.asarray(values, float) - own
-            for values, own in zip(body.cell_lame, self._material.lame, strict=True)
-        ]
-        size = sum(self._material.lame)
-        other = np.abs(differences[0]) + np.abs(differences[1]) > 1e-9 * size
-        if not body.comm.allreduce(bool(other.any())):
-            return None
-        cells = [np.where(other, values, 0.0) for values in differences]
-        displacement = fem.Function(body.space)
-        form = stiffness_form(body.space, (cells[0], cells[1]), body.quadrature_degree)
-        nodes = np.unique(compat.cell_nodes(body.space)[np.flatnonzero(other)])
-        action = compat.compile_form(ufl.action(form, displacement))
-        return action, displacement, nodes, self._displacement(nodes)
+    for number, values in _solutions(body, load, len(loads) * count):
+        which, mode = divmod(number, count)
+        displacement = body.function(values)
+        displacement.x.array[:] += loads[which].prescribed(mode)
+        yield which, mode, displacement
 
 
 def _solutions(
-    body: ElasticBody, loads: FaceMoments | _InTurn | _Corrections, count: int
+    body: ElasticBody, forces: Callable[[int], Array], count: int
 ) -> Iterator[tuple[int, Array]]:
-    """Yield every mode and its displacements, this rank's owned ones."""
+    """Yield the numbers of loads and this rank's owned displacements by them."""
     free, (load, solution) = body.free.array_r.copy(), body.stiffness.createVecs()
     if body.dofs <= FACTORISED and not PETSc.Options(PREFIX).hasName("pc_type"):
-        right = np.stack([free * loads.load(mode) for mode in range(count)], axis=1)
+        right = np.stack([free * forces(number) for number in range(count)], axis=1)
         yield from enumerate(solved_at_once(body.stiffness, right).T)
         return
-    for mode in range(count):
-        load.array[:] = free * loads.load(mode)
+    for number in range(count):
+        load.array[:] = free * forces(number)
         solve_linear(body.solver, load, solution)
-        yield mode, solution.array_r
+        yield number, solution.array_r
         compat.collect_garbage(solution.comm)

@@ -362,11 +362,11 @@ class Interface:
         Raises:
             InputError: Without friction; when it is set, where it is that of another face.
         """
-        return self._rubbing().record()
+        return self._rubbing().sliders.record()
 
     @slip_record.setter
     def slip_record(self, record: SliderRecord) -> None:
-        self._rubbing().restore(record)
+        self._rubbing().sliders.restore(record)
 
     @property
     def shear_force(self) -> Array:

@@ -46,7 +46,7 @@ class LawsAtPoints:
             raise InputError(
                 "an external operator knows pressures alone",
                 key="friction",
-                value=interface.rubs.friction.coefficient,
+                value=interface.rubs.sliders.friction.coefficient,
                 allowed="no friction; or Interface.add_residual and ContactProblem",
             )
         self._interface = interface

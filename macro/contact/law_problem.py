@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +17,16 @@ from geometry.rigid_plane import Control, RigidPlane
 from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
+from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_forces import ContactLaw, ContactLaws
 from macro.contact.contact_preconditioner import ContactPreconditioner
+from macro.contact.contact_response import ApproachResponse, ContactResponse
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_layer import FaceLayer
+from macro.contact.face_sliders import SliderMemory
 from macro.contact.first_steps import FirstSteps
-from macro.contact.frictional_forces import FrictionalForces, SliderMemory, contact_forces
+from macro.contact.frictional_forces import FrictionalForces, contact_forces, sliders_of
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
@@ -32,55 +34,14 @@ from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
+from support.arrays import Array
 from support.collective import together
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
-
-
-_LINEAR = 1e-9
-"""Relative residual of the response to the approach."""
-
-_RESPONSE = 1e-6
-"""Relative difference of a half-space's displacements in the response."""
-
-_STIFFNESS = 1e-10
-"""Relative residual of the tangential stiffness."""
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""
-
-
-class ApproachResponse(NamedTuple):
-    """First order change of a contact with the approach of the plane.
-
-    Operators of body and laws are symmetric, so that it also tells what errors of laws change: the
-    force at the approach by ∫ λ Δp dA, where laws err by pressures Δp.
-
-    Attributes:
-        stiffness: dF/dδ [N/mm].
-        closing: λ, the change of this rank's closures with the approach, shape (n,); 0 where laws
-            have no stiffness.
-        closure: The closures, shape (n,) [mm].
-        sampling: The samples.
-    """
-
-    stiffness: float
-    closing: Array
-    closure: Array
-    sampling: Sampling
-
-    def force_changes(self, pressures: Array) -> Array:
-        """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
-
-        Args:
-            pressures: Their sizes at this rank's samples, shape (n,) [MPa].
-
-        Note:
-            Collective.
-        """
-        return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
 
 
 class LawContactProblem:
@@ -135,6 +96,7 @@ class LawContactProblem:
         self._preload: Array | None = None
         self._flat_preload: Array = np.zeros((len(sampling.weight), 2))
         self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
+        self._sliders = sliders_of(self.forces)
         self.equilibrium = Equilibrium(body, self.forces)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, sampling, body.solver
@@ -145,6 +107,9 @@ class LawContactProblem:
         layer = None
         if mode == "pointwise":
             layer = FaceLayer(self.equilibrium, sampling, face.points_by_dofs)
+        self._response = ContactResponse(
+            self.equilibrium, sampling, self._preconditioner, self.newton
+        )
         self._first_steps = FirstSteps(self.equilibrium, sampling, update, layer)
         condensed = " or, on a very soft body, coupling.newton = 'condensed'"
         steps = "take more load steps (load.steps)"
@@ -172,34 +137,11 @@ class LawContactProblem:
         if self._opposite is None or control.force == 0.0:
             self.forces.gap = self._flat_gap
             return self._solved(control)
-        contact, what = _Pressed(self, control), f"the half-space at {control}"
-        if isinstance(self.forces, FrictionalForces):
-            self._shear(self._opposite, contact, self.forces, what)
-        else:
-            self._opposite.follow(contact, what)
-        return contact.state
+        return self._beside(control).solve(self._opposite, self._flat_preload)
 
-    def _shear(
-        self,
-        opposite: OppositeHalfSpace,
-        contact: _Pressed,
-        forces: FrictionalForces,
-        what: str,
-    ) -> None:
-        """Find the equilibrium beside a half-space that shear stresses displace as well."""
-        preload = self._flat_preload
-
-        def remaining(sheared: Array) -> Array:
-            along_x, along_y, wider = (opposite.at_samples(part) for part in sheared)
-            forces.preload = preload + np.stack([along_x, along_y], axis=1)
-            contact.wider = wider
-            opposite.follow(contact, what)
-            state = contact.latest
-            assert state.shear is not None
-            found = opposite.by_shear(state.shear.sample_stress, state.sample_pressure)
-            return found - sheared
-
-        opposite.shear(remaining, what)
+    def _beside(self, control: Control) -> BesideHalfSpace:
+        """Return a load step beside a half-space."""
+        return BesideHalfSpace(self.forces, self._response, self._solved, control, self._flat_gap)
 
     def _solved(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium in the gap as it is; see `solve`."""
@@ -243,16 +185,16 @@ class LawContactProblem:
     @property
     def memory(self) -> SliderMemory | None:
         """What the load steps so far left behind of friction; set it to take load steps back."""
-        return self.forces.memory if isinstance(self.forces, FrictionalForces) else None
+        return self._sliders.memory if self._sliders else None
 
     @memory.setter
     def memory(self, memory: SliderMemory | None) -> None:
-        if isinstance(self.forces, FrictionalForces) and memory is not None:
-            self.forces.memory = memory
+        if self._sliders and memory is not None:
+            self._sliders.memory = memory
 
     def slider_record(self) -> SliderRecord | None:
         """Return what the load steps so far left behind of friction, of all ranks together."""
-        return self.forces.record() if isinstance(self.forces, FrictionalForces) else None
+        return self._sliders.record() if self._sliders else None
 
     def restore_sliders(self, record: SliderRecord) -> None:
         """Go on from what load steps left behind, on any number of ranks.
@@ -263,8 +205,8 @@ class LawContactProblem:
         Raises:
             InputError: When it is that of another face, or of other laws.
         """
-        assert isinstance(self.forces, FrictionalForces)
-        self.forces.restore(record)
+        assert self._sliders is not None
+        self._sliders.restore(record)
 
     def follow_sliders(self, other: LawContactProblem) -> None:
         """Go on from what load steps left behind under other laws on the same face.
@@ -272,9 +214,8 @@ class LawContactProblem:
         Args:
             other: The problem with these laws.
         """
-        mine, theirs = self.forces, other.forces
-        if isinstance(mine, FrictionalForces) and isinstance(theirs, FrictionalForces):
-            mine.follow(theirs)
+        if self._sliders and other._sliders:
+            self._sliders.follow(other._sliders)
 
     def tangential_stiffness(self) -> tuple[float, int]:
         """Return the derivative of the shear force along the plane's shift, body included [N/mm].
@@ -291,35 +232,12 @@ class LawContactProblem:
         Note:
             Collective; one linear solve, or some against a half-space.
         """
-        forces, equilibrium = self.forces, self.equilibrium
-        assert isinstance(forces, FrictionalForces)
-        stuck, ahead = self._stuck, forces.memory.direction
-        forces.linearise_sticking(forces.stiffness(self._closure), stuck)
-        self._preconditioner.update()
-        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        solver, iterations = self.newton.snes.ksp, 0
-        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=_STIFFNESS)
-
-        def stresses(way: Array) -> Array:
-            nonlocal iterations
-            stress = stuck[:, None] * way
-            forces.write_stresses(np.zeros(len(stress)), stress, load)
-            iterations += solve_linear(solver, load, moved) if load.norm() else 0
-            return np.asarray(stress - stuck[:, None] * forces.along(moved))
-
-        way = np.broadcast_to(ahead, (len(stuck), 2))
-        if self._opposite is not None:
-            way = way - self._opposite.moved_along(lambda part: stresses(way - part))
-        total = float(forces.total(stresses(way)) @ ahead)
-        compat.collect_garbage(load.comm)
-        return total, iterations
+        return self._response.to_shift(self._closure, self._stuck, self._opposite)
 
     def sticking_stiffness(self) -> float:
         """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
-        forces = self.forces
-        assert isinstance(forces, FrictionalForces)
-        return float(forces.total(self._stuck[:, None])[0])
+        assert self._sliders is not None
+        return float(self._sliders.total(self._stuck[:, None])[0])
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -372,43 +290,9 @@ class LawContactProblem:
         Note:
             Collective; one linear solve, or some against a half-space.
         """
-        forces, sampling, opposite = self.forces, self._sampling, self._opposite
-        forces.prescribe(self.same_approach(), self._plane)
-        stiffness = forces.stiffness(self._closure)
-        forces.linearise(stiffness)
-        self._preconditioner.update()
-        way = np.ones_like(sampling.weight)
-        change, _ = self._closed_in(way)
-        if opposite is not None:
-            contact = _Pressed(self, self.forces.control)
-            moved = opposite.followed(opposite.under(change), contact, _RESPONSE)
-            change, _ = self._closed_in(way - opposite.at_samples(moved))
-        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
-        return ApproachResponse(float(forces.loads(change)[0]), closing, self._closure, sampling)
-
-    def _closed_in(self, way: Array, tolerance: float = _LINEAR) -> tuple[Array, int]:
-        """Return the change of pressures where samples close in, shapes (n,), to first order.
-
-        Args:
-            way: What they close in by [mm].
-            tolerance: Relative residual of the linear solve.
-
-        Returns:
-            The change, and the linear iterations that it took.
-        """
-        forces, sampling, equilibrium = self.forces, self._sampling, self.equilibrium
-        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        risen = forces.pressure_change(sampling.weight * way)
-        sampling.values.array[:] = risen
-        sampling.operator.mult(sampling.values, load)
-        solver = self.newton.snes.ksp
-        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
-        iterations = solve_linear(solver, load, moved)
-        sampling.operator.multTranspose(moved, sampling.values)
-        change = risen - forces.pressure_change(sampling.values.array_r.copy())
-        compat.collect_garbage(load.comm)
-        return np.asarray(change), iterations
+        self.forces.prescribe(self.same_approach(), self._plane)
+        contact = self._beside(self.forces.control)
+        return self._response.to_approach(self._closure, self._opposite, contact)
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""
@@ -420,7 +304,8 @@ class LawContactProblem:
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
             self._flat_gap = self.forces.gap
             if isinstance(self.forces, FrictionalForces):
-                self._flat_preload = self.forces.preload = self.forces.along(moved)
+                self._flat_preload = self.forces.along(moved)
+                self.forces.sliders.preload = self._flat_preload
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""
@@ -478,63 +363,3 @@ class LawContactProblem:
         sampling, largest = self._sampling, np.zeros(self._sampling.count)
         np.maximum.at(largest, sampling.patch, function(sampling.patch, self._closure))
         return np.asarray(np.max(self._face.comm.allgather(largest), axis=0))
-
-
-class _Pressed:
-    """A load step of a problem beside a half-space, see `opposite_half_space.Contact`."""
-
-    def __init__(self, problem: LawContactProblem, control: Control) -> None:
-        self._problem, self._control, self._memory = problem, control, problem.memory
-        self._found: list[FaceEquilibrium] = []
-        self._sunk: Array = np.zeros_like(problem._flat_gap)
-        self._iterations = 0
-        self.wider: Array | float = 0.0  # gaps of samples, by shear stresses [mm]
-
-    @property
-    def latest(self) -> FaceEquilibrium:
-        """The latest state alone."""
-        return self._found[-1]
-
-    def pressed(self, moved: Array) -> Array:
-        """Solve the load step anew, from what friction left behind before it."""
-        problem, forces = self._problem, self._problem.forces
-        problem.memory = self._memory
-        forces.gap = problem._flat_gap + moved + self.wider
-        state = problem._solved(self._control)
-        self._sunk = forces.levers.matrix @ problem._plane - forces.gap - state.sample_closure
-        self._found.append(state)
-        return state.sample_pressure
-
-    def held(self, moved: Array) -> Array:
-        """Return the pressures on the body as it is displaced now."""
-        forces = self._problem.forces
-        forces.gap = self._problem._flat_gap + moved + self.wider
-        closure = forces.closure_of(self._sunk)
-        forces.linearise(forces.stiffness(closure))
-        return forces.pressure(closure)
-
-    def closed_in(self, way: Array, tolerance: float) -> Array:
-        """Return the change of pressures where samples close in."""
-        change, iterations = self._problem._closed_in(way, tolerance)
-        self._iterations += iterations
-        return change
-
-    def alone(self, way: Array, softer: float = 0.0) -> Array:
-        """Return that on a rigid body, or on a local compliance."""
-        forces, weight = self._problem.forces, self._problem._sampling.weight
-        stiffness = forces.normal_slope * weight
-        stiffness = stiffness / (1.0 + softer * stiffness)
-        border = forces.border(stiffness)
-        change = stiffness * way
-        if border.shape[1]:
-            change -= border @ forces.levers.summed(border.T @ (weight * way))
-        return np.asarray(change)
-
-    @property
-    def state(self) -> FaceEquilibrium:
-        """The latest state, with the iterations of all."""
-        return replace(
-            self._found[-1],
-            iterations=sum(one.iterations for one in self._found),
-            linear_iterations=self._iterations + sum(one.linear_iterations for one in self._found),
-        )

@@ -39,7 +39,7 @@ from helpers.machine_parts import STEEL, part_body, read_part
 from geometry import Friction, PatchGrid, ShearControl
 from geometry.rigid_plane import Control
 from macro import FacePair, LawContactProblem, LoadedFace, MeshedBody, Support
-from macro.contact.law_problem import ContactPreconditioner
+from macro.contact.contact_preconditioner import ContactPreconditioner
 from macro.mesh.contact_face import contact_facets
 from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face

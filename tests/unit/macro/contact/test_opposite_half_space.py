@@ -6,6 +6,7 @@ from helpers.block_cases import block_of
 
 from geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
 from macro import LawContactProblem, LoadedFace
+from macro.contact.contact_response import ContactResponse
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
@@ -122,13 +123,13 @@ def test_numbers_out_of_all_proportion_end_as_other_failures_do():
 def test_a_stiff_body_is_solved_a_few_times_alone(monkeypatch):
     """The half-space settles on the body as it is: Newton's method needs no responses of it."""
     responses = []
-    whole = LawContactProblem._closed_in
+    whole = ContactResponse.closed_in
 
-    def counted(problem, *arguments):
-        responses.append(whole(problem, *arguments)[1])
-        return whole(problem, *arguments)
+    def counted(response, *arguments):
+        responses.append(whole(response, *arguments)[1])
+        return whole(response, *arguments)
 
-    monkeypatch.setattr(LawContactProblem, "_closed_in", counted)
+    monkeypatch.setattr(ContactResponse, "closed_in", counted)
     for control in (Control(approach=APPROACH), Control(force=2.0, tilt=None)):
         _, state = pressed(face_of(6, modulus=1e6), 5e3, control)
         assert not responses

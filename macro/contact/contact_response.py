@@ -1,0 +1,174 @@
+"""What a contact at its latest equilibrium changes with motions of the plane, to first order.
+
+Theory: sections 11 and 15 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from macro import compat
+from macro.contact.contact_preconditioner import ContactPreconditioner
+from macro.contact.equations import Equilibrium
+from macro.contact.frictional_forces import FrictionalForces
+from macro.contact.newton import Newton
+from macro.contact.opposite_half_space import Contact, OppositeHalfSpace
+from macro.contact.sampling import Sampling
+from macro.linear_solvers.solvers import solve_linear
+from support.arrays import Array
+
+_LINEAR = 1e-9
+"""Relative residual of the response to the approach."""
+
+_RESPONSE = 1e-6
+"""Relative difference of a half-space's displacements in the response."""
+
+_STIFFNESS = 1e-10
+"""Relative residual of the tangential stiffness."""
+
+
+class ApproachResponse(NamedTuple):
+    """First order change of a contact with the approach of the plane.
+
+    Operators of body and laws are symmetric, so that it also tells what errors of laws change: the
+    force at the approach by ∫ λ Δp dA, where laws err by pressures Δp.
+
+    Attributes:
+        stiffness: dF/dδ [N/mm].
+        closing: λ, the change of this rank's closures with the approach, shape (n,); 0 where laws
+            have no stiffness.
+        closure: The closures, shape (n,) [mm].
+        sampling: The samples.
+    """
+
+    stiffness: float
+    closing: Array
+    closure: Array
+    sampling: Sampling
+
+    def force_changes(self, pressures: Array) -> Array:
+        """Return what errors of the laws change the force by at most, by patch, shape (N,) [N].
+
+        Args:
+            pressures: Their sizes at this rank's samples, shape (n,) [MPa].
+
+        Note:
+            Collective.
+        """
+        return np.asarray(self.sampling.patch_sums(np.abs(self.closing) * pressures))
+
+
+class ContactResponse:
+    """First order changes of a body with contact laws, by its linear solver.
+
+    Args:
+        equilibrium: The equations.
+        sampling: The samples that laws are evaluated at.
+        preconditioner: Preconditioner of the tangent.
+        newton: Newton's method, whose linear solver it is.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(
+        self,
+        equilibrium: Equilibrium,
+        sampling: Sampling,
+        preconditioner: ContactPreconditioner,
+        newton: Newton,
+    ) -> None:
+        self._equilibrium, self._sampling = equilibrium, sampling
+        self._preconditioner, self._newton = preconditioner, newton
+
+    def closed_in(self, way: Array, tolerance: float = _LINEAR) -> tuple[Array, int]:
+        """Return the change of pressures where samples close in, shapes (n,), to first order.
+
+        Args:
+            way: What they close in by [mm].
+            tolerance: Relative residual of the linear solve.
+
+        Returns:
+            The change, and the linear iterations that it took.
+        """
+        equilibrium, sampling = self._equilibrium, self._sampling
+        forces = equilibrium.forces
+        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        risen = forces.pressure_change(sampling.weight * way)
+        sampling.values.array[:] = risen
+        sampling.operator.mult(sampling.values, load)
+        solver = self._newton.snes.ksp
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
+        iterations = solve_linear(solver, load, moved)
+        sampling.operator.multTranspose(moved, sampling.values)
+        change = risen - forces.pressure_change(sampling.values.array_r.copy())
+        compat.collect_garbage(load.comm)
+        return np.asarray(change), iterations
+
+    def to_approach(
+        self, closure: Array, opposite: OppositeHalfSpace | None, contact: Contact
+    ) -> ApproachResponse:
+        """Return the response to the approach, under what is prescribed of the plane.
+
+        Args:
+            closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
+            opposite: The half-space on the other side; None: a rigid plane.
+            contact: Its contact with the body.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+        """
+        forces, sampling = self._equilibrium.forces, self._sampling
+        stiffness = forces.stiffness(closure)
+        forces.linearise(stiffness)
+        self._preconditioner.update()
+        way = np.ones_like(sampling.weight)
+        change, _ = self.closed_in(way)
+        if opposite is not None:
+            moved = opposite.followed(opposite.under(change), contact, _RESPONSE)
+            change, _ = self.closed_in(way - opposite.at_samples(moved))
+        closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
+        return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
+
+    def to_shift(
+        self, closure: Array, stuck: Array, opposite: OppositeHalfSpace | None
+    ) -> tuple[float, int]:
+        """Return the derivative of the shear force along the latest change of the shift [N/mm].
+
+        Args:
+            closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
+            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
+            opposite: The half-space on the other side; None: a rigid plane.
+
+        Returns:
+            The derivative, and the linear iterations that it took.
+
+        Raises:
+            NotConverged: When the linear solve fails.
+        """
+        equilibrium, forces = self._equilibrium, self._equilibrium.forces
+        assert isinstance(forces, FrictionalForces)
+        ahead = forces.sliders.memory.direction
+        forces.linearise_sticking(forces.stiffness(closure), stuck)
+        self._preconditioner.update()
+        load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
+        solver, iterations = self._newton.snes.ksp, 0
+        solver.setOperators(equilibrium.tangent, equilibrium.matrix)
+        solver.setTolerances(rtol=_STIFFNESS)
+
+        def stresses(way: Array) -> Array:
+            nonlocal iterations
+            stress = stuck[:, None] * way
+            forces.write_stresses(np.zeros(len(stress)), stress, load)
+            iterations += solve_linear(solver, load, moved) if load.norm() else 0
+            return np.asarray(stress - stuck[:, None] * forces.along(moved))
+
+        way = np.broadcast_to(ahead, (len(stuck), 2))
+        if opposite is not None:
+            way = way - opposite.moved_along(lambda part: stresses(way - part))
+        total = float(forces.sliders.total(stresses(way)) @ ahead)
+        compat.collect_garbage(load.comm)
+        return total, iterations

@@ -1,0 +1,318 @@
+"""Shear stresses on a face by sliders at its samples, and what load steps leave behind of them.
+
+Theory: docs/theory.md, section 15.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from geometry.rigid_plane import Control, PlaneLevers
+from geometry.shear_state import ShearControl
+from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
+from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
+from macro.contact.face_equilibrium import FaceShear
+from macro.contact.plane_shift import find_shift
+from macro.contact.sampling import Sampling
+from support.arrays import Array
+from support.collective import together
+from support.errors import InputError
+
+Indices = NDArray[np.intp]
+
+_HELD = ShearControl(shift=(0.0, 0.0))
+_SAME_PLACE = 1e-6
+"""Distance of a sample from where its sliders were written, relative to the face's size."""
+
+
+class SliderMemory(NamedTuple):
+    """What load steps leave behind of friction on this rank.
+
+    Attributes:
+        sliders: Sliders of this rank's samples.
+        stress: Shear stresses there, shape (n, 2) [MPa].
+        shift: Shift of the plane along the axes of the face, shape (2,) [mm].
+        direction: Unit vector of its last change, shape (2,).
+        dissipated: Energy lost to friction on the whole face since the start [N mm].
+    """
+
+    sliders: SliderState
+    stress: Array
+    shift: Array
+    direction: Array
+    dissipated: float
+
+
+class _Evaluated(NamedTuple):
+    """A response of the sliders, and what it is one to."""
+
+    before: SliderState
+    at: tuple[Array, ...]
+    found: SliderResponse
+
+
+class FaceSliders:
+    """Sliders of the samples of a face under a plane that shifts.
+
+    Slips are s = d − e·u, with the shift d of the plane along the axes e of the face. Shear
+    stresses τ(c, s) follow from the sliders as the last accepted load step left them, whatever
+    displacements are tried: only `accept` moves them on. A prescribed shear force gives the shift.
+
+    Args:
+        sampling: The samples that laws are evaluated at.
+        levers: Levers of this rank's samples.
+        laws: One law per patch; the same on every rank.
+        friction: The friction.
+        comm: MPI communicator of the mesh.
+
+    Attributes:
+        friction: The friction.
+        preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
+        memory: What the load steps so far left behind; set it to take load steps back.
+
+    Raises:
+        InputError: On all ranks, when a law has no springs.
+
+    Note:
+        Construction and every method are collective.
+    """
+
+    def __init__(
+        self,
+        sampling: Sampling,
+        levers: PlaneLevers,
+        laws: Sequence[Any],
+        friction: Friction,
+        comm: Any,
+    ) -> None:
+        self.friction, self._sampling, self._levers, self._comm = friction, sampling, levers, comm
+        beds = together(comm, lambda: [springs_of_law(law) for law in _once(laws)])
+        known = {id(law): bed for law, bed in zip(_once(laws), beds, strict=True)}
+        ratios, patch = stiffness_ratios(laws, friction), sampling.patch
+        self._sliders = Sliders(
+            [known[id(law)] for law in laws], ratios, patch, friction.coefficient
+        )
+        n = len(patch)
+        self.preload: Array = np.zeros((n, 2))
+        self.memory = SliderMemory(
+            self._sliders.at_rest, np.zeros((n, 2)), np.zeros(2), np.array([1.0, 0.0]), 0.0
+        )
+        self._control = Control(approach=0.0)
+        self._shear = _HELD
+        self._shift: Array = np.zeros(2)
+        self._latest: _Evaluated | None = None
+
+    # --- what is prescribed
+
+    def prescribe(self, control: Control) -> None:
+        """Set what a load step prescribes of the shear; without any the plane does not shift."""
+        self._control, self._shear = control, control.shear or _HELD
+        self._shift = self.memory.shift.copy()
+        if self._shear.shift is not None:
+            self._shift = np.array(self._shear.shift, float)
+
+    def hold_shift(self) -> None:
+        """Let the plane stay, whatever shear force is prescribed."""
+        self._shear = _HELD
+
+    @property
+    def shifts(self) -> bool:
+        """Whether the shift follows from a prescribed force."""
+        return self._shear.force is not None and self._control.force != 0.0
+
+    # --- stresses
+
+    def respond(
+        self,
+        closure: Array,
+        moved: Array,
+        pressure: Array,
+        rate: Array,
+        *,
+        sticks: bool = False,
+    ) -> SliderResponse:
+        """Return the shear stresses of this rank's samples; the plane shifts where it is free to.
+
+        Args:
+            closure: Closures, shape (n,) [mm].
+            moved: Displacements along the axes, shape (n, 2) [mm].
+            pressure: Pressures, shape (n,) [MPa].
+            rate: Their derivatives by the closure, shape (n,) [MPa/mm].
+            sticks: Whether springs stick whatever they bear.
+
+        Raises:
+            NotConverged: When the contact does not transmit the prescribed shear force.
+        """
+        pressed = np.maximum(pressure, 0.0)
+
+        def respond(shift: Array) -> SliderResponse:
+            slip = shift - self.preload - moved
+            return self.at_slip(closure, pressed, rate, slip, sticks=sticks)
+
+        if not self.shifts:
+            return respond(self._shift)
+        force = self._levers.loads(self._sampling.weight * pressure)[0]
+        most = self.friction.coefficient * float(force)
+        self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
+        return found
+
+    def slip(self, moved: Array) -> Array:
+        """Return the slips under the shift as it is, shape (n, 2) [mm].
+
+        Args:
+            moved: Displacements along the axes, shape (n, 2) [mm].
+        """
+        return self._shift - self.preload - moved
+
+    def at_slip(
+        self,
+        closure: Array,
+        pressure: Array,
+        rate: Array,
+        slip: Array,
+        *,
+        sticks: bool = False,
+        rows: Indices | None = None,
+    ) -> SliderResponse:
+        """Return the shear stresses at slips, of all samples or of some of them.
+
+        Args:
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            pressure: Pressures, not below zero, shape (n,) [MPa].
+            rate: Their derivatives by the closure, shape (n,) [MPa/mm].
+            slip: Slips of the samples that are asked for, shape (n, 2) [mm].
+            sticks: Whether springs stick whatever they bear.
+            rows: The samples that are asked for; None: all.
+        """
+        before, at = self.memory.sliders, (closure, slip, pressure, rate)
+        if rows is not None:
+            pressed = pressure[rows], rate[rows]
+            return self._sliders.respond(before, closure[rows], slip, *pressed, rows=rows)
+        if sticks:
+            return self._sliders.respond(before, *at, sticks=True)
+        latest = self._latest  # residual and tangent of a point ask for the same
+        known = latest is not None and latest.before is before
+        if latest is None or not (known and all(map(np.array_equal, at, latest.at))):
+            latest = _Evaluated(before, at, self._sliders.respond(before, *at))
+            self._latest = latest
+        return latest.found
+
+    def total(self, values: Array) -> Array:
+        """Return the integrals over the face of values of this rank's samples.
+
+        Args:
+            values: The values, shape (n, k).
+
+        Returns:
+            Shape (k,), the same on every rank.
+        """
+        return np.asarray(self._comm.allreduce(self._sampling.weight @ values))
+
+    # --- load steps
+
+    def accept(self, found: SliderResponse) -> FaceShear:
+        """Move the sliders on to the end of a load step that has converged.
+
+        Args:
+            found: The shear stresses there, as `respond` returned them last.
+
+        Returns:
+            The shear of the face there.
+        """
+        before = self.memory
+        after, shear = self._step(found)
+        moved = self._shift - before.shift
+        size = float(np.hypot(*moved))
+        self.memory = SliderMemory(
+            after,
+            found.stress,
+            self._shift.copy(),
+            moved / size if size else before.direction,
+            shear.dissipated,
+        )
+        return shear
+
+    def shear_of(self, found: SliderResponse) -> FaceShear:
+        """Return the shear of the face by shear stresses, as `respond` returned them last."""
+        return self._step(found)[1]
+
+    def _step(self, found: SliderResponse) -> tuple[SliderState, FaceShear]:
+        """Return the sliders and the shear of the face by a response of them."""
+        step = self._sliders.step(self.memory.sliders, found)
+        lost = float(self.total(step.lost[:, None])[0])
+        force, shift = self.total(found.stress), self._shift
+        shear = FaceShear(
+            shift=(float(shift[0]), float(shift[1])),
+            force=(float(force[0]), float(force[1])),
+            dissipated=self.memory.dissipated + lost,
+            sample_stress=found.stress,
+            stick_closure=np.minimum(step.stick_closure, found.closure),
+            stuck=step.stuck,
+        )
+        return step.after, shear
+
+    def record(self) -> SliderRecord:
+        """Return what load steps left behind, of all ranks together."""
+        memory = self.memory
+        own = {"place": self._places(), "shear": memory.stress, **vars(memory.sliders)}
+        every = self._comm.allgather(own)
+        whole = {name: np.concatenate([rank[name] for rank in every]) for name in own}
+        return SliderRecord(
+            **whole,
+            shift=memory.shift,
+            direction=memory.direction,
+            dissipated=memory.dissipated,
+        )
+
+    def restore(self, record: SliderRecord) -> None:
+        """Go on from what load steps left behind, on any number of ranks.
+
+        Args:
+            record: What `record` returned, of the same laws and samples.
+
+        Raises:
+            InputError: When it is that of another face.
+        """
+        own, size = self._places(), self._levers.half
+        springs = self._sliders.at_rest.stress.shape[2]
+
+        def found() -> Any:
+            far, index = cKDTree(record.place).query(own) if len(own) else (np.zeros(0), [])
+            if np.any(far > _SAME_PLACE * size) or record.stress.shape[2] != springs:
+                raise InputError("the sliders are those of another face, or of other laws")
+            return np.asarray(index, np.intp)
+
+        index = together(self._comm, found)
+        sliders = SliderState(
+            closure=record.closure[index], slip=record.slip[index], stress=record.stress[index]
+        )
+        self.memory = SliderMemory(
+            sliders,
+            record.shear[index],
+            record.shift.copy(),
+            record.direction.copy(),
+            record.dissipated,
+        )
+
+    def follow(self, other: FaceSliders) -> None:
+        """Go on from the sliders of other laws on the same samples, as of laws that go further.
+
+        Args:
+            other: The sliders of these laws.
+        """
+        memory = other.memory
+        sliders = self._sliders.following(other._sliders, memory.sliders)
+        self.memory = memory._replace(sliders=sliders)
+
+    def _places(self) -> Array:
+        return np.column_stack([self._sampling.x, self._sampling.y])
+
+
+def _once(laws: Sequence[Any]) -> list[Any]:
+    """Return the different laws among those of patches, which may have one in common."""
+    return list({id(law): law for law in laws}.values())
