@@ -95,7 +95,7 @@ class EmbeddedLaws(LawSolver):
 
     def face_pressures(self) -> Array:
         """Return the places and pressures of quadrature points; see `StepSolver`."""
-        first: Any = getattr(self.face, "first", self.face)
+        first: Any = self.face.sides[0]
         first = first.quadrature
         own = np.column_stack([first.x, first.y, self.point_pressures])
         return np.concatenate(self.face.comm.allgather(own))
