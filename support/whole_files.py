@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,6 +30,20 @@ def written(path: Path) -> Iterator[None]:
         yield
     except OSError as error:
         raise NotWritten(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def read_bytes(path: Path) -> bytes:
+    """Return the bytes of a file; a pipe or device in its place is not waited for.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OSError: When it cannot be read, or is no regular file.
+    """
+    if path.exists() and not path.is_file():
+        raise OSError(errno.EINVAL, "is no file", str(path))
+    return path.read_bytes()
 
 
 def write_bytes(path: Path, content: bytes) -> Path:
@@ -88,11 +103,15 @@ def remove(path: Path) -> None:
 
     Args:
         path: Its name.
+
+    Raises:
+        NotWritten: When the system refuses, as where a folder has the name of a file.
     """
-    if path.suffix == ".bp" and path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-    else:
-        path.unlink(missing_ok=True)
+    with written(path):
+        if path.suffix == ".bp" and path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def remove_partial(folder: Path) -> None:

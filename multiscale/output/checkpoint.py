@@ -30,7 +30,7 @@ from multiscale.run import Run
 from support.checked_store import START, Mark, append, read_record, unsealed, write_record
 from support.collective import on_root
 from support.errors import InputError, NotWritten
-from support.whole_files import remove_partial
+from support.whole_files import read_bytes, remove, remove_partial
 
 FILE_NAME = "checkpoint.state"
 FORMER_NAME = "checkpoint.h5"
@@ -132,16 +132,15 @@ def read_checkpoint(path: Path) -> Checkpoint:
         InputError: When it is none, is of another version or damaged.
     """
     try:
-        if not path.is_file():  # a pipe would be waited for
-            raise InputError("is no file")
-        found = read_record(path.read_bytes(), _KINDS)
+        found = read_record(read_bytes(path), _KINDS)
         if not isinstance(found, Checkpoint):
             raise InputError("is no checkpoint")
         return replace(found, steps=read_steps(path.with_suffix(LOG_SUFFIX), found.log))
     except InputError as error:
         problem = error.problem
     except OSError as error:
-        problem = f"cannot be read: {error}"
+        where = Path(error.filename or path).name
+        problem = f"cannot be read: {where}: {error.strerror}"
     raise InputError(f"{problem}; remove it, or begin anew with --overwrite", file=str(path))
 
 
@@ -180,7 +179,7 @@ def read_steps(path: Path, mark: Mark) -> tuple[LoadStep, ...]:
         return ()
     steps = []
     with suppress(InputError):
-        for step, here in unsealed(path.read_bytes()[: mark.size], (LoadStep, PatchState, Leak)):
+        for step, here in unsealed(read_bytes(path)[: mark.size], (LoadStep, PatchState, Leak)):
             steps.append(step)
             if here == mark:
                 return tuple(steps)
@@ -262,7 +261,7 @@ class CheckpointWriter:
 
         def unlink() -> None:
             for path in (self.path, self.path.with_suffix(LOG_SUFFIX)):
-                path.unlink(missing_ok=True)
+                remove(path)
 
         on_root(self._run.comm, unlink)
 
@@ -276,7 +275,7 @@ class CheckpointWriter:
             raise NotWritten(f"{self.path.parent}: {error.problem}") from None
         remove_partial(self.path.parent)
         self._log = _write(self.path, self._pending, self._log)
-        self.path.with_name(FORMER_NAME).unlink(missing_ok=True)
+        remove(self.path.with_name(FORMER_NAME))
         self._pending = None
         now = time.monotonic()
         self._due = now + max(LEAST_INTERVAL, LEAST_RATIO * (now - began))

@@ -28,6 +28,7 @@ from multiscale.scene.scene import (
 )
 from support.collective import on_root
 from support.errors import InputError
+from support.whole_files import read_bytes
 
 _NAME = ".lock"
 _OUTPUT = "output."
@@ -245,7 +246,7 @@ def _results(folder: Path) -> tuple[dict[str, Any], bool]:
     The identity is empty where results say nothing of it.
     """
     try:
-        content = json.loads((folder / "provenance.json").read_text(encoding="utf-8"))
+        content = json.loads(read_bytes(folder / "provenance.json"))
         scene = without_removed(content["scene_given"])
         then = flat_identity(scene, content.get("files", {}), content["patchlaw"])
         return then, content["finished"] is True

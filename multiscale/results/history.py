@@ -7,6 +7,7 @@ import json
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
+from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, SupportsIndex, overload
 
@@ -27,6 +28,7 @@ from multiscale.results.reference_record import ReferenceRecord
 from support.arrays import Array
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
+from support.whole_files import read_bytes
 
 _TEXT = "reason"
 PATCH_COLUMNS = ("step", "ix", "iy", "closure_mm", "pressure_MPa", "contact_area_fraction")
@@ -323,7 +325,7 @@ def result_of_a_run(path: Path) -> Iterator[dict[str, Any]]:
             it; names the file.
     """
     try:
-        provenance = json.loads(path.read_text(encoding="utf-8"))
+        provenance = json.loads(read_bytes(path))
         refuse_removed_results(provenance["scene_given"])
         yield provenance
     except InputError as error:
@@ -344,9 +346,9 @@ def csv_rows(path: Path) -> list[dict[str, str]]:
         InputError: When it cannot be read.
     """
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            return list(csv.DictReader(file))
-    except (OSError, ValueError) as error:
+        text = read_bytes(path).decode()
+        return list(csv.DictReader(StringIO(text, newline="")))
+    except (OSError, ValueError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot be read: {reason}", file=str(path)) from None
 

@@ -28,7 +28,7 @@ from multiscale.scene.scene import Scene, changes, told
 from support.checked_store import START, append, end_of, unsealed
 from support.collective import on_root, place_in, together
 from support.errors import InputError, NotConverged
-from support.whole_files import plain, written
+from support.whole_files import plain, read_bytes, written
 
 JOURNAL = "cases"
 """Folder of the cases that are done, within the folder of a study."""
@@ -174,7 +174,7 @@ class Journal:
             InputError: When they are cases of another scene, or the file is damaged.
         """
         try:
-            for value, mark in unsealed(path.read_bytes()):
+            for value, mark in unsealed(read_bytes(path)):
                 if mark.records > 1:
                     yield CaseResult(**value)
                 elif differing := list(changes(self._identity, value)):
@@ -182,10 +182,12 @@ class Journal:
                         f"holds the cases of another scene, where {told(differing)}", key="--out",
                         value=str(path.parents[2]), allowed="another folder, or --overwrite",
                     )  # fmt: skip
-        except (InputError, TypeError) as error:
+        except (InputError, TypeError, OSError) as error:
             if getattr(error, "key", None):
                 raise
             problem = getattr(error, "problem", "was written by another patchlaw")
+            if isinstance(error, OSError):
+                problem = f"cannot be read: {error.strerror}"
             raise InputError(
                 f"{problem}; remove it, and its cases are computed again", file=str(path)
             ) from None
@@ -202,7 +204,7 @@ class Journal:
         path = self._folder / part_name(part) / f"rank-{rank}{_SUFFIX}"
         with written(path):
             path.parent.mkdir(parents=True, exist_ok=True)
-        mark = end_of(path.read_bytes()) if path.exists() else START
+            mark = end_of(read_bytes(path)) if path.exists() else START
 
         def store(result: CaseResult) -> None:
             nonlocal mark

@@ -11,9 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from multiscale.laws.law_file import read_laws
-from multiscale.output.checkpoint import read_checkpoint
-from support.checked_store import checksum_hdf5
-from support.errors import InputError
+from multiscale.loading.stepper import LoadPosition
+from multiscale.output.checkpoint import Checkpoint, read_checkpoint
+from multiscale.output.results_folder import is_finished
+from multiscale.results.history import csv_rows, result_of_a_run
+from multiscale.studies.running import Journal
+from support.checked_store import Mark, checksum_hdf5, write_record
+from support.errors import InputError, NotWritten
+from support.whole_files import remove
 
 few = settings(
     derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
@@ -80,5 +85,40 @@ def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="is not a readable law file: there is no such file"):
         read_laws(tmp_path / "pipe")
-    with pytest.raises(InputError, match="pipe: is no file; remove it, or begin anew"):
+    with pytest.raises(InputError, match="cannot be read: pipe: is no file; remove it, or begin"):
         read_checkpoint(tmp_path / "pipe")
+    with pytest.raises(InputError, match=r"pipe: is not the result of a run: .*is no file"):
+        result_of_a_run(tmp_path / "pipe").__enter__()
+    with pytest.raises(InputError, match="pipe: cannot be read: is no file"):
+        csv_rows(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "provenance.json")
+    assert not is_finished(tmp_path, {})
+
+
+@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+def test_log_of_a_checkpoint_that_is_no_file_is_named(tmp_path, make):
+    path, log = tmp_path / "a.state", tmp_path / "a.steps"
+    checkpoint = Checkpoint(
+        identity={}, resolved={}, laws=b"", position=LoadPosition(), state=None,
+        log=Mark(records=1, size=100, checksum="0" * 64),
+    )  # fmt: skip
+    write_record(path, checkpoint)
+    make(log)
+    with pytest.raises(InputError, match=r"a\.state: cannot be read: a\.steps: is no file; remove"):
+        read_checkpoint(path)
+
+
+def test_journal_that_is_no_file_is_named(tmp_path):
+    journal = Journal(tmp_path, {})
+    path = tmp_path / "journal"
+    for make in (os.mkfifo, os.mkdir):
+        make(path)
+        with pytest.raises(InputError, match="journal: cannot be read: is no file; remove it"):
+            list(journal.read(path))
+        path.unlink() if path.is_fifo() else path.rmdir()
+
+
+def test_folder_in_the_place_of_a_file_to_remove_is_named(tmp_path):
+    (tmp_path / "contact.h5").mkdir()
+    with pytest.raises(NotWritten, match=r"contact\.h5: cannot be written: Is a directory"):
+        remove(tmp_path / "contact.h5")
