@@ -14,6 +14,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
+import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -43,6 +44,15 @@ SLOPES = 2
 _RESIDUAL = 1e-10
 """Residual of half-space solutions. Their forces are then right to 1e-12, so that neither the unit
 of length nor the number of ranks changes a result. It costs a tenth more than 1e-8."""
+
+
+def solver_options_given() -> bool:
+    """Tell whether the user set options of PETSc's solver; before PETSc starts there are none."""
+    if "petsc4py.PETSc" not in sys.modules:
+        return False
+    from macro.linear_solvers.options import users_options
+
+    return bool(users_options())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

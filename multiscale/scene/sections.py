@@ -99,7 +99,8 @@ class CouplingSection:
             exact half-space. Auto is decomposed, except for isolated laws and for laws at points.
         newton: How laws find the load steps: ``condensed`` solves for the patches alone, with a
             compliance computed once; ``full`` for all displacements of the mesh. Auto is what takes
-            fewer multigrid cycles, counted from patches and load steps.
+            fewer multigrid cycles, counted from patches and load steps, and full where PETSc's
+            options are given.
         love: Displacement under its own pressure that is subtracted from an isolated patch: the
             mean one, or that at its centre.
         interface: Whether the closure of a law is a mean over each patch, or taken at each point.
