@@ -13,7 +13,6 @@ from typing import Any
 from geometry.statistics import roughness
 from multiscale import console
 from multiscale.cli.execution import scene_and_folder
-from multiscale.console import counting, following
 from multiscale.couplings import describe
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import coupling_class, load_finite_elements
@@ -25,6 +24,7 @@ from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
 from multiscale.output.results import surface_drawing
 from multiscale.output.results_folder import locked, refuse_other_results
+from multiscale.progress import counting, following
 from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity
 from multiscale.setup import make_setup

@@ -9,7 +9,6 @@ from typing import Any
 from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
-from multiscale.console import following, run_progress
 from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.output.results import RunFigures, write_fields, write_results
 from multiscale.output.results_folder import (
@@ -18,6 +17,7 @@ from multiscale.output.results_folder import (
     locked,
     refuse_other_results,
 )
+from multiscale.progress import following, run_progress
 from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity
 from support.collective import on_root

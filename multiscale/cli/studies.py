@@ -12,7 +12,6 @@ from typing import Any
 from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
-from multiscale.console import case_progress, following
 from multiscale.figures.files import (
     Drawing,
     Pictures,
@@ -23,14 +22,16 @@ from multiscale.figures.files import (
 from multiscale.output.report import filled
 from multiscale.output.results import write_records
 from multiscale.output.results_folder import locked
+from multiscale.progress import case_progress, following
 from multiscale.readable import duration, percent
 from multiscale.readable import number as readable_number
 from multiscale.studies import errors
+from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.difference import Difference, difference
 from multiscale.studies.running import JOURNAL, CaseResult, part_name
-from multiscale.studies.sweep import Statistics, SweepResults, sweep, sweep_cases, values_from_text
+from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
 from support.whole_files import remove, write_text

@@ -22,7 +22,7 @@ from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
-from multiscale.console import Clock
+from multiscale.clock import Clock
 from multiscale.couplings import describe, validity
 from multiscale.inputs.bodies import SceneBody
 from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests

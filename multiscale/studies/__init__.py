@@ -1,6 +1,6 @@
 """Runs many scenes: for many values of their keys, or in every sensible way to compute one.
 
-    sweep_cases, configurations     what is run                            `sweep`, `configurations`
+    sweep_cases, configurations     what is run                            `cases`, `configurations`
     run_cases, CaseResult           runs it on any number of ranks, and goes on after a kill
                                                                            `running`, `measured_run`
     SweepResults                    rows, means and bands of a sweep       `sweep`

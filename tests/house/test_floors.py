@@ -54,9 +54,9 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "figures machine",
-        "laws loading",
-        "console",
+        "clock figures machine",
+        "console laws loading",
+        "progress",
         "exports results scene",
         "inputs",
         "bodies",

@@ -12,13 +12,13 @@ from geometry import BlockShape
 from micro import HalfSpaceModel
 from micro.complementarity import solver
 from multiscale import Run, Scene, make_setup
-from multiscale.console import Pace
 from multiscale.couplings import micro_coupling, patch_laws
 from multiscale.inputs import cost
 from multiscale.inputs.cost import SOLUTIONS_OF_LAWS, magnitude, memory_parts
 from multiscale.inputs.reference_meshes import mesh_unknowns
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
+from multiscale.progress import Pace
 
 
 def scene(kind="concurrent", grid=64, cells=(4, 4, 4), **sections):

@@ -15,7 +15,7 @@ from multiscale import run, sweep
 from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
-from multiscale.studies.sweep import sweep_cases, values_from_text
+from multiscale.studies.cases import sweep_cases, values_from_text
 from support.checked_store import START, sealed, unsealed
 from support.errors import InputError, NotConverged
 
