@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import webbrowser
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -90,8 +91,12 @@ def complain(comm: Any, error: PatchlawError) -> None:
         comm: MPI communicator, or None.
         error: The error.
     """
-    line = escape(" ".join(str(error).splitlines()))
-    console_of(comm, stderr=True).print(f"[bold red]patchlaw:[/] {line}")
+    line = " ".join(str(error).splitlines())
+    try:
+        console_of(comm, stderr=True).print(f"[bold red]patchlaw:[/] {escape(line)}")
+    except ModuleNotFoundError:  # the error can be that packages are missing, rich among them
+        if speaks(comm):
+            print(f"patchlaw: {line}", file=sys.stderr)
 
 
 def say(comm: Any, text: str) -> None:
