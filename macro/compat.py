@@ -486,6 +486,20 @@ def call(name: str, *arguments: Any) -> None:
         raise PETSc.Error(code)
 
 
+@contextmanager
+def errors_of_callbacks() -> Iterator[None]:
+    """Let the errors of Python functions that PETSc calls be raised as they are.
+
+    From PETSc 3.25 on petsc4py raises its own error, whose cause is that of the function.
+    """
+    try:
+        yield
+    except PETSc.Error as error:
+        if error.__cause__ is None:
+            raise
+        raise error.__cause__ from None
+
+
 def collect_garbage(comm: PETSc.Comm) -> None:
     """Free PETSc objects that Python has dropped on all ranks, and every rank's own objects.
 

@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 # as many workers as cores, so that threads would only be in each other's way; before numpy comes
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+with suppress(ImportError):  # before dolfinx, which needs its library where both are wheels
+    import mpi4py.MPI  # noqa: F401
 import numpy as np
 from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.waiting_ranks import WaitingRanks

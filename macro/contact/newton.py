@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from macro import compat
 from macro.linear_solvers.options import (
     KRYLOV_DEFAULTS,
     PREFIX,
@@ -154,7 +155,8 @@ class Newton:
         self._residuals, snes = [], self.snes
         own = self._preconditioner is not None  # PETSc's are made with the first system
         with nullcontext() if own else default_options(PREFIX, self._options):
-            snes.solve(None, solution)
+            with compat.errors_of_callbacks():
+                snes.solve(None, solution)
             self._unread -= options_read(PREFIX, self._unread)
         if self._unread and snes.its:
             raise InputError(

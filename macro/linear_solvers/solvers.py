@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from petsc4py import PETSc
 
+from macro import compat
 from macro.linear_solvers.options import (
     ALGEBRAIC_DEFAULTS,
     GEOMETRIC_DEFAULTS,
@@ -168,7 +169,8 @@ def solve_linear(
     """
     own = solver.getTolerances()[0]
     solver.setTolerances(rtol=max(own, tolerance or 0.0))
-    solver.solve(load, solution)
+    with compat.errors_of_callbacks():
+        solver.solve(load, solution)
     solver.setTolerances(rtol=own)
     if solver.reason < 0:
         raise NotConverged(

@@ -106,3 +106,16 @@ def test_half_of_a_symmetric_matrix_is_all_of_it(cell):
     assert facts["nz_used"] == (whole.getInfo()["nz_used"] + 9 * nodes) / 2  # with the diagonal
     assert facts["nz_allocated"] == facts["nz_used"]
     assert facts["mallocs"] == 0
+
+
+def test_errors_of_functions_that_petsc_calls_are_raised_as_they_are():
+    def residual(_snes, _x, _values):
+        raise InputError("such a thing is not there", value=3)
+
+    vector = PETSc.Vec().createSeq(1)
+    snes = PETSc.SNES().create(MPI.COMM_SELF)
+    snes.setFunction(residual, vector.duplicate())
+    with pytest.raises(InputError, match="such a thing"), compat.errors_of_callbacks():
+        snes.solve(None, vector)
+    with pytest.raises(PETSc.Error), compat.errors_of_callbacks():
+        PETSc.KSP().create(MPI.COMM_SELF).setType("no such type")
