@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from contextlib import suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,8 @@ import pytest
 # as many workers as cores, so that threads would only be in each other's way; before numpy comes
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-with suppress(ImportError):  # before dolfinx, which needs its library where both are wheels
+with suppress(PackageNotFoundError):  # MPI as a wheel is found by dolfinx once it is loaded
+    version("mpich")
     import mpi4py.MPI  # noqa: F401
 import numpy as np
 from helpers.mpi_environment import BESIDE_OTHERS
