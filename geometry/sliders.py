@@ -10,7 +10,7 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,11 +34,13 @@ class SliderState:
         closure: Closures, shape (n,) [mm].
         slip: Tangential displacements of the plane against the samples, shape (n, 2) [mm].
         stress: Shear stresses of the springs, before they are scaled, shape (n, 2, N) [MPa].
+        scale: What they are scaled by, shape (n,).
     """
 
     closure: Array
     slip: Array
     stress: Array
+    scale: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +53,7 @@ class SliderRecord:
         closure: Their closures, shape (m,) [mm].
         slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
         stress: Shear stresses of their springs, before they are scaled, shape (m, 2, N) [MPa].
+        scale: What they are scaled by, shape (m,).
         shift: Shift of the plane, shape (2,) [mm].
         direction: Unit vector of its last change, shape (2,).
         dissipated: Energy lost to friction since the start [N mm].
@@ -61,6 +64,7 @@ class SliderRecord:
     closure: Array
     slip: Array
     stress: Array
+    scale: Array
     shift: Array
     direction: Array
     dissipated: float
@@ -155,7 +159,8 @@ class Sliders:
         """The sliders where nothing has touched yet."""
         n, springs = self._start.shape
         closure = np.full(n, -1e30)  # far from touching, and a number
-        return SliderState(closure=closure, slip=np.zeros((n, 2)), stress=np.zeros((n, 2, springs)))
+        slip, stress = np.zeros((n, 2)), np.zeros((n, 2, springs))
+        return SliderState(closure=closure, slip=slip, stress=stress, scale=np.ones(n))
 
     def respond(
         self,
@@ -258,8 +263,10 @@ class Sliders:
         sticks = sizes < (1.0 - _AT_BOUND) * bound
         stuck = np.where(sticks, now.stiffness, 0.0).sum(axis=1)
         return SliderStep(
-            after=SliderState(closure=found.closure, slip=found.slip, stress=stress),
-            lost=found.scale * self._lost(before, trial, stress, now),
+            after=SliderState(
+                closure=found.closure, slip=found.slip, stress=stress, scale=found.scale
+            ),
+            lost=self._lost(before, trial, stress, now, found.scale),
             stuck=found.scale / self.ratio * stuck,
             stick_closure=self._closure_of(stuck),
         )
@@ -284,7 +291,7 @@ class Sliders:
         stress *= springs.stiffness[:, None]
         size, bound = np.hypot(stress[:, 0], stress[:, 1]), self._coefficient * springs.force
         stress *= np.where(size > bound, bound / np.where(size > bound, size, 1.0), 1.0)[:, None]
-        return SliderState(closure=state.closure, slip=state.slip, stress=stress)
+        return replace(state, stress=stress)
 
     def _at(self, closure: Array, rows: Any = slice(None), *, trimmed: bool = True) -> _Springs:
         """Return stiffness and force of the springs at closures, and the stiffness's growth.
@@ -311,11 +318,14 @@ class Sliders:
             growth=np.where(touched & (depth < width), growth, 0.0),
         )
 
-    def _lost(self, before: SliderState, trial: Array, after: Array, now: _Springs) -> Array:
-        """Return what friction takes up per area, before it is scaled, shape (n,) [N/mm].
+    def _lost(
+        self, before: SliderState, trial: Array, after: Array, now: _Springs, scale: Array
+    ) -> Array:
+        """Return what friction takes up per area, shape (n,) [N/mm].
 
         It is the stress of a spring times its slip. Where the bound rises in the step, its mean
-        counts; where it falls, the mean of both stresses. Springs that part lose their energy.
+        counts; where it falls, the mean of both stresses. Springs that part lose their energy,
+        which they bore with the scale of before: that of the end has no bound near first touch.
         """
         then = self._at(before.closure, trimmed=False)
         stiffness = np.maximum(now.stiffness, then.stiffness)
@@ -325,8 +335,8 @@ class Sliders:
         mean = np.where(rises, 0.5 + 0.5 * then.force / np.where(rises, now.force, 1.0), 1.0)
         own = mean * (after * slip).sum(axis=1)
         falling = 0.5 * ((before.stress - after) * slip).sum(axis=1)
-        lost: Array = (np.maximum(own, 0.0) + np.maximum(falling, 0.0)).sum(axis=1)
-        return lost
+        lost: Array = scale * np.maximum(own, 0.0).sum(axis=1)
+        return lost + before.scale * np.maximum(falling, 0.0).sum(axis=1)
 
     def _closure_of(self, stiffness: Array) -> Array:
         """Return the closures at which the springs have a stiffness, shape (n,) [mm]."""

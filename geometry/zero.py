@@ -103,13 +103,12 @@ def _error_of_top(surface: Surface) -> float:
     """Return by how much the height of the highest point may be off [mm].
 
     Quintic splines show the cubic one's error where the surface is smooth. Akima's local cubics
-    hardly overshoot at the edges of grooves; they end at the outermost samples.
+    hardly overshoot at the edges of grooves; they end at the outermost samples. They depend on the
+    order of the axes, so that the mean of both orders counts.
     """
     tops, samples = [], surface.heights if surface.periodic else bordered(surface.heights)
-    twelve = np.argpartition(surface.heights, -12, axis=None)[-12:]
-    highest = np.divmod(twelve, surface.grid[1])
     top = np.floor(np.divide(surface.highest_point, surface.spacing)).astype(int)
-    for cell in {(int(i), int(j)) for i, j in (*zip(*highest, strict=True), top)}:
+    for cell in {(int(i), int(j)) for i, j in (*_highest_cells(surface.heights), top)}:
         axes = [_axis(surface, axis, cell[axis]) for axis in range(2)]
         (rows, columns), (u, v), (x, y) = zip(*axes, strict=True)
         window = samples[np.ix_(rows, columns)] - surface.highest
@@ -120,13 +119,25 @@ def _error_of_top(surface: Surface) -> float:
                 _without_border(surface, axis, one) for axis, one in enumerate(axes)
             )
             window = window[np.ix_(ins, within)]
-        lines = scipy.interpolate.Akima1DInterpolator(u, window)(x)
-        local = scipy.interpolate.Akima1DInterpolator(v, lines, axis=1)(y)
+        local = 0.5 * (_akima(u, v, window, x, y) + _akima(v, u, window.T, y, x).T)
         tops.append((float(quintic.max()), float(local.max())))
     quintic, akima = np.max(tops, axis=0)
     # Beyond 1.5 times this error are one of 24 plateau-honed surfaces of 8 to 16 heights per wave,
     # and one of 36 self-affine ones of 3 heights and more; with 2 in place of 8 seven and two.
     return float(max(8.0 * abs(quintic), abs(akima)))
+
+
+def _highest_cells(heights: Array) -> Indices:
+    """Return the indices of the twelve highest cells, without equal ones beyond, shape (n, 2)."""
+    least = np.partition(heights, -12, axis=None)[-12]
+    highest = np.argwhere(heights >= least)
+    return highest if len(highest) <= 2 * 12 else np.argwhere(heights > least)
+
+
+def _akima(u: Array, v: Array, samples: Array, x: Array, y: Array) -> Array:
+    """Return Akima's cubics along the first axis, and along the second one through these."""
+    lines = scipy.interpolate.Akima1DInterpolator(u, samples)(x)
+    return np.asarray(scipy.interpolate.Akima1DInterpolator(v, lines, axis=1)(y))
 
 
 def _axis(surface: Surface, axis: int, cell: int) -> Axis:

@@ -289,7 +289,10 @@ class FaceSliders:
 
         index = together(self._comm, found)
         sliders = SliderState(
-            closure=record.closure[index], slip=record.slip[index], stress=record.stress[index]
+            closure=record.closure[index],
+            slip=record.slip[index],
+            stress=record.stress[index],
+            scale=record.scale[index],
         )
         self.memory = SliderMemory(
             sliders,

@@ -83,6 +83,17 @@ def test_few_springs_in_large_steps_are_many_in_small_ones(sliders, name):
     assert found == pytest.approx(exact, abs=tolerance)
 
 
+def test_what_springs_lose_is_continuous_where_they_part(sliders):
+    """Just before the law parts, few springs bear 1e-6 of its pressure of then: what they bore."""
+    until = scaled((0.9, 0, 0), (0.9, 0.4, 0))
+    lost = [
+        float(walk(sliders, [*until, (TOUCH + above, -END, 0.0)])[-1].lost[0])
+        for above in (-1e-9, 1e-9, 1e-12)
+    ]
+    assert lost[0] > 0.0
+    assert lost[1:] == pytest.approx([lost[0]] * 2, rel=1e-5)  # 6e-6 at a closure of 1e-9 mm
+
+
 def test_full_sliding_is_the_coefficient_times_the_pressure(sliders):
     *_, last = walk(sliders, scaled((0.8, 0, 0), (0.8, 3.0, 4.0)))
     bound = MU * float(pressure(0.8 * END))

@@ -108,6 +108,17 @@ def test_the_stated_error_of_first_touch_holds(make, n):
     assert sum(kept) >= 13  # 95 of 100, with what 15 scatter
 
 
+@pytest.mark.parametrize("periodic", [False, True])
+@pytest.mark.parametrize("step", [0.0, 1e-3])  # of heights that an instrument rounds: many are equal
+def test_the_error_of_first_touch_knows_no_order_of_the_axes(periodic, step):
+    for seed in range(4):
+        heights = waves(40, seed, 8)[:, :32]
+        heights = np.round(heights / step) * step if step else heights
+        one = Surface(heights=heights, lengths=(1.0, RATE), periodic=periodic)
+        other = Surface(heights=heights.T, lengths=(RATE, 1.0), periodic=periodic)
+        assert Zero().error(one) == pytest.approx(Zero().error(other), rel=1e-9)  # rounding
+
+
 @pytest.mark.parametrize("n", [64, 80])
 def test_grooves_that_meet_the_border_leave_no_ridge(n):
     """An extrapolated spline exceeds the plateau by 140 to 240 nm, at 80 on the last of these."""
