@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from support.arrays import Array, Flags
+from support.checks import finite_pair
 from support.errors import InputError
 
 Pair = tuple[float, float]
@@ -36,11 +37,7 @@ class ShearControl:
                 allowed="exactly one of them",
             )
         pair = self.shift if self.force is None else self.force
-        if (
-            np.shape(np.asarray(pair, float)) != (2,)
-            or not np.isfinite(np.asarray(pair, float)).all()
-        ):
-            raise InputError("needs two finite numbers", value=pair, allowed="along x and y")
+        finite_pair(pair, "needs two finite numbers", allowed="along x and y")
 
     def __str__(self) -> str:
         """Say what shears, as in "shear force (2, 0) N"."""

@@ -21,9 +21,9 @@ from multiscale.progress import run_progress
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from multiscale.scene.scene import Scene, identity
+from multiscale.scene.scene import Scene, checked_scene, identity
 from multiscale.setup import make_setup
-from support.collective import on_root
+from support.collective import check_comm, on_root
 from support.packages import optional_packages
 
 
@@ -51,8 +51,9 @@ class Run:
     def __init__(
         self, scene: Scene, comm: Any = None, resolved: Mapping[str, Any] | None = None
     ) -> None:
+        check_comm(comm)
         self.clock = Clock()
-        self.given, self.comm = scene, comm
+        self.given, self.comm = checked_scene(scene), comm
         self.steps: list[LoadStep] = []
         self.position = LoadPosition()
         self._notes: list[str] = []
@@ -197,6 +198,7 @@ def run(
     Note:
         Collective.
     """
+    checked_scene(scene)
     with run_progress(comm, scene.loading) if progress else nullcontext((None, None)) as shown:
         advance, at = shown
         whole = Run(scene, comm)

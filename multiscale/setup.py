@@ -21,8 +21,8 @@ from multiscale.couplings.dispatch import coupling_class
 from multiscale.inputs.scene_parts import Source
 from multiscale.inputs.surfaces import located, make_surface
 from multiscale.machine import ClusterNodes, large_object_comm
-from multiscale.scene.scene import Scene
-from support.collective import on_root_alone
+from multiscale.scene.scene import Scene, checked_scene
+from support.collective import check_comm, on_root_alone
 
 if TYPE_CHECKING:
     from multiscale.auto.search import MeshError
@@ -55,6 +55,8 @@ def make_setup(
     Note:
         Collective.
     """
+    check_comm(comm)
+    checked_scene(scene)
     began, known = time.perf_counter(), resolved or {}
     auto: frozenset[str] = frozenset() if known else auto_keys(scene)
     build = _Builder(comm, nodes or ClusterNodes())

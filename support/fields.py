@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, fields
 from functools import cache
+from numbers import Real
 from typing import Annotated, Any, get_args, get_type_hints
 
 from support.errors import InputError
@@ -86,7 +87,10 @@ def check_limits(record: Any) -> None:
     """
     for name, limits in _limits(record.__class__).items():
         value = getattr(record, name)
-        if value is not None and (problem := limits.problem(value)):
+        if value is None:
+            continue
+        number = isinstance(value, Real) and not isinstance(value, bool)
+        if problem := limits.problem(value) if number else "must be a number":
             raise InputError(problem, key=name, value=value)
 
 

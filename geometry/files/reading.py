@@ -16,7 +16,14 @@ from geometry.files.text import load_text, read_text
 from geometry.plausibility import reading_notes, surface_notes
 from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
-from support.checks import cell_counts, check_scale, is_level, positive_lengths, real_array
+from support.checks import (
+    cell_counts,
+    check_scale,
+    is_level,
+    path_of,
+    positive_lengths,
+    real_array,
+)
 from support.errors import InputError
 
 
@@ -57,7 +64,7 @@ def read_surface(
     Raises:
         InputError: When the file is missing, unreadable or does not fit, naming the file.
     """
-    file, preparation = Path(path), Preparation(**steps)
+    file, preparation = path_of(path), Preparation(**steps)
     try:
         if not file.is_file():  # pipes and devices are refused too: they may never end
             raise InputError("there is no such file")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
+from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -30,6 +31,7 @@ from micro.half_space.cell_sums import summed
 from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices
+from support.checks import of_kind
 from support.cores import blas_threads
 from support.errors import InputError
 
@@ -89,9 +91,11 @@ class HalfSpaceModel:
     few: Indices | None = None
 
     def __post_init__(self) -> None:
+        allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
+        of_kind(self.surface, Surface, "is no surface", allowed=allowed)
         for what in ("contact_modulus", "tolerance"):
             value = getattr(self, what)
-            if not (np.isfinite(value) and value > 0.0):
+            if not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
         if self.hardness is not None and not self.hardness > 0.0:

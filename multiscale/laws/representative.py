@@ -20,6 +20,7 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.readable import Observer
+from support.checks import of_kind
 
 Array = NDArray[np.float64]
 MakeModel = Callable[[Surface], HalfSpaceModel]
@@ -89,6 +90,8 @@ def representative_law(
             value=list(limits.values()),
             allowed="largest_pressure, largest_closure or both",
         )
+    if not isinstance(samples, list | tuple):
+        raise InputError("is no list of surfaces", key="samples", value=samples)
     if not samples:
         raise InputError("a representative law needs a sample", value=[])
     make = make_model or (
@@ -165,6 +168,8 @@ def representative_laws(
 
 
 def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
+    allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
+    of_kind(sample, Surface, "is no surface", allowed=allowed)
     if np.ptp(sample.heights) == 0.0:
         raise InputError("a flat sample has no law", value=sample.source or "flat")
     model = make(sample)

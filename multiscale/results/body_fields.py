@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from multiscale.readable import number, times
 from support.arrays import Array
+from support.checks import path_of
 from support.displayed import Displayed, Table, dataset
 from support.errors import InputError
 from support.packages import optional_packages
@@ -100,7 +101,7 @@ def read_fields(folder: str | Path, *, counter: bool = False) -> BodyFields:
     Raises:
         InputError: When a file is missing, damaged or cut short.
     """
-    path = Path(folder) / ("counter_fields.xdmf" if counter else "fields.xdmf")
+    path = path_of(folder) / ("counter_fields.xdmf" if counter else "fields.xdmf")
     if not path.is_file():
         allowed = "the results of a run with output.fields = 'last' or 'all', which has a body"
         raise InputError("there are no fields", file=str(path), allowed=allowed)

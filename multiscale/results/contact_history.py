@@ -17,6 +17,7 @@ from multiscale.results.contact_record import FIELDS, SPOT_COLUMNS, ContactRecor
 from multiscale.results.history import csv_rows, read_history, result_of_a_run
 from support.arrays import Array
 from support.checked_store import check_hdf5
+from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, dataset, of_columns, spread
 from support.errors import InputError
 from support.packages import optional_packages
@@ -210,7 +211,7 @@ def read_contact(folder: str | Path) -> ContactHistory:
     Raises:
         InputError: When a file is missing, damaged or cut short, or the run recorded no contacts.
     """
-    folder = Path(folder)
+    folder = path_of(folder)
     history, path = read_history(folder), folder / "contacts.csv"
     with result_of_a_run(folder / "provenance.json") as provenance:
         spots = {int(one["step"]): int(one["spots"]) for one in provenance["contacts"]}

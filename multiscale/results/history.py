@@ -26,6 +26,7 @@ from multiscale.results.accuracy import AccuracyVerdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.reference_record import ReferenceRecord
 from support.arrays import Array
+from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, dataset
 from support.errors import InputError
 from support.whole_files import read_bytes
@@ -298,7 +299,7 @@ def read_history(folder: str | Path) -> History:
     Raises:
         InputError: When a file is missing, cannot be read or is no result of a run.
     """
-    folder = Path(folder)
+    folder = path_of(folder)
     rows, patch_rows = csv_rows(folder / "history.csv"), csv_rows(folder / "patches.csv")
     with result_of_a_run(folder / "provenance.json") as provenance:
         lengths, grid = provenance["surface"]["lengths_mm"], provenance["patches"]

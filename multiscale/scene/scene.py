@@ -9,11 +9,14 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, get_args, get_type_hints
+
+import numpy as np
 
 from multiscale.removed import refuse_removed
 from multiscale.scene.contents import SceneSections, check_together
@@ -21,6 +24,7 @@ from multiscale.scene.keys import keys_beside, scene_keys
 from multiscale.scene.reader import read, to_dict
 from multiscale.scene.scene_file import changed, flat, overridden, read_scene_file
 from multiscale.scene.surface import NAMES_A_FILE
+from support.checks import of_kind, path_of
 from support.displayed import Displayed, Table
 from support.errors import InputError, did_you_mean
 from support.fields import KEY, key_of
@@ -62,7 +66,7 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When the file cannot be read or anything in it is wrong.
         """
-        path = Path(path)
+        path = path_of(path)
         data = read_scene_file(path)
         for text in overrides:
             data = overridden(data, text)
@@ -79,10 +83,11 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When anything is wrong; names file, key, value and what is allowed.
         """
+        data = _copied(data)
         try:
             refuse_removed(data)
             sections = read(cls, data, _unknown_key)
-            scene = replace(sections, source=source, written=_copied(data))
+            scene = replace(sections, source=source, written=data)
             check_together(scene, scene.stated("coupling"))
         except InputError as error:
             raise error.located(file=str(source) if source else None) from None
@@ -110,8 +115,11 @@ class Scene(Displayed, SceneSections):
         Raises:
             InputError: When a key is none, or the scene would be wrong.
         """
+        allowed = '{"section.key": value}'
+        changes = of_kind(changes, Mapping, "are no changes", allowed=allowed)  # type: ignore[type-abstract]
         data = self.written
         for key, value in changes.items():
+            of_kind(key, str, "is no key", allowed=allowed)
             data = changed(data, key, value)
         return Scene.from_dict(data, self.source)
 
@@ -154,11 +162,38 @@ class Scene(Displayed, SceneSections):
         return (self.source.parent if self.source else Path()) / file
 
 
+def checked_scene(scene: Any) -> Scene:
+    """Return a scene as it is.
+
+    Raises:
+        InputError: When it is something else, such as the path of one.
+    """
+    return of_kind(
+        scene, Scene, "is no scene", allowed="Scene.load(path) or Scene.from_dict(sections)"
+    )
+
+
 def _copied(data: Any) -> Any:
-    """Return nested dictionaries that do not change with those that were given."""
+    """Return nested dictionaries that do not change with those that were given.
+
+    Arrays and numbers of numpy become those of Python, but for heights.
+    """
     if isinstance(data, dict):
-        return {name: _copied(value) for name, value in data.items()}
-    return data
+        pairs = data.items()
+        return {name: (_unchanging if name == "heights" else _copied)(one) for name, one in pairs}
+    if isinstance(data, list | tuple):
+        return [_copied(value) for value in data]
+    return data.tolist() if isinstance(data, np.generic | np.ndarray) else data
+
+
+def _unchanging(heights: Any) -> Any:
+    """Return a copy of heights, or themselves where nobody writes them, as where they are one."""
+    if isinstance(heights, np.ndarray) and not heights.flags.writeable:
+        return heights
+    copied = deepcopy(heights)
+    if isinstance(copied, np.ndarray):
+        copied.setflags(write=False)
+    return copied
 
 
 def _said(value: Any) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 
 from multiscale.scene.scene import CONTENT, Scene, content_digest
 from multiscale.scene.scene_file import parsed
+from support.checks import of_kind
 from support.errors import InputError
 from support.whole_files import plain
 
@@ -73,6 +74,11 @@ def sweep_cases(scene: Scene, vary: Mapping[str, Iterable[Any]]) -> list[Case]:
         InputError: When nothing is varied, a key has no values or one twice, or there are too many
             cases. Scenes are not made.
     """
+    allowed = '{"section.key": [value, …]}'
+    vary = of_kind(vary, Mapping, "are no values to vary", allowed=allowed)  # type: ignore[type-abstract]
+    for key, values in vary.items():
+        if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
+            raise InputError("is no list of values", key=key, value=values, allowed=allowed)
     lists = {key: [plain(value) for value in values] for key, values in vary.items()}
     if not lists:
         raise InputError("varies nothing", key="--vary", allowed="KEY=VALUES, at least once")

@@ -15,7 +15,7 @@ import numpy as np
 from multiscale.auto.keys import auto_keys, is_measured, resolved_sections, with_resolved
 from multiscale.couplings.dispatch import coupling_class
 from multiscale.readable import column, duration
-from multiscale.scene.scene import Scene
+from multiscale.scene.scene import Scene, checked_scene
 from multiscale.setup import make_setup
 from multiscale.studies import AGAINST
 from multiscale.studies.configurations import Configuration, configurations, pressure_grid
@@ -29,7 +29,7 @@ from multiscale.studies.errors import (
 )
 from multiscale.studies.measured_run import measured_run
 from multiscale.studies.running import CaseResult, Journal, run_cases
-from support.collective import on_root, place_in
+from support.collective import check_comm, on_root, place_in
 from support.displayed import Displayed, Table, of_columns
 from support.errors import InputError
 
@@ -158,6 +158,8 @@ def compare(
     Note:
         Collective.
     """
+    check_comm(comm)
+    checked_scene(scene)
     if any(one and one.heights is not None for one in (scene.surface, scene.counter_surface)):
         allowed = "surface.file: save them, as by numpy.save"
         raise InputError("are not compared in memory", key="surface.heights", allowed=allowed)

@@ -40,6 +40,7 @@ from multiscale.studies.run_curves import (
     nominal_area,
 )
 from support.arrays import Array
+from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
 
@@ -228,6 +229,8 @@ def difference(
         raise InputError("is nothing to compare at", key="at", value=at, allowed=", ".join(AT))
     runs = [_Run.of(one) for one in (first, second)]
     chosen = tuple(names or _names((first, second)))
+    if len(chosen) != 2:
+        raise InputError("are not the names of two runs", key="names", value=names)
     whole = (runs[0].history, runs[1].history)
     risen = [_first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
     risen, zero_notes, has_approach = _from_one_zero(runs, risen)
@@ -266,7 +269,7 @@ class _Run:
     def of(cls, given: History | str | Path) -> _Run:
         if isinstance(given, History):
             return cls(history=given)
-        folder = Path(given)
+        folder = path_of(given)
         if not (folder / "history.csv").is_file():
             problem = "holds no run: there is no history.csv in it"
             allowed = "a folder that patchlaw run wrote"
