@@ -109,9 +109,7 @@ def test_the_stated_error_of_first_touch_holds(make, n):
 
 
 @pytest.mark.parametrize("periodic", [False, True])
-@pytest.mark.parametrize(
-    "step", [0.0, 1e-3]
-)  # of heights that an instrument rounds: many are equal
+@pytest.mark.parametrize("step", [0.0, 1e-3])  # rounded heights: many are equal
 def test_the_error_of_first_touch_knows_no_order_of_the_axes(periodic, step):
     for seed in range(4):
         heights = waves(40, seed, 8)[:, :32]
