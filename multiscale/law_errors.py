@@ -25,7 +25,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.special import stdtrit
+import scipy
 
 from geometry import Control, Surface
 from multiscale.bodies.bodies import free_bodies
@@ -335,7 +335,9 @@ def mean_error(samples: Sequence[Surface]) -> float:
     """
     areas = np.array([sample.area for sample in samples])
     count = float(areas.sum() ** 2 / (areas @ areas))
-    return float(stdtrit(count - 1.0, _SHARE)) / math.sqrt(count) if count > 1.0 else 0.0
+    return (
+        float(scipy.special.stdtrit(count - 1.0, _SHARE)) / math.sqrt(count) if count > 1.0 else 0.0
+    )
 
 
 def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:

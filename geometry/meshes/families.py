@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, label
+import scipy
 
 from geometry.meshes.block import BlockShape
 from geometry.meshes.refined_block import Mesher, RefinedShape
@@ -73,9 +73,11 @@ class ContactMap:
             pressures: Pressures of its cells, some of them positive [MPa].
         """
         touching, spacing = pressures > 0.0, surface.spacing
-        region, count = label(touching, structure=np.ones((3, 3)))
+        region, count = scipy.ndimage.label(touching, structure=np.ones((3, 3)))
         # a cell is on average half its width further inside than its distance from those outside
-        depth = distance_transform_edt(np.pad(touching, 1), sampling=spacing)[1:-1, 1:-1]
+        depth = scipy.ndimage.distance_transform_edt(np.pad(touching, 1), sampling=spacing)[
+            1:-1, 1:-1
+        ]
         depth = depth[touching] - 0.5 * min(spacing)
         of_cell = region[touching] - 1
         cells = np.bincount(of_cell, minlength=count)
@@ -108,7 +110,7 @@ class ContactMap:
             for length, count in zip(surface.lengths, surface.grid, strict=True)
         )
         inside = depth_below_plane(surface, x[:, None], y[None, :], approach, tilt) > 0.0
-        island, count = label(inside, structure=np.ones((3, 3)))
+        island, count = scipy.ndimage.label(inside, structure=np.ones((3, 3)))
         known = np.zeros(count + 1, dtype=bool)
         known[0] = True
         cell = np.floor(self.places / surface.spacing).astype(int)
@@ -117,7 +119,7 @@ class ContactMap:
         i, j = np.nonzero(~known[island])
         if not len(i):
             return self
-        depth = distance_transform_edt(inside, sampling=surface.spacing)[i, j]
+        depth = scipy.ndimage.distance_transform_edt(inside, sampling=surface.spacing)[i, j]
         size = np.bincount(island[i, j], depth, count + 1) / np.maximum(
             np.bincount(island[i, j], minlength=count + 1), 1
         )
@@ -380,5 +382,5 @@ def contact_radius(
         return 0.5 * min(surface.lengths)
     step = (x[1], y[1])
     # a point lies on average half a step further inside than its distance from those outside
-    distance = distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
+    distance = scipy.ndimage.distance_transform_edt(inside, sampling=step)[inside] - 0.5 * min(step)
     return max(3.0 * float(distance.mean()) / math.sqrt(2.0), least)

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from geometry.meshes.bisection import Tetrahedra
 from geometry.meshes.gmsh_session import gmsh_session
@@ -97,7 +97,7 @@ def _generate(gmsh: Any, height: float, classes: list[tuple[float, Array]]) -> N
     gmsh.model.mesh.generate(2)
     _, nodes, _ = gmsh.model.mesh.getNodes(2, -1, includeBoundary=True)
     nodes = np.reshape(nodes, (-1, 3))
-    top = cKDTree(nodes[np.abs(nodes[:, 2]) < 1e-9 * height, :2])
+    top = scipy.spatial.cKDTree(nodes[np.abs(nodes[:, 2]) < 1e-9 * height, :2])
     if any(np.any(top.query(places)[0] > edge) for edge, places in classes):
         gmsh.model.mesh.clear()
         gmsh.option.setNumber("Mesh.Algorithm", 5)  # Delaunay's

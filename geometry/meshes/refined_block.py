@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 from geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
 from geometry.meshes.lattice import Segment, lattice_cells, node_share
@@ -175,7 +175,7 @@ class EdgeLengths:
     def __init__(self, shape: RefinedShape, hollows: Array | None = None) -> None:
         self._shape = shape
         self._near = [
-            (edge, cKDTree(np.column_stack([places, np.zeros(len(places))])))
+            (edge, scipy.spatial.cKDTree(np.column_stack([places, np.zeros(len(places))])))
             for edge, places in shape.edge_classes()
         ]
         hollows = np.empty((0, 2, 3)) if hollows is None else hollows
@@ -187,7 +187,7 @@ class EdgeLengths:
         which = np.repeat(np.arange(len(count)), count)
         seams = start[which, 0] + share[:, None] * (end - start)[which, 0]
         self._least = least[which]
-        self._seam_tree = cKDTree(seams) if len(seams) else None
+        self._seam_tree = scipy.spatial.cKDTree(seams) if len(seams) else None
 
     def _around(self, points: Array) -> Array:
         """Return the edge length that roughness and distance from the interface allow."""

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import brentq, linprog
+import scipy
 
 from geometry import Control
 from geometry.plane_equilibrium import PlaneResponse, find_equilibrium
@@ -175,7 +175,7 @@ class Peaks:
         most = 1e-6 * self.modes.half
         while residual(most) < 0.0:
             most *= 4.0
-        return float(brentq(residual, 0.0, most, rtol=1e-3))
+        return float(scipy.optimize.brentq(residual, 0.0, most, rtol=1e-3))
 
     def _resting(self, control: Control) -> tuple[float, float]:
         """Return the slopes of a plane that rests on the rigid peaks under a force in the centre.
@@ -187,7 +187,7 @@ class Peaks:
             return 0.0, 0.0
         scale = float(np.ptp(self.depth)) or 1.0
         most = None if control.approach is None else control.approach / scale + 1.0
-        programme = linprog(
+        programme = scipy.optimize.linprog(
             [-1.0, 0.0, 0.0],
             A_ub=self.modes.matrix / [1.0, self.modes.half, self.modes.half],
             b_ub=self.depth / scale,

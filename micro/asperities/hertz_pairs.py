@@ -27,7 +27,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
-from scipy.special import elliprf
+import scipy
 
 from micro.asperities.patch_sums import EllipticContacts
 from micro.asperities.summit_problem import InteractionDisplacement
@@ -170,7 +170,7 @@ def merging_parameter(beta: Array, integral: Array) -> Array:
     """
     v = beta**MERGING_SLOPE / np.tan(0.5 * np.pi * MERGING_SLOPE) ** 2
     for _ in range(30):
-        excess = elliprf(1.0 + v, beta + v, v) - MERGING_SLOPE * integral
+        excess = scipy.special.elliprf(1.0 + v, beta + v, v) - MERGING_SLOPE * integral
         step = 2.0 * excess * np.sqrt((1.0 + v) * (beta + v) / v)
         v = v * np.exp(np.clip(step, -2.0, 2.0))
         if np.all(np.abs(step) < 1e-14):

@@ -27,7 +27,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import roots_jacobi
+import scipy
 
 from geometry import PatchGrid
 from geometry.legendre_modes import gauss_rule
@@ -212,7 +212,7 @@ def patch_displacements(
 
 def _cubature(contacts: EllipticContacts) -> tuple[Array, Array]:
     """Return points, shape (64 m, 2), and the 64 weights of every contact's mean."""
-    places, weights = roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
+    places, weights = scipy.special.roots_jacobi(4, 0.5, 0.0)  # t = r² weighs as (1 − t)^½
     radius, angles = np.sqrt(0.5 * (1.0 + places))[:, None], 16
     around = 2.0 * np.pi / angles * (np.arange(angles) + 0.5)
     u, v = (radius * np.cos(around)).ravel(), (radius * np.sin(around)).ravel()

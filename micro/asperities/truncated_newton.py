@@ -12,7 +12,7 @@ Theory: docs/theory.md, section 9.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.linalg import lsqr
+import scipy
 
 from micro.asperities.summit_problem import (
     TOLERANCE,
@@ -102,4 +102,6 @@ def _gauss_newton_step(
     """Reduce ‖J step + error‖ by conjugate gradients to ``forcing`` times ‖error‖."""
     jacobian = np.eye(len(rows))
     jacobian[:, np.searchsorted(rows, caused.active)] += caused.derivative[rows]
-    return lsqr(jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows))[0]
+    return scipy.sparse.linalg.lsqr(
+        jacobian, -error, atol=0.0, btol=forcing, conlim=0.0, iter_lim=4 * len(rows)
+    )[0]

@@ -10,7 +10,7 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+import scipy
 
 from micro.boundary_elements.half_space_grid import Cells
 from support.arrays import Array
@@ -64,9 +64,11 @@ class ComplianceMatrix:
         if self._last is None or self._last[0] is not cells:
             part = self._matrix[np.ix_(cells.flat, cells.flat)]
             try:
-                factors = cho_factor(part, lower=True, check_finite=False)
-            except LinAlgError:  # to rounding, or terms that err: conjugate gradients then iterate
-                factors = cho_factor(np.diag(np.diag(part)), lower=True)
+                factors = scipy.linalg.cho_factor(part, lower=True, check_finite=False)
+            except (
+                scipy.linalg.LinAlgError
+            ):  # to rounding, or terms that err: conjugate gradients then iterate
+                factors = scipy.linalg.cho_factor(np.diag(np.diag(part)), lower=True)
             self._last = cells, part, factors
         return self._last[1:]
 
@@ -85,4 +87,4 @@ class FactoredInverse:
 
     def __call__(self, displacement: Array) -> Array:
         """Return the pressures that displace the cells so, shape (n,)."""
-        return np.asarray(cho_solve(self._factors, displacement, check_finite=False))
+        return np.asarray(scipy.linalg.cho_solve(self._factors, displacement, check_finite=False))

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
+import scipy
 
 from geometry import PatchGrid
 from geometry.legendre_modes import gauss_rule
@@ -162,7 +162,7 @@ def distance_nodes(nearest: float, farthest: float) -> Array:
     return np.asarray(nearest * np.exp(_STEP * np.arange(max(count, 4))))
 
 
-def values_at(nodes: Array, distances: Array) -> csr_array:
+def values_at(nodes: Array, distances: Array) -> scipy.sparse.csr_array:
     """Return the cubic interpolation from nodes to distances, shape (distances, nodes).
 
     Args:
@@ -184,10 +184,10 @@ def values_at(nodes: Array, distances: Array) -> csr_array:
     columns = first[:, None] + np.arange(4)
     rows = np.repeat(np.arange(len(distances)), 4)
     shape = len(distances), len(nodes)
-    return csr_array((entries.ravel(), (rows, columns.ravel())), shape=shape)
+    return scipy.sparse.csr_array((entries.ravel(), (rows, columns.ravel())), shape=shape)
 
 
-def means_over(nodes: Array, borders: Array) -> csr_array:
+def means_over(nodes: Array, borders: Array) -> scipy.sparse.csr_array:
     """Return the means of the interpolation over intervals, shape (intervals, nodes).
 
     Args:
@@ -198,8 +198,10 @@ def means_over(nodes: Array, borders: Array) -> csr_array:
     ends = np.union1d(borders, inside)  # the interpolation bends at the nodes
     points, weights = gauss_points(ends, 4)
     owner = np.searchsorted(borders, points) - 1
-    sums = csr_array((weights / np.diff(borders)[owner], (owner, np.arange(points.size))))
-    return csr_array(sums @ values_at(nodes, points))
+    sums = scipy.sparse.csr_array(
+        (weights / np.diff(borders)[owner], (owner, np.arange(points.size)))
+    )
+    return scipy.sparse.csr_array(sums @ values_at(nodes, points))
 
 
 def gauss_points(ticks: Array, count: int) -> tuple[Array, Array]:

@@ -40,8 +40,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.interpolate import RectBivariateSpline, make_interp_spline
-from scipy.special import k0, k1
+import scipy
 
 from support.arrays import Array
 
@@ -87,20 +86,23 @@ def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
 
 
 @cache
-def _compliance_splines(nu: float) -> list[RectBivariateSpline]:
+def _compliance_splines(nu: float) -> list[scipy.interpolate.RectBivariateSpline]:
     logs = _logs(1e-8)
-    return [RectBivariateSpline(logs, logs, _side_compliance(logs, nu))]
+    return [scipy.interpolate.RectBivariateSpline(logs, logs, _side_compliance(logs, nu))]
 
 
 @cache
-def _stress_splines(nu: float) -> list[RectBivariateSpline]:
+def _stress_splines(nu: float) -> list[scipy.interpolate.RectBivariateSpline]:
     """Return splines of the stresses times x + x': so they vary little where both are short."""
     logs = _logs(1e-11)
     apart = np.add.outer(np.exp(logs), np.exp(logs))
-    return [RectBivariateSpline(logs, logs, part) for part in _side_stresses(logs, nu) * apart]
+    return [
+        scipy.interpolate.RectBivariateSpline(logs, logs, part)
+        for part in _side_stresses(logs, nu) * apart
+    ]
 
 
-def _values(splines: list[RectBivariateSpline], distances: Array) -> Array:
+def _values(splines: list[scipy.interpolate.RectBivariateSpline], distances: Array) -> Array:
     """Return functions at pairs of ascending distances, (functions, n, n); 0 beyond tables."""
     first, *_, last = splines[0].get_knots()[0]
     logs = np.log(distances)
@@ -139,9 +141,9 @@ def _side_compliance(logs: Array, nu: float) -> Array:
     _, more = _reflections(logs, nu)
     apart = np.abs(np.subtract.outer(x, x))
     np.fill_diagonal(apart, 1.0)
-    near = k0(apart)
+    near = scipy.special.k0(apart)
     np.fill_diagonal(near, -np.log(_STEP * x / (4.0 * np.pi)) - np.euler_gamma)
-    image = k0(np.add.outer(x, x))
+    image = scipy.special.k0(np.add.outer(x, x))
     total = 2.0 / np.pi * (image + ((near + image) * weights) @ more)
     return np.asarray(0.5 * (total + total.T))
 
@@ -194,7 +196,7 @@ def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
     """
     x = np.exp(logs)[:, None]
     rho = np.hypot(x, x.T)
-    k_0, k_1, k_2 = (function(rho) for function in (k0, k1, _k2))
+    k_0, k_1, k_2 = (function(rho) for function in (scipy.special.k0, scipy.special.k1, _k2))
     below = (1.0 - 2.0 * poisson_ratio) * _depth_integral(logs)
     xx = -(x**3) * k_2 / rho**2
     yy = x * k_0 - 2.0 * poisson_ratio * x * k_1 / rho - below
@@ -204,10 +206,12 @@ def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
 def _depth_integral(logs: Array) -> Array:
     """Return ∫_z^∞ K₀(√(x² + s²)) ds at depths z and distances x of exp(logs), shape (n, n)."""
     x = np.exp(logs)
-    below = make_interp_spline(logs, k0(np.hypot.outer(x, x)) * x[:, None]).antiderivative()
+    below = scipy.interpolate.make_interp_spline(
+        logs, scipy.special.k0(np.hypot.outer(x, x)) * x[:, None]
+    ).antiderivative()
     return np.asarray(below(logs[-1]) - below(logs))
 
 
 def _k2(x: Array) -> Array:
     """Return K₂(x), by K₀ and K₁."""
-    return np.asarray(k0(x) + 2.0 / x * k1(x))
+    return np.asarray(scipy.special.k0(x) + 2.0 / x * scipy.special.k1(x))

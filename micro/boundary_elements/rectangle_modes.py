@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import spherical_jn
+import scipy
 
 from geometry.legendre_modes import gauss_rule, mode_slopes, mode_values
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, gauss_points, values_at
@@ -254,7 +254,7 @@ def _waves(waves: Indices, count: int) -> Array:
     ∫ P_k(t) exp(i z t) dt = 2 iᵏ j_k(z).
     """
     k = np.arange(count)[:, None]
-    bessel = np.sqrt(2.0 * k + 1.0) * spherical_jn(k, 0.5 * np.pi * waves)
+    bessel = np.sqrt(2.0 * k + 1.0) * scipy.special.spherical_jn(k, 0.5 * np.pi * waves)
     phase = 1j**k
     return np.stack([bessel * phase.real, bessel * phase.imag])
 

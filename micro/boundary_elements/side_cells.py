@@ -15,9 +15,9 @@ from functools import lru_cache
 from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.sparse import csr_array, hstack
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from micro.boundary_elements.grid_compliance import CellGrid
@@ -26,7 +26,7 @@ from support.arrays import Array, Indices
 from support.cores import blocks, in_threads
 
 Waves = NDArray[np.complex128]
-Means: TypeAlias = Any  # Array on few rows, csr_array otherwise
+Means: TypeAlias = Any  # Array on few rows, scipy.sparse.csr_array otherwise
 
 _LINES = 2**20
 """Numbers that the waves between rows of cells hold at most at a time."""
@@ -172,18 +172,18 @@ def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> Means:
     length = sides.lengths[axis]
     lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
     low, high = (float(there) for there in sides.pair(axis))
-    both = csr_array(hstack([low * lower, high * lower[::-1]]))
+    both = scipy.sparse.csr_array(scipy.sparse.hstack([low * lower, high * lower[::-1]]))
     return both.toarray() if rows <= 128 else both  # full matrices are quicker
 
 
 def _full(means: Means) -> Array:
     """Return a full or sparse matrix as a full one."""
-    return means.toarray() if isinstance(means, csr_array) else means
+    return means.toarray() if isinstance(means, scipy.sparse.csr_array) else means
 
 
 def _transposed(means: Means) -> Means:
     """Return the transpose of a full or sparse matrix, of the same kind."""
-    return csr_array(means.T) if isinstance(means, csr_array) else means.T
+    return scipy.sparse.csr_array(means.T) if isinstance(means, scipy.sparse.csr_array) else means.T
 
 
 def _multiplied(kernels: Array, waves: Waves) -> Waves:

@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import elliprd, elliprf
 
 from micro.closed_forms.hertz_field import elliptic_field
 from support.arrays import Array
@@ -87,8 +87,8 @@ def _factors(beta: Array) -> ShapeFactors:
 
     K − E = (e²/3) RD(0, β, 1) and E/β − K = (e²/3) RD(0, 1, β).
     """
-    integral = elliprf(0.0, beta, 1.0)
-    product = elliprd(0.0, 1.0, beta) * elliprd(0.0, beta, 1.0)
+    integral = scipy.special.elliprf(0.0, beta, 1.0)
+    product = scipy.special.elliprd(0.0, 1.0, beta) * scipy.special.elliprd(0.0, beta, 1.0)
     force = np.pi / np.sqrt(6.0) * product**0.25 * integral**-1.5
     axis = 2.0 / np.pi * integral * force
     return ShapeFactors(beta, integral, axis, force, np.sqrt(beta) * axis**2)
@@ -105,7 +105,7 @@ def _axis_ratio_squared(radius_major: ArrayLike, radius_minor: ArrayLike) -> Arr
     log_beta = -4.0 / 3.0 * target
     for _ in range(30):
         beta = np.exp(log_beta)
-        ratio = elliprd(0.0, 1.0, beta) / elliprd(0.0, beta, 1.0)
+        ratio = scipy.special.elliprd(0.0, 1.0, beta) / scipy.special.elliprd(0.0, beta, 1.0)
         gap = 1.0 - beta
         flat = gap < 1e-5  # the quotient has lost half its digits; its limit is as good
         quotient = (beta * ratio - 1.0 / ratio) / (2.0 * np.where(flat, 1.0, gap))

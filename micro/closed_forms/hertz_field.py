@@ -28,7 +28,7 @@ Theory: docs/theory.md, section 8.
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import elliprd, elliprf
+import scipy
 
 from support.arrays import Array
 
@@ -92,10 +92,10 @@ def _carlson(
     x_squared: Array, y_squared: Array, s: Array, beta: Array, v: Array
 ) -> tuple[Array, Array]:
     p, q = 1.0 + v, beta + v
-    slope = elliprf(p, q, v)
+    slope = scipy.special.elliprf(p, q, v)
     # At v = 0 (inside) RD keeps two positive arguments and stays finite.
-    along = x_squared * elliprd(q, v, p)
-    across = y_squared * elliprd(p, v, q)
+    along = x_squared * scipy.special.elliprd(q, v, p)
+    across = y_squared * scipy.special.elliprd(p, v, q)
     return s * slope - (along + across) / 3.0, slope
 
 

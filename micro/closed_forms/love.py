@@ -14,8 +14,8 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import toeplitz
 
 from geometry.legendre_modes import gauss_rule
 from geometry.patches import PatchGrid
@@ -76,8 +76,8 @@ def influence_matrix(patches: PatchGrid) -> Array:
     """
     (nx, ny), (sx, sy), (a, b) = patches.grid, patches.size, patches.half_sizes
     table = mutual_influence(np.arange(nx)[:, None] * sx, np.arange(ny) * sy, a, b)
-    steps_x = toeplitz(np.arange(nx))
-    steps_y = toeplitz(np.arange(ny))
+    steps_x = scipy.linalg.toeplitz(np.arange(nx))
+    steps_y = scipy.linalg.toeplitz(np.arange(ny))
     whole = table[steps_x[:, None, :, None], steps_y[None, :, None, :]]
     return np.asarray(whole.reshape(patches.count, patches.count))
 

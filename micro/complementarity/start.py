@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from micro.complementarity.cell_problem import CellProblem
 from micro.complementarity.rigid_motions import Motions
@@ -108,7 +108,7 @@ def clearance(interference: Array, motions: Motions) -> Clearance:
             break
         cells.append(worst)
         modes = motions.modes_of(np.array(cells)).T
-        programme = linprog(
+        programme = scipy.optimize.linprog(
             np.append(np.zeros(motions.count), 1.0),
             A_ub=np.column_stack((modes, -np.ones(len(cells)))),
             b_ub=-scaled.ravel()[cells],

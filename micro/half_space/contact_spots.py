@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from geometry.contact_state import Spots, peaks_of
 from support.arrays import Array
@@ -38,7 +36,7 @@ def find_spots(
         The spots, their areas corrected by the perimeter; and the part of every cell that is in
         contact, likewise, shape (nx, ny).
     """
-    labels, count = ndimage.label(pressure > 0.0)
+    labels, count = scipy.ndimage.label(pressure > 0.0)
     if periodic and count:
         labels, count = _joined(labels, count)
     owner = labels.ravel()
@@ -90,5 +88,7 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
     one, other = (np.concatenate(part) for part in zip(*sides, strict=True))
     both = (one > 0) & (other > 0)
     links = (np.ones(both.sum()), (one[both] - 1, other[both] - 1))
-    merged, name = connected_components(coo_array(links, shape=(count, count)), directed=False)
+    merged, name = scipy.sparse.csgraph.connected_components(
+        scipy.sparse.coo_array(links, shape=(count, count)), directed=False
+    )
     return np.concatenate(([0], name + 1))[labels], merged

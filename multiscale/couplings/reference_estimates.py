@@ -9,7 +9,7 @@ Theory: docs/theory.md, section 12.
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from geometry import Control, PatchGrid, RigidPlane, Surface
 from geometry.meshes.families import ContactMap
@@ -77,7 +77,9 @@ def plane_over_face(
     most = excess(0.0)
     if most <= 0.0:
         return plane
-    return over_face(brentq(excess, 0.0, most, rtol=0.01) if excess(most) < 0.0 else most)
+    return over_face(
+        scipy.optimize.brentq(excess, 0.0, most, rtol=0.01) if excess(most) < 0.0 else most
+    )
 
 
 def block_compliance(scene: Scene, lengths: tuple[float, float], height: float) -> Array:

@@ -9,7 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
+import scipy
 
 from geometry import BlockShape, RefinedShape, RigidPlane, Surface
 from geometry.meshes.families import ContactMap, Shape, characteristic_size, reference_shapes
@@ -307,7 +307,7 @@ def _cubes(shape: RefinedShape) -> float:
     for one in np.unique(classes):
         away, chosen = np.ones(counts, dtype=bool), classes == one
         away[near[chosen, 0], near[chosen, 1]] = False
-        beside.append(np.asarray(distance_transform_edt(away, sampling=spacing)))
+        beside.append(np.asarray(scipy.ndimage.distance_transform_edt(away, sampling=spacing)))
         edges.append(float(shape.edges[chosen].mean()))
 
     def density(depth: float) -> float:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 from geometry import Control, InputError, NotConverged, PatchGrid
 from geometry.rigid_plane import PlaneLevers
@@ -194,7 +194,7 @@ class LoadedPatches:
                     raise self.failure("NO_CONTACT", 0)
                 return self.levers.matrix @ plane, plane  # nothing is in contact
         accuracy = 1e-9 * (above - below)
-        common = min(brentq(excess, below, above, xtol=accuracy) + accuracy, above)
+        common = min(scipy.optimize.brentq(excess, below, above, xtol=accuracy) + accuracy, above)
         if force is not None:
             plane[0] = mean_approach(self.laws.along(common + tilted))
         return common + tilted, plane

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from multiscale.laws.rows import LawRows
 
@@ -93,7 +93,7 @@ class LawCurves:
             power = rows.pressure ** (2 / 3)
             smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
             values = np.column_stack(smooth).astype(np.float64)
-            cubic = PchipInterpolator(rows.approach, values)
+            cubic = scipy.interpolate.PchipInterpolator(rows.approach, values)
             pieces[0, 3, :4] = values[0]
             pieces[1:-1, :, :4] = np.moveaxis(cubic.c, 0, 1)
             pieces[-1, 2:, :4] = cubic(rows.approach[-1], 1), values[-1]

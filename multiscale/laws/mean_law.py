@@ -11,8 +11,8 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import bisect
 
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample, SampleRow
@@ -159,7 +159,7 @@ class PeriodicSamples:
             return float(self.rows(np.array([parameter]), 0.0).pressure[0, 0]) - pressure
 
         if high - low > _CLOSE * high and excess(low) < 0.0 < excess(high):
-            found = float(bisect(excess, low, high, xtol=1e-9 * high, rtol=_CLOSE))
+            found = float(scipy.optimize.bisect(excess, low, high, xtol=1e-9 * high, rtol=_CLOSE))
             high = min(high, (1.0 + _CLOSE) * found)
         return min(by_closure, high)
 

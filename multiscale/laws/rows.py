@@ -10,9 +10,8 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from geometry import InputError
 
@@ -234,7 +233,7 @@ class PlanePath:
         if len(values) == 1:
             return values[0]
         within = np.clip(approach, self.approach[0], self.approach[-1])
-        return np.asarray(PchipInterpolator(self.approach, values)(within))
+        return np.asarray(scipy.interpolate.PchipInterpolator(self.approach, values)(within))
 
     def approach_under(self, force: float, force_at: Callable[[float], float]) -> tuple[float, int]:
         """Return the approach under a force [mm], and the number of evaluations of the force.
@@ -250,7 +249,7 @@ class PlanePath:
         if largest < force:  # beyond the path: continue its last secant
             slope = (largest - force_at(0.5 * (first + last))) / (0.5 * (last - first) or 1.0)
             return last + (force - largest) / (slope or 1.0), 2
-        found, report = brentq(
+        found, report = scipy.optimize.brentq(
             # powers of 2/3 are nearly straight over the approach (Hertz)
             lambda approach: force_at(approach) ** (2 / 3) - force ** (2 / 3),
             first,

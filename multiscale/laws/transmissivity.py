@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from support.arrays import Array
 from support.errors import InputError
@@ -93,5 +93,5 @@ class Transmissivity:
         within, beyond = np.clip(separation, first, last), np.maximum(separation - last, 0.0)
         if len(rows) == 1:
             return np.asarray((gaps + beyond[:, None]) ** 3)
-        gap: Any = PchipInterpolator(rows, gaps)(within)
+        gap: Any = scipy.interpolate.PchipInterpolator(rows, gaps)(within)
         return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from multiscale.readable import number, usual_unit
 from multiscale.results.history import History
@@ -173,8 +173,10 @@ def interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:
 def _cubic(steps: Array, values: Array) -> Callable[[Array], Array]:
     """Return a monotone cubic, of logarithms where all values have some."""
     if (values > 0.0).all():
-        return lambda where: np.exp(PchipInterpolator(steps, np.log(values))(where))
-    return PchipInterpolator(steps, values)
+        return lambda where: np.exp(
+            scipy.interpolate.PchipInterpolator(steps, np.log(values))(where)
+        )
+    return scipy.interpolate.PchipInterpolator(steps, values)
 
 
 def _error(where: Array, steps: Array, values: Array, found: Array) -> Array:
