@@ -335,9 +335,9 @@ def mean_error(samples: Sequence[Surface]) -> float:
     """
     areas = np.array([sample.area for sample in samples])
     count = float(areas.sum() ** 2 / (areas @ areas))
-    return (
-        float(scipy.special.stdtrit(count - 1.0, _SHARE)) / math.sqrt(count) if count > 1.0 else 0.0
-    )
+    if count <= 1.0:
+        return 0.0
+    return float(scipy.special.stdtrit(count - 1.0, _SHARE)) / math.sqrt(count)
 
 
 def omission_notes(samples: Sequence[RegionSamples], step: LoadStep) -> Iterator[str]:

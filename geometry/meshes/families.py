@@ -75,9 +75,8 @@ class ContactMap:
         touching, spacing = pressures > 0.0, surface.spacing
         region, count = scipy.ndimage.label(touching, structure=np.ones((3, 3)))
         # a cell is on average half its width further inside than its distance from those outside
-        depth = scipy.ndimage.distance_transform_edt(np.pad(touching, 1), sampling=spacing)[
-            1:-1, 1:-1
-        ]
+        around = np.pad(touching, 1)
+        depth = scipy.ndimage.distance_transform_edt(around, sampling=spacing)[1:-1, 1:-1]
         depth = depth[touching] - 0.5 * min(spacing)
         of_cell = region[touching] - 1
         cells = np.bincount(of_cell, minlength=count)

@@ -65,9 +65,7 @@ class ComplianceMatrix:
             part = self._matrix[np.ix_(cells.flat, cells.flat)]
             try:
                 factors = scipy.linalg.cho_factor(part, lower=True, check_finite=False)
-            except (
-                scipy.linalg.LinAlgError
-            ):  # to rounding, or terms that err: conjugate gradients then iterate
+            except np.linalg.LinAlgError:  # to rounding, or terms that err: CG then iterates
                 factors = scipy.linalg.cho_factor(np.diag(np.diag(part)), lower=True)
             self._last = cells, part, factors
         return self._last[1:]

@@ -173,9 +173,8 @@ def interpolated(at: Array, load: Array, values: Array) -> tuple[Array, Array]:
 def _cubic(steps: Array, values: Array) -> Callable[[Array], Array]:
     """Return a monotone cubic, of logarithms where all values have some."""
     if (values > 0.0).all():
-        return lambda where: np.exp(
-            scipy.interpolate.PchipInterpolator(steps, np.log(values))(where)
-        )
+        logarithm = scipy.interpolate.PchipInterpolator(steps, np.log(values))
+        return lambda where: np.exp(logarithm(where))
     return scipy.interpolate.PchipInterpolator(steps, values)
 
 
