@@ -78,9 +78,14 @@ def number(value: float, digits: int = 4, smallest: int = -6) -> str:
         return "–" if math.isnan(value) else f"{value}".replace("inf", "∞")
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
     if value and not smallest <= int(power) < 10:
-        return f"{float(mantissa):g}·10{str(int(power)).translate(_SUPERSCRIPTS)}"
+        return f"{float(mantissa):g}·{power_of_ten(int(power))}"
     text = f"{float(mantissa + 'e' + power):.{max(digits - 1 - int(power), 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def power_of_ten(power: int) -> str:
+    """Return a power of ten such as ``10⁻⁹``."""
+    return f"10{str(power).translate(_SUPERSCRIPTS)}"
 
 
 def quantity(value: float, unit: str, digits: int = 4) -> str:

@@ -30,6 +30,7 @@ from multiscale.figures.style import (
     PRESSURES,
     VERMILLION,
     map_panels,
+    powers_of_ten,
     styled,
 )
 from multiscale.figures.surface import draw_surface
@@ -210,6 +211,7 @@ def _draw_sizes(axes: Any, record: Any) -> None:
     axes.hist(10.0**exponent, bins, color=BLUE, ec="white", lw=0.5)
     axes.set(xscale="log", xlim=(10.0**low, 10.0**high))
     axes.minorticks_off()
+    powers_of_ten(axes.xaxis)
     axes.yaxis.get_major_locator().set_params(integer=True)
 
 

@@ -6,6 +6,7 @@ made by `new_figure`, in one of two widths, and written by `save`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from contextlib import AbstractContextManager, ContextDecorator
 from io import BytesIO
@@ -18,7 +19,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
-from multiscale.readable import number, usual_unit
+from multiscale.readable import number, power_of_ten, usual_unit
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
 PURPLE, SKY, INK, GREY = "#cc79a7", "#56b4e9", "#222222", "#8c8c8c"
@@ -290,6 +291,15 @@ def show_unit(axis: Any, text: str, unit: str, values: Any, drawn: float = 1.0) 
     axis.set_label_text(f"{text} [{name}]")
     if size != drawn:
         axis.set_major_formatter(lambda place, _: number(place * drawn / size))
+
+
+def powers_of_ten(axis: Any) -> None:
+    """Label the powers of ten of a logarithmic axis without mathtext, whose parser is slow.
+
+    Args:
+        axis: The x or y axis.
+    """
+    axis.set_major_formatter(lambda value, _: power_of_ten(round(math.log10(value))))
 
 
 def plain_logarithmic(axis: Any) -> None:

@@ -21,6 +21,7 @@ from multiscale.figures.style import (
     VERMILLION,
     map_panels,
     plain_logarithmic,
+    powers_of_ten,
     styled,
 )
 from multiscale.readable import usual, usual_unit
@@ -145,6 +146,8 @@ def draw_spectrum(axes: Any, surface: Surface, target: Spectrum | None = None) -
         axes.legend()
     axes.set(xlabel="angular wavenumber [rad/mm]", ylabel="power spectral density [mm⁴]")
     axes.minorticks_off()  # drawing them takes as long as all the rest
+    powers_of_ten(axes.xaxis)
+    powers_of_ten(axes.yaxis)
     if axes.get_xlim()[1] < 100.0 * axes.get_xlim()[0]:
         plain_logarithmic(axes.xaxis)
     axes.set_title(f"rms gradient {roughness(surface).sdq:.3g}")
