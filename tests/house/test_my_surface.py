@@ -29,8 +29,15 @@ def place(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def said(place):
-    """What every command of the page says, and its exit code, in the order of the page."""
-    return {command: said_by(command, place) for command in COMMANDS}
+    """What every command of the page says, and its exit code, in the order of the page.
+
+    Of the scene that a command makes the page quotes no number: one load step shows that it runs.
+    """
+    short = " --set load.steps=1 output.figures=false output.report=false output.check=none"
+    return {
+        command: said_by(command + short * command.endswith("mine.toml"), place)
+        for command in COMMANDS
+    }
 
 
 def said_by(command, place):

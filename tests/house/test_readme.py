@@ -32,6 +32,7 @@ PLAN = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
 FEATURES = (DOCS / "features.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_example_of_a_run():
     (example,) = re.findall(r"```python\n(.*?)```", FEATURES, re.DOTALL)
     (shown,) = re.findall(r"```text\n(.*?)```", FEATURES, re.DOTALL)

@@ -34,7 +34,7 @@ from support.errors import InputError, NotConverged
 COMM = MPI.COMM_WORLD
 SHAPES = {
     "whole": ({"cells": (6, 6, 4)}, (4, 4)),
-    "tets": ({"cells": (5, 4, 3), "element": "P2", "sides": "roller"}, (2, 3)),
+    "tets": ({"cells": (3, 4, 2), "element": "P2", "sides": "roller"}, (2, 3)),
     # a single facet on the interface: only one rank owns any of it
     "one facet": (
         {"interface": (0.2, 0.2), "cells": (1, 1, 5), "margin": 0.4, "margin_cells": 3},

@@ -37,7 +37,6 @@ from macro import (
 CHOICES = {
     "usual": {},
     "mumps": {"pc_type": "cholesky", "pc_factor_mat_solver_type": "mumps"},
-    "lu": {"pc_type": "lu", "pc_factor_mat_solver_type": "mumps"},
     "superlu": {
         "ksp_type": "preonly", "pc_type": "lu", "pc_factor_mat_solver_type": "superlu_dist",
     },
@@ -49,7 +48,7 @@ LAWS = [PowerLaw(k, touch) for k, touch in ((9e5, 0.0), (3e5, 2e-3), (2e6, 1e-3)
 
 EVERY_FACE = [("P", 1), ("P", 2), ("Q", 1), ("Q", 2)]
 FEW_FACES = [("P", 2), ("Q", 1)]
-"""What options choose does not depend on the element: all are pressed by one direct solver."""
+"""What options choose does not depend on the element: one rank alone presses all of them."""
 
 
 def faces(elements):
@@ -87,7 +86,7 @@ def by_choice(choice):
     for name, value in CHOICES[choice].items():
         options[name] = value
     try:
-        return forces(EVERY_FACE if choice in ("usual", "mumps") else FEW_FACES)
+        return forces(EVERY_FACE if COMM.size == 1 else FEW_FACES)
     finally:
         for name in CHOICES[choice]:
             options.delValue(name)

@@ -179,7 +179,7 @@ def test_contacts_read_back_and_their_pictures_are_those_of_one(folders, ranks):
     scene = [
         "surface.grid=[32, 32]", "surface.spectrum.waves=[2, 6]", "coupling.kind=analytic",
         "micro.model=half-space", "micro.hardness=300 MPa", "load.approach=['8 um', '0 um']",
-        "load.steps=2", "output.contact=all", "output.check=none",
+        "load.steps=1", "output.contact=all", "output.check=none",
     ]  # fmt: skip
     found, pictures = [], []
     for count in (1, ranks):
@@ -188,12 +188,12 @@ def test_contacts_read_back_and_their_pictures_are_those_of_one(folders, ranks):
         report = (out / "report.html").read_text()
         pictures.append(re.findall(r'alt="Load step (\d.*?)" src="(.*?)"', report))
     one, more = found
-    assert one.unloading.tolist() == more.unloading.tolist() == [False, False, True, True]
+    assert one.unloading.tolist() == more.unloading.tolist() == [False, True]
     for name in ("pressure_MPa", "gap_mm", "plastic_depth_mm"):
         values = getattr(one, name)
         np.testing.assert_allclose(getattr(more, name), values, rtol=0, atol=1e-8 * values.max())
     assert [caption for caption, _ in pictures[0]] == [caption for caption, _ in pictures[1]]
-    assert len(pictures[0]) == 4
+    assert len(pictures[0]) == 2
 
 
 @pytest.mark.long
@@ -227,34 +227,7 @@ def test_a_rank_may_own_nothing_of_the_interface(waiting_ranks):
     ("override", "text"),
     [
         ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
-        pytest.param(
-            "patches.grid=[50, 4]",
-            "patches.grid = [50, 4]: more patches than cells",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "surface.spectrum.waves=[2, 200]", "the grid is too coarse", marks=pytest.mark.long
-        ),
-        pytest.param(
-            "block.young_modulus='-4 GPa'",
-            "block.young_modulus = '-4 GPa': must be greater than 0",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "block.poisson_ratio=0.5",
-            "block.poisson_ratio = 0.5: must be less than 0.5",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "load.approach='8 kg'",
-            "load.approach = '8 kg': has the wrong unit",
-            marks=pytest.mark.long,
-        ),
-        pytest.param(
-            "surface.grid=[1, 256]",
-            "surface.grid.0 = 1: must be greater than or equal to 4",
-            marks=pytest.mark.long,
-        ),
+        ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),  # found as it is made
     ],
 )
 def test_wrong_input_ends_all_ranks_with_one_message(waiting_ranks, tmp_path, override, text):
@@ -267,47 +240,19 @@ def test_wrong_input_ends_all_ranks_with_one_message(waiting_ranks, tmp_path, ov
     assert not out.exists()
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        None,
-        *(
-            pytest.param(heights, marks=pytest.mark.long)
-            for heights in (np.zeros((1, 64)), np.full((8, 8), np.nan))
-        ),
-    ],
-)
-def test_bad_heights_end_all_ranks(mpirun, root, tmp_path, content):
+@pytest.mark.parametrize("content", [None, np.full((8, 8), np.nan)], ids=["no file", "no numbers"])
+def test_bad_heights_end_all_ranks(waiting_ranks, root, tmp_path, content):
     text = (root / PAPER).read_text(encoding="utf-8").replace("spectrum = {", 'file = "h.npy" # {')
     (tmp_path / "scene.toml").write_text(text.replace("grid = [256, 256]", ""), encoding="utf-8")
     if content is not None:
         np.save(tmp_path / "h.npy", content)
     out = tmp_path / "out"
-    done = mpirun(2, "-m", "patchlaw", "run", tmp_path / "scene.toml", "--out", out, timeout=60)
+    words = ("-m", "patchlaw", "run", tmp_path / "scene.toml", "--out", out)
+    done = waiting_ranks(2, *words, timeout=60)
     assert done.returncode == 2, done.stderr
     assert done.stderr.count("patchlaw: ") == 1
     assert "h.npy" in done.stderr
     assert not out.exists()
-
-
-@pytest.mark.long  # as in test_faults.py
-def test_bug_on_one_rank_ends_all(mpirun, tmp_path):
-    """An error that only one rank meets must not leave the others waiting."""
-    code = (
-        "import sys; from mpi4py import MPI; from multiscale import Run;"
-        "steps = Run.load_steps\n"
-        "def broken(self):\n"
-        "    for step in steps(self):\n"
-        "        yield step\n"
-        "        if MPI.COMM_WORLD.rank == 1: raise RuntimeError('one rank')\n"
-        "Run.load_steps = broken\n"
-        "from multiscale.cli.command_line import main\n"
-        f"sys.exit(main(['run', '{PAPER}', '--out', '{tmp_path / 'out'}', '--set', "
-        "'surface.grid=[64, 64]', 'block.cells=[8, 8, 4]', 'load.steps=3']))"
-    )
-    done = mpirun(2, "-c", code, timeout=60)
-    assert done.returncode != 0
-    assert "RuntimeError: one rank" in done.stderr
 
 
 def sorted_fields(folder):

@@ -78,6 +78,7 @@ def test_a_margin_goes_with_a_meshed_counter_body(tmp_path, first):
     np.testing.assert_allclose(found, forces(block=softer, **SMALL), rtol=2e-3)  # that of 10³
 
 
+@pytest.mark.long
 def test_a_stiff_counter_body_is_a_rigid_plane_beside_a_margin(tmp_path):
     """The pair takes more modes, 16 for 13, which change the force by 3e-4; with finite slopes."""
     block = {"block": CONSTANTS | {"margin": 0.1}}

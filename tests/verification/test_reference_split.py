@@ -58,6 +58,7 @@ def test_concurrent_lies_within_the_error_bar_of_flat_meshes(seed):
     assert bar < 0.012 * value
 
 
+@pytest.mark.long
 def test_slopes_count_in_the_first_order():
     """F/c on one mesh: three tenths of the heights have three tenths of the effect."""
     steep, less, flat = (forces(4, scale, 1.0)[0][-1] for scale in (1.0, 0.3, FLAT))

@@ -7,7 +7,7 @@ from hypothesis import HealthCheck, given, settings
 
 
 @settings(
-    max_examples=200,
+    max_examples=100,
     derandomize=True,
     database=None,
     deadline=None,

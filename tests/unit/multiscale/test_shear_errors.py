@@ -34,8 +34,7 @@ def response(step, *, by_force=False):
     return np.array([step.shear_force_x_N, step.shear_force_y_N])
 
 
-@pytest.mark.parametrize("kind", ["analytic", "concurrent"])
-@pytest.mark.parametrize("by_force", [False, True])
+@pytest.mark.parametrize(("kind", "by_force"), [("analytic", False), ("concurrent", True)])
 def test_the_errors_stated_are_those_of_finer_cells_and_of_the_coupling(kind, by_force):
     step = ran(kind, by_force=by_force).steps[-1]
     parts = dict(step.shear_errors)
@@ -104,8 +103,9 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["consistent", "isolated"])
-@pytest.mark.parametrize("load", [{"force": 6.0}, {"approach": 7e-3}], ids=["force", "approach"])
+@pytest.mark.parametrize(
+    ("kind", "load"), [("consistent", {"force": 6.0}), ("isolated", {"approach": 7e-3})]
+)
 def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}
     block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}

@@ -83,6 +83,7 @@ def test_a_cube_from_a_file_is_chosen_for_as_the_block_is(cube):
     assert 1e-6 < off < 1.5 * by_body.errors["body"]
 
 
+@pytest.mark.long
 def test_a_mesh_is_refined_until_what_the_body_adds_is_known(plate):
     ends = [{"surface": "left"}, {"surface": "right"}]
     keys = {"micro": {"model": "half-space"}, "surface": {**SURFACE, "grid": [40, 40]}}
@@ -181,6 +182,7 @@ def test_a_block_under_laws_of_samples_gets_cells_and_elements():
     assert stated.scene.block.cells == (6, 3, 2) and stated.scene.block.element == "Q1"
 
 
+@pytest.mark.long
 def test_every_stage_is_looked_at(plate):
     """Bolts bend the plate most in the first stage, under which the plane presses least."""
     pull = [{"surface": "left", "pull": "5 N"}]

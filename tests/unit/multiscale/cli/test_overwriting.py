@@ -25,7 +25,7 @@ def scene(tmp_path, monkeypatch):
 def test_results_of_another_scene_are_kept(scene, capsys, command):
     kind = "isolated" if command == "laws" else "analytic"
     words = [command, "scene.toml", "--out", "results/scene", "--set", f"coupling.kind={kind}"]
-    words += ["patches.grid=[1, 1]", "load.steps=1"]
+    words += ["patches.grid=[1, 1]", "block.cells=[4, 4, 3]", "load.steps=1"]
     assert main(["run", *words[1:]]) == 0
     capsys.readouterr()
     files = [path for path in (scene.parent / "results").rglob("*") if path.is_file()]

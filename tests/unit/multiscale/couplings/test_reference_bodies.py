@@ -49,6 +49,7 @@ def history(cube):
     return run(scene(cube))
 
 
+@pytest.mark.long
 def test_cube_from_a_mesh_is_the_block_within_both_error_bars(history):
     on_mesh, on_block = (one.reference.force for one in (history, run(scene())))
     both = float(on_mesh.error[0] + on_block.error[0])

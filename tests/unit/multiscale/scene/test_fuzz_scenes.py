@@ -21,7 +21,7 @@ few = settings(
 )
 
 
-@settings(few, max_examples=80)
+@settings(few, max_examples=50)
 @given(scenes())
 def test_scenes_of_any_values(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "scene.toml"
@@ -29,7 +29,7 @@ def test_scenes_of_any_values(tmp_path_factory, data):
     planned(path)
 
 
-@settings(few, max_examples=150)
+@settings(few, max_examples=75)
 @given(damaged())
 def test_scenes_of_any_bytes(tmp_path_factory, content):
     path = tmp_path_factory.getbasetemp() / "damaged.toml"
@@ -37,7 +37,7 @@ def test_scenes_of_any_bytes(tmp_path_factory, content):
     planned(path)
 
 
-@settings(few, max_examples=80)
+@settings(few, max_examples=50)
 @given(st.one_of(odd_text, st.builds("{}={}".format, st.sampled_from(sorted(KEYS)), odd_text)))
 def test_overrides_of_any_text(tmp_path_factory, word):
     path = tmp_path_factory.getbasetemp() / "base.toml"
@@ -45,7 +45,7 @@ def test_overrides_of_any_text(tmp_path_factory, word):
     planned(path, [word])
 
 
-@settings(few, max_examples=40)
+@settings(few, max_examples=25)
 @given(scenes())
 def test_small_scenes_run(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "run.toml"

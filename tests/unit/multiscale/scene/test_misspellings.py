@@ -3,7 +3,7 @@
 from helpers import misspellings
 from hypothesis import given, settings
 
-FEW = settings(max_examples=150, derandomize=True, database=None, deadline=None)
+FEW = settings(max_examples=60, derandomize=True, database=None, deadline=None)
 
 
 @FEW
