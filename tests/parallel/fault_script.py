@@ -11,7 +11,6 @@ from itertools import count
 from mpi4py import MPI
 
 from multiscale.cli import main
-from multiscale.couplings.patch_laws import PatchLaws
 from multiscale.law_solvers.condensed import CondensedLaws
 from support.errors import NotConverged
 
@@ -19,9 +18,6 @@ command = import_module("multiscale.cli.run")
 run = sys.modules["multiscale.run"]  # the package's attribute of that name is the function
 PLACES = {
     "surface": (sys.modules["multiscale.setup"], "on_root_alone"),
-    "plan": (command.console, "show_plan"),
-    "laws": (PatchLaws, "make_laws"),
-    "block": (PatchLaws, "_solver_of"),
     "load step": (CondensedLaws, "press"),
     "checkpoint": (command.CheckpointWriter, "accept"),
     "output": (command, "write_fields"),

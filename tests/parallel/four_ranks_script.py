@@ -20,15 +20,12 @@ REFERENCE = [
     "load.approach=30 um",
 ]  # fmt: skip
 SCENES = {
-    "isolated, patchwise": [*COLUMN, "coupling.kind=isolated", "coupling.newton=full"],
     "isolated, pointwise": [*COLUMN, "coupling.kind=isolated", "coupling.interface=pointwise"],
     "isolated, condensed": [*COLUMN, "coupling.kind=isolated", "coupling.newton=condensed"],
-    "consistent": ["coupling.kind=consistent", HALF_SPACE],
     "consistent, pointwise": [
         *COLUMN, "coupling.kind=consistent", HALF_SPACE, "coupling.interface=pointwise",
     ],
     "concurrent": ["coupling.kind=concurrent", HALF_SPACE],
-    "analytic": ["coupling.kind=analytic", HALF_SPACE],
     "analytic, one summit": ["coupling.kind=analytic", "load.approach=0.5 um"],
     "reference, active sets": [*COLUMN, *REFERENCE],
     "reference, augmented": [*COLUMN, *REFERENCE, "reference.method=augmented-lagrangian"],

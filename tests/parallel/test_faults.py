@@ -23,9 +23,6 @@ WORDS = (
     ("rank", "place"),
     [
         pytest.param(1, "surface", marks=pytest.mark.long),
-        pytest.param(1, "plan", marks=pytest.mark.long),
-        pytest.param(1, "laws", marks=pytest.mark.long),
-        pytest.param(1, "block", marks=pytest.mark.long),
         (1, "load step"),
         pytest.param(1, "checkpoint", marks=pytest.mark.long),
         pytest.param(1, "output", marks=pytest.mark.long),

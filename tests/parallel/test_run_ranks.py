@@ -147,7 +147,7 @@ LONG = {
     ("scene", "ranks"),
     [
         *((name, 2) for name in sorted(SCENES.keys() - LONG)),
-        *(pytest.param(name, 3, marks=pytest.mark.long) for name in SCENES),
+        *(pytest.param(name, 3, marks=pytest.mark.long) for name in sorted(LONG)),
     ],
 )
 def test_same_numbers_on_any_number_of_ranks(waiting_ranks, alone, tmp_path, scene, ranks):
