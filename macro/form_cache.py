@@ -38,6 +38,13 @@ def stale_locks(folder: Path, older_than: float = 2.0 * TIMEOUT) -> list[Path]:
     return sorted(left)
 
 
+def compiled(folder: Path) -> int:
+    """Count the compiled forms in a folder, which need not exist."""
+    with suppress(PermissionError):  # a folder on the way that this user may not enter
+        return len(list(folder.glob("libffcx_*.c.cached")))
+    return 0
+
+
 def writable(folder: Path) -> bool:
     """Return whether a folder, or its nearest existing parent, can be written to."""
     try:

@@ -1,12 +1,8 @@
-"""The bodies of a scene: contact face, compliance, contact models on them, fields.
+"""The bodies of a scene: contact face, compliance, contact models on them.
 
 One rule holds for a counter-body that is a half-space. A compliance of the patches as a matrix is
 that of both bodies. A mesh is that of the first body alone; then the laws, whose closures count its
 displacements alone, contain those of the half-space.
-
-Fields are those of a body that was pressed as a mesh, whose displacements are kept. Elsewhere a
-body with a flat top is meshed after the load, and loaded by the contact pressures: by those of the
-cells or asperities, summed over the facets of the mesh, or with laws by the means of the patches.
 
 Theory: docs/theory.md, section 11.
 """
@@ -15,15 +11,14 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import MaterialPair, PatchGrid, Surface
+from geometry import MaterialPair, Surface
 from micro import FiniteSlopes, HalfSpaceModel, influence_matrix
 from multiscale.bodies.face_terms import BlockTerms, FaceTerms
 from multiscale.bodies.mesh import MeshTerms, PairTerms
@@ -33,8 +28,7 @@ from multiscale.laws.consistent import Displacements
 from support.arrays import Array, Indices
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import ElasticBody, FacePair, FieldStep, LoadedFace
-    from macro.fields import Pressures
+    from macro import ElasticBody, FacePair, LoadedFace
 
 OnBody = Callable[[HalfSpaceModel, int], HalfSpaceModel]
 """Puts a half-space model on a body; with finite slopes up to an order, 0 for none."""
@@ -402,76 +396,6 @@ def on_body(
         return replace(model, slopes=(slopes, others))
 
     return put
-
-
-def write_solved(path: Path, bodies: Bodies, parts: PatchGrid, states: Mapping[int, Array]) -> None:
-    """Write the fields of bodies under pressures of parts of their contact face.
-
-    Args:
-        path: File to write, ending in ``.xdmf``.
-        bodies: The bodies, meshed where they were not yet.
-        parts: The N parts.
-        states: Pressures by number of the load step, shape (N,) each [MPa].
-
-    Note:
-        Collective.
-    """
-    from macro import FieldStep
-
-    whole = bodies.contact_face()
-
-    def solved(face: LoadedFace) -> Iterator[FieldStep]:
-        for number, pressure in sorted(states.items()):
-            solution = face.body.solve(face.load(pressure))
-            yield FieldStep(number, solution.x.array[: face.body.owned_dofs].copy(), pressure)
-
-    _write(path, whole, solved, parts=parts)
-
-
-def write_displaced(
-    path: Path,
-    face: LoadedFace | FacePair,
-    states: Mapping[int, tuple[Array, float]],
-    pressures: Callable[[int, bool], Pressures],
-    further: Callable[[int], Sequence[Any]] = lambda number: (),
-) -> None:
-    """Write the fields of bodies whose displacements are known.
-
-    Args:
-        path: File to write, ending in ``.xdmf``.
-        face: The contact face of the body, or of both.
-        states: By number of the load step this rank's displacements [mm], and the position among
-            the states of the bodies' loads.
-        pressures: What is shown as pressure, by load step and whether it is on the counter-body.
-        further: Other functions on the mesh of the first body, by load step.
-
-    Note:
-        Collective.
-    """
-    from macro import FieldStep
-
-    both = len(face.sides) > 1
-
-    def halves(counter: bool) -> Iterator[FieldStep]:
-        for number, (moved, loads) in sorted(states.items()):
-            own = face.body.split(moved)[counter] if both else moved
-            more = () if counter else further(number)
-            yield FieldStep(number, own, pressures(number, counter), loads, more)
-
-    _write(path, face, lambda one: halves(both and one is face.sides[1]))
-
-
-def _write(
-    path: Path,
-    whole: LoadedFace | FacePair,
-    fields: Callable[[LoadedFace], Iterator[FieldStep]],
-    parts: PatchGrid | None = None,
-) -> None:
-    import macro
-
-    for one, name in zip(whole.sides, (path.name, f"counter_{path.name}"), strict=False):
-        face = one if parts is None else replace(one, patches=parts)
-        macro.write_fields(path.with_name(name), face, fields(face))
 
 
 def free_bodies(bodies: list[ElasticBody]) -> None:

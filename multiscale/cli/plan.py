@@ -22,8 +22,8 @@ from multiscale.inputs.cost import shortage_warnings
 from multiscale.laws.law_file import write_laws
 from multiscale.machine import cluster_nodes, peak_memory
 from multiscale.observers.conductance import conducts_of
-from multiscale.output.results import surface_drawing
 from multiscale.output.results_folder import locked, refuse_other_results
+from multiscale.output.run_figures import surface_drawing
 from multiscale.progress import counting, following
 from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity

@@ -10,13 +10,15 @@ from multiscale import console
 from multiscale.cli.execution import scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
 from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
-from multiscale.output.results import RunFigures, write_fields, write_results
+from multiscale.output.fields import write_fields
+from multiscale.output.results import write_results
 from multiscale.output.results_folder import (
     find_checkpoint,
     is_finished,
     locked,
     refuse_other_results,
 )
+from multiscale.output.run_figures import RunFigures
 from multiscale.progress import following, run_progress
 from multiscale.run import Run
 from multiscale.scene.scene import Scene, identity

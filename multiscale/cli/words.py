@@ -225,7 +225,7 @@ def _add_descriptions(command: Callable[[str, str, str], argparse.ArgumentParser
     doctor.add_argument("--json", action="store_true", help="results as JSON, for scripts")
     compiled = "Compile all finite element forms now, so that later runs need no compiler."
     names: dict[str, Any] = {"nargs": "+", "default": [], "metavar": "NAME"}
-    warm = command("warm", "doctor.compile_ahead", compiled)
+    warm = command("warm", "warm.compile_ahead", compiled)
     warm.add_argument("--element", help="Q1, Q2, P1, P2; all by default", **names)
 
 

@@ -21,7 +21,8 @@ from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import Bodies, free_bodies, write_solved
+from multiscale.bodies.bodies import Bodies, free_bodies
+from multiscale.bodies.fields import write_solved
 from multiscale.clock import Clock
 from multiscale.couplings import describe, validity
 from multiscale.inputs.bodies import SceneBody

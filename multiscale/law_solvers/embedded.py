@@ -13,7 +13,7 @@ import numpy as np
 
 from geometry import Control, InputError, NotConverged, PatchGrid, ShearControl
 from micro.model import Stiffness
-from multiscale.bodies.bodies import write_displaced
+from multiscale.bodies.fields import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep

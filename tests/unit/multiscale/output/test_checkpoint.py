@@ -21,7 +21,7 @@ from multiscale.output.checkpoint import (
     read_checkpoint,
     write_checkpoint,
 )
-from multiscale.output.results import write_fields
+from multiscale.output.fields import write_fields
 from multiscale.output.results_folder import FolderLock, find_checkpoint
 from support.checked_store import write_record
 from support.errors import InputError, NotConverged, NotWritten

@@ -10,7 +10,8 @@ from helpers.small_scene import SMALL_SCENE
 
 from multiscale import Run, Scene, read_contact, read_fields
 from multiscale.cli.command_line import main
-from multiscale.output.results import write_fields, write_results
+from multiscale.output.fields import write_fields
+from multiscale.output.results import write_results
 from multiscale.results.contact_record import FIELDS
 from support.errors import InputError
 

@@ -1,0 +1,150 @@
+"""The figures of a run, drawn by other processes or shared by the ranks.
+
+Each is drawn once, for its file and for the report.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any
+
+from multiscale.couplings.coupling import Coupling
+from multiscale.figures.contact_scales import ContactScales
+from multiscale.figures.files import Drawing, FigureProcess, Pictures, file_kinds, pictures_of
+from multiscale.output.report import CONTACT_OF_STEP, shown_contacts
+from multiscale.results.contact_record import ContactRecord
+from multiscale.run import Run
+from multiscale.scene.scene import Scene
+from support.collective import shared
+from support.cores import cores
+
+_MOST_PROCESSES = 3
+"""Processes that draw; a run has five to nine figures."""
+
+
+def surface_drawing(coupling: Coupling) -> Drawing:
+    """Return the figure of a scene's surface, with its summits where the micro model uses them.
+
+    Args:
+        coupling: What was made of the scene.
+    """
+    output, spectrum = coupling.scene.output, coupling.scene.surface.spectrum
+    surface = replace(coupling.surface)  # without its interpolant, which is not drawn
+    about = surface, coupling.summits, coupling.patches, spectrum
+    return Drawing("surface", "figures.surface.surface_figure", about, file_kinds(output.figures))
+
+
+def _contacts_of_steps(contacts: Sequence[ContactRecord]) -> Iterator[Drawing]:
+    """Yield figures of several contacts, which have the same colour scales, for the report."""
+    shown = shown_contacts(contacts)
+    scales = ContactScales.of(shown)
+    for record in shown:
+        name = f"{CONTACT_OF_STEP}{record.step}"
+        yield Drawing(name, "figures.contact.contact_maps", (record, scales))
+
+
+class RunFigures:
+    """The figures of a run.
+
+    Ranks share them at its end. Of a process on its own with a further core, other processes draw
+    them: surface and laws while load steps are made.
+
+    Args:
+        scene: The scene.
+        comm: MPI communicator; None for this process alone.
+    """
+
+    def __init__(self, scene: Scene, comm: Any) -> None:
+        self._figures, self._comm = scene.output.figures, comm
+        self._process: FigureProcess | None = None
+        self._begun: dict[str, Future[Pictures]] = {}
+
+    def __enter__(self) -> RunFigures:
+        """Start the processes that draw, which load what they need while the run is set up."""
+        if self._figures and self._comm is None and (count := cores()) > 1:
+            with suppress(OSError):  # none can be started, and figures are drawn here
+                self._process = FigureProcess(min(count, _MOST_PROCESSES))
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        """End the processes that draw."""
+        if self._process is not None:
+            self._process.close()
+
+    def begin(self, run: Run) -> None:
+        """Have those drawn beside the load steps that do not depend on them.
+
+        Args:
+            run: The run.
+        """
+        # larger ones take minutes beside their figures, and long to send
+        if self._process is not None and run.coupling.surface.heights.size > 2**20:
+            self._process.close()
+            self._process = None
+        if self._process is not None:
+            for drawing in self._before_load_steps(run):
+                self._begun[drawing.name] = self._process.draw(drawing, beside=True)
+
+    def drawn(self, run: Run) -> list[Pictures]:
+        """Return the files of all figures; none of a run without load steps, or that wants none.
+
+        Args:
+            run: The run.
+
+        Note:
+            Collective.
+        """
+        if not self._figures or not run.steps:
+            return []
+        with run.clock.phase("output"):
+            drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
+            if self._process is None:
+                comm = self._comm
+                return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
+            ahead = []
+            for drawing in drawings:
+                begun = self._begun.get(drawing.name)
+                if begun is None or begun.cancel():
+                    begun = self._process.draw(drawing)
+                ahead.append(begun)
+            return [one.result() for one in ahead]
+
+    def _before_load_steps(self, run: Run) -> Iterator[Drawing]:
+        yield surface_drawing(run.coupling)
+        if (laws := run.laws) is not None:
+            kinds = file_kinds(self._figures)
+            yield Drawing("laws", "figures.curves.law_figure", (laws,), kinds)
+
+    def _after_load_steps(self, run: Run) -> Iterator[Drawing]:
+        """Yield the figures of what was found.
+
+        Note:
+            Collective.
+        """
+        coupling, history = run.coupling, run.history()
+        surface, of_samples = replace(coupling.surface), coupling.regions is not None
+        face = coupling.face_pressures()
+        figures: dict[str, tuple[str, Any]] = {
+            "overview": ("contact.overview_figure", (surface, of_samples, history, face)),
+            "curves": ("curves.history_figure", (history, run.scene.kind)),
+        }
+        if not of_samples:
+            figures["pressures"] = "contact.pressure_figure", (history,)
+        if face is not None:
+            figures["face"] = "contact.face_figure", (face, history.steps[-1])
+        if run.contacts:
+            contact = run.contacts[-1]
+            figures["contact"] = "contact.contact_figure", (contact,)
+            of_cells = getattr(contact.pressure_MPa, "shape", None) == surface.grid
+            if self._figures in ("all", "svg") and of_cells and contact.force_N > 0.0:
+                ratio = coupling.materials.first.poisson_ratio
+                figures["block"] = "block.contact_block", (surface, contact, ratio)
+        for name, function, of in run.observers.figures(history):
+            figures[name] = function, of
+        for name, (function, arguments) in figures.items():
+            yield Drawing(name, f"figures.{function}", arguments, file_kinds(self._figures))
+        if run.scene.output.report:
+            yield from _contacts_of_steps(run.contacts)
