@@ -8,6 +8,7 @@ import pytest
 
 from multiscale import Run, Scene, make_setup, run
 from multiscale.laws.law_file import read_laws, write_laws
+from multiscale.loading import stepper
 from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from support.errors import InputError, NotConverged
 
@@ -218,7 +219,8 @@ def test_friction_without_shear_holds_the_body():
     assert history.dissipated_mJ[-1] > 0.0
 
 
-def test_a_force_that_slides_under_an_approach_ends_the_run():
+def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
+    monkeypatch.setattr(stepper, "_SMALLEST", 0.25)  # halved often enough
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())
