@@ -1,5 +1,6 @@
 """What folders of tests share: bodies solved for once, commands under MPI, counted iterations."""
 
+import gc
 import os
 import subprocess
 import sys
@@ -23,6 +24,15 @@ from helpers.waiting_ranks import WaitingRanks
 os.environ["PATCHLAW_CACHE"] = "off"
 SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
 """Where the compliance of a body is itself what is tested."""
+
+
+def pytest_collection_finish():
+    """Keep what all tests have loaded out of later collections of garbage.
+
+    Every run that had a mesh ends with one. With 300,000 objects each took 0.2 s, 13 % of all.
+    """
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -151,6 +151,8 @@ def _wait(folder):
                 code = _ended_with(order["words"])
             sys.path[:] = path
             gc.collect()  # what is freed by all ranks is freed by all now
+            if order["job"] == 1:  # modules are loaded, which later collections can pass over
+                gc.freeze()
             ended.write(f"{code}\n")
             ended.flush()
 

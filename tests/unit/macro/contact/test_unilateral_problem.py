@@ -134,9 +134,8 @@ def test_no_force_is_first_touch(method):
     assert state.patch_closure == pytest.approx(touch, rel=1e-12)
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.15, 0.49])
-def test_one_step_to_merged_contacts(poisson_ratio):
-    material = replace(MATERIAL, poisson_ratio=poisson_ratio)
+def test_one_step_to_merged_contacts():
+    material = replace(MATERIAL, poisson_ratio=0.49)
     found, slow = problem(material=material), problem(material=material)
     state = found.solve(Control(approach=25e-3))
     for approach in (10e-3, 18e-3, 25e-3):
