@@ -194,6 +194,10 @@ class _Problems:
         error = known.force * missing / (2.0 * known.elastic_energy)
         if not self._probe.order:
             return error + abs(known.force - self._force(self._others, 0))
+        if model.periodic:  # whether the body under a sample can widen is not known
+            held = replace(flat, slopes=tuple(each.on_held_body() for each in model.slopes))
+            found = held.press(self._control, start=known.guess)
+            return error + abs(known.force - found.force)
         if model.body is None:
             return error
         alone = replace(flat, slopes=tuple(each.on_half_space() for each in model.slopes))

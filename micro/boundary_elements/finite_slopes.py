@@ -107,7 +107,10 @@ class FiniteSlopes:
         surface: The surface.
         material: Elastic constants of the body.
         periodic: Whether surface and pressures continue periodically; displacements then count
-            from their mean, as those of the periodic half-space do.
+            from the plane of the flat body under the mean pressure, which is 1/E of the mean of
+            h p above the mean displacement of the surface. This body is free to widen.
+        held: Whether a periodic body cannot widen, as in a wide layer. Its mean stresses in the
+            plane are then −ν/(1 − ν) times the mean pressure.
         plane: Height of the surface of the flat body whose edge stresses are given [mm]; that
             of the mean plane when not given. On the half-space alone it hardly matters.
         edge_stresses: Stresses in the surface beyond those of the half-space, on the cells of
@@ -133,12 +136,15 @@ class FiniteSlopes:
         plane: float | None = None,
         edge_stresses: Sequence[SurfaceStress] = (),
         grid: tuple[int, int] | None = None,
+        held: bool = False,
     ) -> None:
         if periodic and not surface.periodic:
             raise InputError("periodic slopes need a periodic surface", value=surface.source)
         check_finite_slopes(surface)
         self.material, self.edge_stresses = material, tuple(edge_stresses)
         self.surface, self._periodic = surface, periodic
+        nu = material.poisson_ratio
+        self._held = nu / (1.0 - nu) if held else 0.0
         self.grid = grid or coarse_grid(surface)
         around: Around = "copies" if periodic else "nothing" if edge_stresses else "mirrored"
         self._waves = surface_waves(surface.grid, surface.spacing, coarse=self.grid, around=around)
@@ -218,14 +224,16 @@ class FiniteSlopes:
         waves, nu, count = self._waves, self.material.poisson_ratio, len(weights)
         for term in self.edge_stresses:
             pushed = pushed + term.adjoint(_TWICE_SHEAR * weights)
+        if self._periodic:
+            means = weights.mean(axis=(-2, -1), keepdims=True)
+            weights = weights - means
+            pushed = pushed - self._held * (means[:, 0] + means[:, 1])
         # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
         pushed = pushed - 2.0 * nu * (weights[:, 0] + weights[:, 1])
         tensors = (2.0 * nu - 1.0) * weights
         fields = np.concatenate([tensors.reshape(-1, *bent.shape[1:]), bent])
         moved = waves.changed(fields, self._displaced, count, inside=True)
         moved += pushed[:, : moved.shape[1], : moved.shape[2]]
-        if self._periodic:
-            moved -= moved.mean(axis=(1, 2), keepdims=True)
         return moved
 
     def error(self, pressure: Array) -> float:
@@ -262,6 +270,10 @@ class FiniteSlopes:
         """Return the same slopes on a half-space, without edge stresses."""
         return FiniteSlopes(self.surface, self.material, periodic=self._periodic, grid=self.grid)
 
+    def on_held_body(self) -> FiniteSlopes:
+        """Return the same slopes of a periodic surface on a body that cannot widen."""
+        return FiniteSlopes(self.surface, self.material, periodic=True, grid=self.grid, held=True)
+
     def _second(self, stresses: Array, curvatures: Array) -> tuple[float, Array]:
         """Return the value of the second-order form, and the weights of stresses in it.
 
@@ -289,6 +301,9 @@ class FiniteSlopes:
         total = np.stack([-2.0 * nu * pressure - along, along - pressure, -across])
         for term in self.edge_stresses:
             total += term.stresses(pressure)
+        if self._periodic:  # their means are those of the body
+            total -= total.mean(axis=(1, 2), keepdims=True)
+            total[:2] -= self._held * pressure.mean()
         return total
 
     def _directed(self, pressure: Array) -> tuple[Array, Array]:

@@ -52,7 +52,7 @@ class HalfSpaceModel:
         contact_modulus: E* [MPa].
         periodic: Whether surface and pressures continue periodically. The mean displacement of
             a periodic half-space is not determined: displacements, and so the approach, count
-            from the mean of the displaced surface.
+            from the mean of the displaced surface, with finite slopes from the flat body's.
         tolerance: Largest residual of a solution, which bounds the error of the force: the force
             is exact for a surface whose heights differ from these by at most the residual times the
             largest interference. On a random surface of 256² cells the force erred by 5e-10 with
