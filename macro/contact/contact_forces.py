@@ -247,6 +247,7 @@ class ContactForces:
         load: PETSc.Vec,
         *,
         body: float,
+        shear: Array | None,
     ) -> None:
         """Write the forces on laws that are lines, and move the derivative to these.
 
@@ -257,6 +258,7 @@ class ContactForces:
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
             body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
+            shear: Predicted shear stresses, shape (n, 2 or 0) [MPa]; None: those on the last lines.
         """
         samples = self._sampling.values
         samples.array[:] = pressure
@@ -286,6 +288,11 @@ class ContactForces:
 
     def along(self, displacement: PETSc.Vec) -> Array:
         """Return displacements along the face that shear stresses follow, none without friction."""
+        return np.zeros((len(self._sampling.weight), 0))
+
+    @property
+    def last_shear(self) -> Array:
+        """Shear stresses of the latest load step, (n, 2) [MPa]; none without friction, (n, 0)."""
         return np.zeros((len(self._sampling.weight), 0))
 
     def write_last_shear(self, load: PETSc.Vec) -> None:

@@ -68,7 +68,8 @@ class FirstSteps:
             The residuals before every step, relative to the contact forces, and the number of
             linear iterations.
         """
-        predicted = basis.write_guess(displacement)
+        closure, pressure, shear = basis.write_guess(displacement)
+        expected: Array | None = shear
         residuals = [self._relative_residual(displacement)]
         if residuals[0] <= NEAR or self._forces.control.force == 0.0:
             return [], 0
@@ -77,8 +78,8 @@ class FirstSteps:
         own, layer = solver.getTolerances()[0], self._layer if len(basis) > 1 else None
         solver.setOperators(self._equilibrium.tangent, self._equilibrium.matrix)
         while residuals[-1] > NEAR and len(residuals) <= _MOST_STEPS:
-            lines = self._lines(displacement, *predicted, basis.stiffness, layer)
-            self._linearise(displacement, lines, basis.stiffness)
+            lines = self._lines(displacement, closure, pressure, basis.stiffness, layer)
+            self._linearise(displacement, lines, basis.stiffness, expected)
             self._follow()
             solver.setTolerances(rtol=tolerance)
             solver.solve(self._residual, step)
@@ -86,8 +87,8 @@ class FirstSteps:
                 break
             spent += int(solver.its)
             displacement.axpy(-1.0, step)
-            closure, layer = self._closure_on(lines, displacement), self._layer
-            predicted = closure, lines.at(closure)
+            closure, layer, expected = self._closure_on(lines, displacement), self._layer, None
+            pressure = lines.at(closure)
             residuals.append(self._relative_residual(displacement))
             if residuals[-1] <= min(residuals):
                 displacement.copy(best)
@@ -121,12 +122,21 @@ class FirstSteps:
         displaced = self._sampling.displacements(displacement)
         return self._forces.closure_on_lines(displaced, lines.at, lines.stiffness)
 
-    def _linearise(self, displacement: PETSc.Vec, lines: Lines, body: float) -> None:
-        """Write the residual K u − B p with pressures p of linearised laws, and its derivative."""
+    def _linearise(
+        self, displacement: PETSc.Vec, lines: Lines, body: float, shear: Array | None
+    ) -> None:
+        """Write the residual K u − B p with pressures p of linearised laws, and its derivative.
+
+        Args:
+            displacement: u [mm].
+            lines: The laws as lines.
+            body: Stiffness of the body [MPa/mm].
+            shear: Predicted shear stresses; None: those on the lines before [MPa].
+        """
         matrix, forces = self._equilibrium.matrix, self._forces
         closure = self._closure_on(lines, displacement)
         pressure, stiffness = lines.at(closure), lines.stiffness
         at = displacement, closure, pressure, stiffness
-        forces.write_lines(*at, self._load, body=body)
+        forces.write_lines(*at, self._load, body=body, shear=shear)
         matrix.mult(displacement, self._residual)
         self._residual.axpy(-1.0, self._load)

@@ -61,7 +61,8 @@ class FrictionalForces(ContactForces):
         self.slope = np.zeros(3 * n)
         self._lines: ShearLines | None = None
         self._tangent: Array = np.zeros((n, 3, 3))
-        self._closes: Array = np.zeros(n)
+        self._by_pressure: Array = np.zeros((n, 3))  # of (p, τx, τy) as the plane moves
+        self._by_slip: Array = np.zeros((n, 2, 2))
 
     def prescribe(self, control: Control, plane: Array) -> None:
         """Set what a load step prescribes, of the shear too: without any the plane does not shift.
@@ -128,13 +129,14 @@ class FrictionalForces(ContactForces):
         load: PETSc.Vec,
         *,
         body: float,
+        shear: Array | None,
     ) -> None:
         """Write the forces on laws that are lines; see `ContactForces.write_lines`.
 
         Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
         """
-        lines, sliders, moved = self._lines, self.sliders, self.along(displacement)
-        if lines is None or sliders.shifts:
+        sliders, moved = self.sliders, self.along(displacement)
+        if sliders.shifts:
             at = closure, moved, pressure, stiffness
             try:
                 found = sliders.respond(*at)
@@ -144,7 +146,10 @@ class FrictionalForces(ContactForces):
         else:
             slip = sliders.slip(moved)
             respond = partial(sliders.at_slip, closure, np.maximum(pressure, 0.0), stiffness)
-            lines = shear_lines(respond, slip, closure, lines.at(slip, closure), body)
+            if shear is None:
+                assert self._lines is not None
+                shear = self._lines.at(slip, closure)
+            lines = shear_lines(respond, slip, closure, shear, body)
         self._lines = lines
         self.write_stresses(pressure, lines.stress, load)
         self.linearise_shear(stiffness, lines.response)
@@ -174,9 +179,14 @@ class FrictionalForces(ContactForces):
         changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
         parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)
 
+    @property
+    def last_shear(self) -> Array:
+        """Shear stresses of the latest load step, shape (n, 2) [MPa]."""
+        return self.sliders.memory.stress
+
     def write_last_shear(self, load: PETSc.Vec) -> None:
         """Write the forces by the shear stresses of the latest load step."""
-        stress = self.sliders.memory.stress
+        stress = self.last_shear
         self.write_stresses(np.zeros(len(stress)), stress, load)
 
     def update(self, displacement: PETSc.Vec) -> None:
@@ -223,7 +233,11 @@ class FrictionalForces(ContactForces):
         self._tangent = tangent / weight[:, None, None]
         along = 0.5 * (tangent[:, 1, 1] + tangent[:, 2, 2])  # preconditioners know the mean
         self.slope = (np.column_stack([stiffness, along, along]) / weight[:, None]).ravel()
-        self._closes = np.divide(1.0, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0)
+        closes = np.divide(1.0, stiffness, out=np.zeros_like(stiffness), where=stiffness > 0)
+        self._by_pressure = np.column_stack(
+            [np.ones_like(closes), tangent[:, 1:, 0] * closes[:, None]]
+        )
+        self._by_slip = tangent[:, 1:, 1:].copy()
 
     @property
     def normal_slope(self) -> Array:
@@ -255,16 +269,15 @@ class FrictionalForces(ContactForces):
         Args:
             stretch: What they move by against the directions, times their weights, (n, 3) [mm³].
         """
-        pressed = self.pressure_change(stretch[:, 0])
-        change = np.einsum("nij,nj->ni", self._tangent[:, :, 1:], stretch[:, 1:])
-        closes = pressed * self._closes * self._sampling.weight
-        change[:, 1:] += self._tangent[:, 1:, 0] * closes[:, None]
-        change[:, 0] = pressed
+        change = np.einsum("nij,nj->ni", self._tangent, stretch)
+        if self._border.shape[1]:
+            parted = self._border @ self.levers.summed(self._border.T @ stretch[:, 0])
+            change -= self._by_pressure * parted[:, None]
         if self.sliders.shifts:
-            total, weight = self.sliders.total, self._sampling.weight[:, None, None]
-            moves = total((self._tangent[:, 1:, 1:] * weight).reshape(-1, 4)).reshape(2, 2)
+            total = self.sliders.total
+            moves = total(self._by_slip.reshape(-1, 4)).reshape(2, 2)
             shift = np.linalg.lstsq(moves, total(change[:, 1:]), rcond=1e-13)[0]
-            change[:, 1:] -= (self._tangent[:, 1:, 1:] * weight) @ shift
+            change[:, 1:] -= self._by_slip @ shift
         return change
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:

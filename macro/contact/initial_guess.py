@@ -60,18 +60,22 @@ class DisplacementBasis:
         self.vectors: list[Array] = []
         self._sampled: Array = np.empty((0, len(sampling.weight)))  # Wᵀ B of this rank's samples
         self._pressures: Array = np.empty((0, len(sampling.weight)))  # that W follow from
+        self._shears: list[Array] = []  # with these shear stresses, (n, 2 or 0) each
         self._along: list[Array] = []  # displacements of samples along the axes, (n, 2) each
         self._last: Array = np.empty(0)  # the latest solution in the basis
 
     def __len__(self) -> int:
         return len(self.vectors)
 
-    def add(self, displacement: PETSc.Vec, pressure: Array, *, solved: bool = True) -> None:
+    def add(
+        self, displacement: PETSc.Vec, pressure: Array, shear: Array, *, solved: bool = True
+    ) -> None:
         """Add the part of a displacement that is new to the basis.
 
         Args:
             displacement: The displacement [mm].
             pressure: Pressures of this rank's samples that it follows from, shape (n,) [MPa].
+            shear: Shear stresses likewise, shape (n, 2); (n, 0) without friction [MPa].
             solved: Whether it is a solution, from which the next guess is looked for.
 
         Note:
@@ -87,6 +91,8 @@ class DisplacementBasis:
             for share, each in zip(shares, self.vectors, strict=True):
                 vector -= share * each
             pressure, last = pressure - shares @ self._pressures, last + shares
+            for share, each in zip(shares, self._shears, strict=True):
+                shear = shear - share * each
         stiffness.mult(work, force)
         square = self._sum(vector @ force.array_r)
         is_new = square > _ROUNDING**2 * before
@@ -102,6 +108,7 @@ class DisplacementBasis:
         self._sampled = np.vstack([self._sampled, sampled.array_r])[first:]
         self._along = [*self._along, self._equilibrium.forces.along(work)][first:]
         self._pressures = np.vstack([self._pressures, pressure / square**0.5])[first:]
+        self._shears = [*self._shears, shear / square**0.5][first:]
         self._last = self._last[first:]
 
     @property
@@ -112,7 +119,7 @@ class DisplacementBasis:
         square = self._sum((self._sampling.weight * pressure) @ pressure)
         return float(square / self._sum(pressure @ (y @ self._sampled)))
 
-    def write_guess(self, into: PETSc.Vec) -> tuple[Array, Array]:
+    def write_guess(self, into: PETSc.Vec) -> tuple[Array, Array, Array]:
         """Write the state of least energy in the basis under what is prescribed of the plane.
 
         It solves y = Wᵀ B p(closure(W y)), with the laws as lines, from the latest solution; shear
@@ -120,7 +127,7 @@ class DisplacementBasis:
 
         Returns:
             Closures of this rank's samples there [mm], and the pressures that the displacements
-            follow from [MPa], shape (n,) each.
+            follow from [MPa], shape (n,) each; the shear stresses likewise, shape (n, 2 or 0).
         """
         forces, stiffness = self._equilibrium.forces, self.stiffness
         y = self._last if forces.control.force != 0.0 else np.zeros(len(self))
@@ -137,7 +144,7 @@ class DisplacementBasis:
         into.set(0.0)
         for share, vector in zip(y, self.vectors, strict=True):
             into.array[:] += share * vector
-        return closure, y @ self._pressures
+        return closure, y @ self._pressures, np.einsum("k,kni->ni", y, np.array(self._shears))
 
     def _closure_on(self, lines: Lines, y: Array) -> Array:
         """Bring the plane into equilibrium on linearised laws, and return the closures."""

@@ -153,7 +153,7 @@ class LawContactProblem:
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self._closure, body = self.forces.closure(solution), equilibrium.body
         shear = self._accepted(solution)
-        self.basis.add(solution, self.forces.pressure(self._closure))
+        self.basis.add(solution, self.forces.pressure(self._closure), self.forces.last_shear)
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
@@ -252,7 +252,8 @@ class LawContactProblem:
         """
         if pressure.any():
             samples = pressure[self._sampling.patch]
-            self.basis.add(self._displacement(samples, sheared=True)[0], samples)
+            displacement, _ = self._displacement(samples, sheared=True)
+            self.basis.add(displacement, samples, self.forces.last_shear)
 
     def start_at(self, displacement: Array, plane: RigidPlane, body_state: float = 0.0) -> None:
         """Take a displacement for the latest solution, such as that on other elements.
@@ -270,7 +271,8 @@ class LawContactProblem:
         start.array[:] = displacement - (0.0 if self._preload is None else self._preload)
         self._plane = np.array([plane.approach, *plane.tilt])
         self.forces.prescribe(Control(approach=plane.approach, tilt=plane.tilt), self._plane)
-        self.basis.add(start, self.forces.pressure(self.forces.closure(start)))
+        pressure = self.forces.pressure(self.forces.closure(start))
+        self.basis.add(start, pressure, self.forces.last_shear)
 
     def same_approach(self) -> Control:
         """Return what prescribes the latest plane by its approach; it turns where it was free."""
@@ -311,7 +313,8 @@ class LawContactProblem:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""
         samples = np.ones(len(self._sampling.weight))
         displacement, iterations = self._displacement(samples, _ROUGHLY)
-        self.basis.add(displacement, samples, solved=False)
+        unsheared = np.zeros_like(self.forces.last_shear)
+        self.basis.add(displacement, samples, unsheared, solved=False)
         return iterations
 
     def _displacement(

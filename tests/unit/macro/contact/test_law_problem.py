@@ -150,7 +150,7 @@ def test_basis_is_orthonormal_limited_and_ignores_what_it_knows(interface):
     pressures = [*np.eye(4), np.eye(4)[-1]]
     for load, pressure in zip((*loads, loads[-1]), pressures, strict=True):
         load.array[:] = interface.body.solve(load.copy()).x.array
-        basis.add(load, pressure[interface.patchwise.patch])
+        basis.add(load, pressure[interface.patchwise.patch], pressed.forces.last_shear)
         vectors = [load.duplicate() for _ in basis.vectors]
         for vector, values in zip(vectors, basis.vectors, strict=True):
             vector.array[:] = values
