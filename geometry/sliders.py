@@ -222,9 +222,9 @@ class Sliders:
         mx, my = moved[:, :1], moved[:, 1:]
         last = before.stress[rows][..., : springs.force.shape[1]]
         tx, ty = last[:, 0] + springs.stiffness * mx, last[:, 1] + springs.stiffness * my
-        size, bound = np.sqrt(tx * tx + ty * ty), np.maximum(mu * springs.force, _TINY)
+        size, bound = np.sqrt(tx * tx + ty * ty), mu * springs.force
         bound = np.maximum(bound, size) if sticks else bound
-        slips, size = size > bound, np.maximum(size, bound)
+        slips, size = size > bound, np.maximum(np.maximum(size, bound), _TINY)
         share = bound / size  # exactly 1 where springs stick; choosing by flags takes far longer
         least = slips / size  # for directions of slip, 0 for springs that stick
         ax, ay = tx * least, ty * least
