@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from micro.boundary_elements.half_space_grid import Cells
 from support.arrays import Array
-from support.cores import BLOCK, blocks, in_threads
+from support.cores import BLOCK, CELLS, blocks, in_threads
 
 Field = NDArray[np.float32]
 
@@ -77,7 +77,12 @@ class Extension:
             out: Overwritten by their extension, shape (mx, my).
         """
         self.interpolated(values, out)
-        out[self.place] = values
+        rows, columns = self.place
+
+        def put(some: slice) -> None:
+            out[rows[some], columns[some]] = values[some]
+
+        in_threads(put, blocks(len(values), CELLS))
 
     def gathered(self, field: Field) -> Array:
         """Return the transpose of `extended` times a field.
@@ -88,8 +93,15 @@ class Extension:
         Returns:
             Shape (n,).
         """
-        own = field[self.place].astype(float)
-        field[self.place] = 0.0
+        rows, columns = self.place
+        own = np.empty(len(rows))
+
+        def take(some: slice) -> None:
+            place = rows[some], columns[some]
+            own[some] = field[place]
+            field[place] = 0.0
+
+        in_threads(take, blocks(len(own), CELLS))
         own += self.collected(field)
         return own
 
@@ -108,9 +120,7 @@ class Extension:
         field = known.pop()
         for mine, unknown in zip(reversed(known), self._unknown[-2::-1], strict=True):
             finer = np.empty_like(mine)
-            _interpolate(field, finer)
-            finer *= unknown
-            finer += mine
+            _interpolate(field, finer, unknown, mine)
             field = finer
         _interpolate(field, out)
 
@@ -125,12 +135,17 @@ class Extension:
         """
         levels = [_collected(field)]
         for unknown in self._unknown[:-1]:
-            levels.append(_collected(unknown * levels[-1]))
+            levels.append(_collected(levels[-1], unknown))
         total = levels.pop() * self._scales[-1]
         for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
-            level += _repeated(total, level.shape)
-            total = scale * level
-        return np.asarray(total.ravel()[self._block], float)
+            total = _scaled_sum(level, total, scale)
+        flat, found = total.ravel(), np.empty(len(self._block))
+
+        def take(some: slice) -> None:
+            found[some] = flat[self._block[some]]
+
+        in_threads(take, blocks(len(found), CELLS))
+        return found
 
 
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:
@@ -146,14 +161,39 @@ def _sums(fine: Field) -> Field:
     return np.asarray(rows[:, 0::2] + rows[:, 1::2])
 
 
-def _repeated(coarse: Field, shape: tuple[int, ...]) -> Field:
-    """Return on every cell the value of the coarse one that covers it: `_sums` transposed."""
-    rows = np.repeat(coarse, 2, axis=1)[:, : shape[1]]
-    return np.repeat(rows, 2, axis=0)[: shape[0]]
+def _scaled_sum(fine: Field, coarse: Field, scale: Field) -> Field:
+    """Add to fine cells the value of the coarse one that covers them, `_sums` transposed; scale.
+
+    Args:
+        fine: Values of the fine cells; overwritten by the result.
+        coarse: Values of the coarse cells.
+        scale: What the sums are multiplied by, of the fine shape.
+    """
+    height, width = fine.shape
+
+    def work(here: slice) -> None:
+        rows = np.repeat(coarse[here], 2, axis=1)[:, :width]
+        for below in (0, 1):
+            part = fine[2 * here.start + below : 2 * here.stop : 2]
+            part += rows[: len(part)]
+        some = slice(2 * here.start, 2 * here.stop)
+        fine[some] *= scale[some]
+
+    in_threads(work, blocks(-(-height // 2), BLOCK // (16 * width)))
+    return fine
 
 
-def _interpolate(coarse: Field, out: Field) -> None:
-    """Interpolate linearly, and periodically, from the middles of coarse cells to fine ones."""
+def _interpolate(
+    coarse: Field, out: Field, factors: Field | None = None, terms: Field | None = None
+) -> None:
+    """Interpolate linearly, and periodically, from the middles of coarse cells to fine ones.
+
+    Args:
+        coarse: Values of the coarse cells.
+        out: Overwritten by those of the fine cells.
+        factors: What these are multiplied by, of the same shape; 1 when not given.
+        terms: What is added then; nothing when not given.
+    """
     (rows, columns), (_, width) = coarse.shape, out.shape
 
     def work(here: slice) -> None:
@@ -172,18 +212,28 @@ def _interpolate(coarse: Field, out: Field) -> None:
         np.add(middle[some], quarter[some, :-2], out=fine[:, 0::2])
         odd = width // 2
         np.add(middle[some, :odd], quarter[some, 2 : odd + 2], out=fine[:, 1::2])
+        if factors is not None:
+            fine *= factors[2 * here.start : 2 * here.stop]
+        if terms is not None:
+            fine += terms[2 * here.start : 2 * here.stop]
 
     in_threads(work, blocks(rows, BLOCK // (16 * width)))
 
 
-def _collected(fine: Field) -> Field:
-    """Return the transpose of `_interpolate` times a field."""
+def _collected(fine: Field, factors: Field | None = None) -> Field:
+    """Return the transpose of `_interpolate` times a field.
+
+    Args:
+        fine: The field.
+        factors: What it is multiplied by first, of the same shape; 1 when not given.
+    """
     height, width = fine.shape
     rows, columns = _halved((height, width))
     result = np.empty((rows, columns), np.float32)
 
-    def along(part: Field) -> Field:
-        """Collect in every row."""
+    def along(rows: slice | list[int]) -> Field:
+        """Collect in some rows."""
+        part = fine[rows] if factors is None else fine[rows] * factors[rows]
         even = np.empty((len(part), columns + 1), np.float32)
         odd = np.zeros_like(even)
         even[:, :-1], odd[:, 1 : width // 2 + 1] = part[:, 0::2], part[:, 1::2]
@@ -199,12 +249,12 @@ def _collected(fine: Field) -> Field:
     def work(here: slice) -> None:
         count = here.stop - here.start
         even, odd = np.zeros((2, count + 1, columns), np.float32)
-        found = along(fine[2 * here.start : 2 * here.stop])
+        found = along(slice(2 * here.start, 2 * here.stop))
         even[:-1], odd[1 : 1 + len(found) // 2] = found[0::2], found[1::2]
-        even[-1] = along(fine[2 * (here.stop % rows)][None])[0]
+        even[-1] = along([2 * (here.stop % rows)])[0]
         before = 2 * ((here.start - 1) % rows) + 1
         if before < height:
-            odd[0] = along(fine[before][None])[0]
+            odd[0] = along([before])[0]
         quarter = even[1:] + odd[:-1]
         quarter -= even[:-1]
         quarter -= odd[1:]

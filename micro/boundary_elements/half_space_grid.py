@@ -18,7 +18,7 @@ from scipy import fft
 
 from micro.closed_forms.love import corner_integral
 from support.arrays import Array, Indices
-from support.cores import BLOCK, blocks, cores, in_threads
+from support.cores import BLOCK, CELLS, blocks, cores, in_threads
 
 Field = NDArray[Any]
 
@@ -182,12 +182,24 @@ class Convolution:
         scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
         # the field takes the place of its own transform, whose rows are at least as long
         memory = self._rows(len(cells.rows)).view(np.float32)
-        place = cells.row * memory.shape[1] + cells.column
-        field = memory[:, : self.grid[1]]
-        field[:] = 0.0
-        memory.ravel()[place] = values / scale
+        field, flat, found = memory[:, : self.grid[1]], memory.ravel(), np.empty(len(values))
+
+        def places(some: slice) -> Indices:
+            return np.asarray(cells.row[some] * memory.shape[1] + cells.column[some])
+
+        def put(some: slice) -> None:
+            flat[places(some)] = values[some] / scale
+
+        def take(some: slice) -> None:
+            np.multiply(flat[places(some)], scale, out=found[some], dtype=float)
+
+        parts = blocks(len(values), CELLS)
+        rows = blocks(len(field), BLOCK // (4 * self.grid[1]))
+        in_threads(lambda some: field[some].fill(0.0), rows)
+        in_threads(put, parts)
         self(field, cells.rows)
-        return memory.ravel()[place].astype(np.float64) * scale
+        in_threads(take, parts)
+        return found
 
     def field(self) -> Field:
         """Return memory for a field on all cells, which the next product overwrites, (nx, ny)."""

@@ -93,11 +93,15 @@ class ActiveSet:
         interference = problem.interference
         parts = blocks(gap.shape[0], _BLOCK // gap.shape[1])
 
-        def work(rows: slice) -> float:
-            """Turn displacements of some rows into gaps; return twice the energy of the rows."""
-            elastic = float(np.vdot(pressure[rows], gap[rows]))
-            gap[rows] -= interference[rows]
-            return elastic - 2.0 * float(np.vdot(pressure[rows], interference[rows]))
+        def work(rows: slice) -> tuple[float, float, float]:
+            """Turn displacements of some rows into gaps; return three sums over these rows.
+
+            They are the pressures, and these times the displacements and times the interference.
+            """
+            here, p = gap[rows], pressure[rows]
+            elastic = float(np.vdot(p, here))
+            here -= interference[rows]
+            return float(p.sum()), elastic, float(np.vdot(p, interference[rows]))
 
         def extremes(rows: slice) -> tuple[float, float, float, float]:
             """Let free motions act; return four extremes.
@@ -117,12 +121,15 @@ class ActiveSet:
             inside = max(apart, -float(closed.min()))
             return float(nearer.max()), float(np.abs(nearer).max()), inside, -float(open_gaps.min())
 
-        self._energy = sum(in_threads(work, parts))
-        if motions.count and pressure.any():
-            self.motion = self._closing(pressure)
+        total, elastic, pressed = np.sum(in_threads(work, parts), axis=0)
+        self._energy = float(elastic - 2.0 * pressed)
+        if motions.count and total > 0.0:
+            self.motion = np.array([(elastic - pressed) / total])  # mean gap under the pressures
+            if motions.turns or problem.bound.is_finite:
+                self.motion = self._closing(pressure)
         largest = np.max(in_threads(extremes, parts), axis=0)
         self.scale = float(largest[0])
-        if self.scale <= 0.0 and pressure.any():  # clear of all cells, and yet loaded
+        if self.scale <= 0.0 and total > 0.0:  # clear of all cells, and yet loaded
             self.scale = float(largest[1])
         self.residual = self.rounding = 0.0
         self._enters = not float(largest[2]) > _CLOSED * float(largest[3])
@@ -180,11 +187,7 @@ class ActiveSet:
 
     def _step_together(self, *, cautious: bool) -> bool:
         """Move all cells at once, by less while that gains nothing; return whether it gained."""
-        touching = self._touching()
-        if not self._enters:
-            opened = self.pressure <= 0.0
-            opened.ravel()[self._constrained] = False
-            touching &= ~opened
+        touching = self._touching(entering=self._enters)
         same = np.array_equal(touching, self._set)
         if not same:
             self._set, self._contact = touching, self._among(np.flatnonzero(touching))
@@ -212,11 +215,12 @@ class ActiveSet:
             change: Their change, shape (n,).
         """
         problem, moved = self.problem, old.copy()
-        wanted = moved.ravel()[cells] + change
+        wanted = old.ravel()[cells] + change
         upper = problem.bound.of(cells)
         moved.ravel()[cells] = np.clip(wanted, 0.0, upper)
-        admissible = problem.admissible(moved.copy(), self._yielding)
-        if admissible is not None or not problem.bound.is_finite or not problem.motions.count:
+        final = not problem.bound.is_finite or not problem.motions.count
+        admissible = problem.admissible(moved if final else moved.copy(), self._yielding)
+        if admissible is not None or final:
             return admissible
         # so many cells leave that the others cannot bear the load: those nearest to carrying stay
         moved.ravel()[cells] = 0.0
@@ -270,9 +274,21 @@ class ActiveSet:
         entering = entering[worst[: max(1, np.count_nonzero(carry))]]
         return np.union1d(np.flatnonzero(carry), entering)
 
-    def _touching(self) -> Flags:
-        """Return the cells to find pressures of; those that yield are not among them."""
-        touching = (self.pressure > 0.0) | (self.gap < 0.0)
+    def _touching(self, *, entering: bool = True) -> Flags:
+        """Return the cells to find pressures of; those that yield are not among them.
+
+        Args:
+            entering: Whether cells with negative gaps are among them that have no pressure.
+        """
+        pressure, gap = self.pressure, self.gap
+        touching = np.empty(gap.shape, bool)
+
+        def work(rows: slice) -> None:
+            here = np.greater(pressure[rows], 0.0, out=touching[rows])
+            if entering:
+                here |= gap[rows] < 0.0
+
+        in_threads(work, blocks(gap.shape[0], _BLOCK // gap.shape[1]))
         if self.problem.bound.is_finite:
             self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
             touching &= ~self._yielding

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 
 from micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
 from support.arrays import Array, Flags, Indices
+from support.cores import BLOCK, blocks, in_threads
 
 _MOST_STEPS, _MOST_HALVINGS = 100, 8
 _LONGEST = 1.5
@@ -88,6 +89,8 @@ class Motions:
 
     def modes_of(self, cells: Indices) -> Array:
         """Return the modes of some cells by their flat indices, shape (k, n)."""
+        if not self.turns:  # the approach, whose mode is 1
+            return np.ones((self.count, len(cells)))
         row, column = np.divmod(cells, self.along_y.shape[1])
         return np.asarray(self.along_x[:, row] * self.along_y[:, column])
 
@@ -141,10 +144,13 @@ class Motions:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.turns and not bound.is_finite:
-            total = float(pressure.sum())
-            if total > 0.0:
-                pressure *= self.loads[0] / total
-            return pressure if total > 0.0 else None
+            parts = blocks(len(pressure), BLOCK // (8 * pressure.shape[1]))
+            total = sum(in_threads(lambda rows: float(pressure[rows].sum()), parts))
+            if total <= 0.0:
+                return None
+            factor = float(self.loads[0]) / total
+            in_threads(lambda rows: np.multiply(pressure[rows], factor, pressure[rows]), parts)
+            return pressure
         cells, loads, acting = np.flatnonzero(pressure), self.loads, 0.0
         if fixed is not None:
             cells = np.flatnonzero(np.where(fixed, 0.0, pressure))
