@@ -53,16 +53,22 @@ class Extension:
     """
 
     def __init__(self, cells: Cells, period: tuple[int, int], weights: Array | None = None) -> None:
-        self.place = rows, columns = cells.rows[cells.row], cells.column
+        self.place = rows, columns = np.empty_like(cells.row), cells.column
         shape = _halved(period)
-        self._block = (rows // 2) * shape[1] + columns // 2
+        self._block = np.empty_like(rows)
+
+        def locate(some: slice) -> None:
+            rows[some] = cells.rows[cells.row[some]]
+            self._block[some] = (rows[some] >> 1) * shape[1] + (columns[some] >> 1)
+
+        in_threads(locate, blocks(len(rows), CELLS))
         sums = np.bincount(self._block, weights, minlength=shape[0] * shape[1])
         weight = sums.reshape(shape).astype(np.float32)
         self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
         self._unknown: list[Field] = []  # of each level but the finest, what it does not know
         while True:
-            limited = np.minimum(_SHARE * weight, np.float32(1.0))
-            self._scales.append(np.divide(limited, weight, out=weight, where=weight > _NONE))
+            limited = _limited(weight)
+            self._scales.append(weight)
             self._unknown.append(np.float32(1.0) - limited)
             if min(shape) <= _SMALLEST:
                 break
@@ -151,6 +157,19 @@ class Extension:
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:
     """Return the shape of the next coarser grid."""
     return (shape[0] + 1) // 2, (shape[1] + 1) // 2
+
+
+def _limited(weight: Field) -> Field:
+    """Return a share of sums of weights, at most 1, and leave its ratio to these in their place."""
+    limited = np.empty_like(weight)
+
+    def work(rows: slice) -> None:
+        here, most = weight[rows], limited[rows]
+        np.minimum(np.float32(_SHARE) * here, np.float32(1.0), out=most)
+        np.divide(most, here, out=here, where=here > _NONE)
+
+    in_threads(work, blocks(len(weight), BLOCK // (8 * weight.shape[1])))
+    return limited
 
 
 def _sums(fine: Field) -> Field:

@@ -23,6 +23,7 @@ from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from support.arrays import Array, Indices
+from support.cores import copied
 from support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
@@ -129,8 +130,7 @@ class GridCompliance:
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
-        moved = np.empty_like(pressure) if out is None else out
-        moved[:] = pressure
+        moved: Array = copied(pressure, out)
         self._half_space.compliance(moved)
         for term in self._terms:
             moved += term.displacement(pressure)

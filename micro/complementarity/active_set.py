@@ -21,7 +21,7 @@ from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.start import admissible_start
 from support.arrays import Array, Flags, Indices
-from support.cores import blocks, in_threads
+from support.cores import CELLS, blocks, copied, in_threads
 from support.errors import NotConverged
 
 _BLOCK = 2**17
@@ -214,16 +214,21 @@ class ActiveSet:
             cells: Flat indices of the cells that change, shape (n,).
             change: Their change, shape (n,).
         """
-        problem, moved = self.problem, old.copy()
-        wanted = old.ravel()[cells] + change
-        upper = problem.bound.of(cells)
-        moved.ravel()[cells] = np.clip(wanted, 0.0, upper)
+        problem, moved, wanted = self.problem, copied(old), np.empty(len(cells))
+        upper, flat = problem.bound.of(cells), moved.ravel()
+
+        def work(some: slice) -> None:
+            most = upper if np.ndim(upper) == 0 else np.asarray(upper)[some]
+            np.add(flat[cells[some]], change[some], out=wanted[some])
+            flat[cells[some]] = np.clip(wanted[some], 0.0, most)
+
+        in_threads(work, blocks(len(cells), CELLS))
         final = not problem.bound.is_finite or not problem.motions.count
         admissible = problem.admissible(moved if final else moved.copy(), self._yielding)
         if admissible is not None or final:
             return admissible
         # so many cells leave that the others cannot bear the load: those nearest to carrying stay
-        moved.ravel()[cells] = 0.0
+        flat[cells] = 0.0
         shifted = problem.motions.shifted_to_load(wanted, upper, float(moved.sum()))
         if shifted is None:
             return None
