@@ -86,8 +86,7 @@ def by_choice(choice):
     for name, value in CHOICES[choice].items():
         options[name] = value
     try:
-        # a thousand iterations take long, on whichever element
-        few = FEW_FACES[:1] if choice == "bjacobi" else FEW_FACES
+        few = FEW_FACES if choice == "mumps" else FEW_FACES[:1]
         return forces(EVERY_FACE if COMM.size == 1 else few)
     finally:
         for name in CHOICES[choice]:

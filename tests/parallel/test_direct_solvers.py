@@ -17,7 +17,7 @@ def forces(waiting_ranks):
 )
 def test_forces_are_those_of_multigrid(forces, choice, ranks):
     usual, found = forces[1]["usual"], forces[ranks][choice]
-    assert len(found) == (8 if ranks == 1 else 2 if choice == "bjacobi" else 4)
+    assert len(found) == (8 if ranks == 1 else 4 if choice == "mumps" else 2)
     for name in found:
         # Newton's method and the equilibrium of the plane end at 1e-9 of the force
         least = 1e-8 * max(usual[name])

@@ -138,7 +138,7 @@ def towards_a_punch(exponent, approach):
     return block, coefficient, force, contact
 
 
-@pytest.mark.parametrize("exponent", [6, 12])
+@pytest.mark.parametrize("exponent", [6, pytest.param(12, marks=pytest.mark.long)])
 def test_towards_the_flat_punch(exponent):
     """C rⁿ tends to a flat punch of its contact's radius: F = 2 E* a δ n / (n + 1)."""
     approach = 1e-4

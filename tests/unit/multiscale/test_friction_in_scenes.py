@@ -157,7 +157,8 @@ def test_coupled_friction_says_so_and_goes_on_where_it_was(tmp_path, kind):
 
 def test_fields_columns_figure_and_report_are_written(tmp_path):
     output = {"check": "none", "figures": True, "report": True, "contact": "all"}
-    whole = Run(scene(output=output))
+    load = PATH | {"steps": 1, "shear": PATH["shear"][:1], "shear_steps": 2}
+    whole = Run(scene(output=output, load=load))
     list(whole.load_steps())
     files = {path.name for path in write_results(tmp_path, whole, options=[])}
     whole.close()

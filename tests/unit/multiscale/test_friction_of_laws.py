@@ -44,10 +44,9 @@ def ran(kind):
     return run(scene(kind))
 
 
-KINDS = ["consistent", "isolated", "representative"]
-
-
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", ["consistent", "representative", pytest.param("isolated", marks=pytest.mark.long)]
+)
 def test_the_plane_presses_then_shifts_there_and_back(kind):
     history = ran(kind)
     assert len(history) == 1 + 3 * 2
