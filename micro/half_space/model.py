@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, replace
 from functools import cached_property
-from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -95,7 +94,9 @@ class HalfSpaceModel:
         of_kind(self.surface, Surface, "is no surface", allowed=allowed)
         for what in ("contact_modulus", "tolerance"):
             value = getattr(self, what)
-            if not (isinstance(value, Real) and np.isfinite(value) and value > 0.0):
+            if not (
+                isinstance(value, int | float | np.number) and np.isfinite(value) and value > 0.0
+            ):
                 problem = f"the {what.replace('_', ' ')} must be positive and finite"
                 raise InputError(problem, value=value, allowed="> 0")
         if self.hardness is not None and not self.hardness > 0.0:
