@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 16.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -23,6 +24,10 @@ _SAME = 1e-6
 """Distance of places that count as one, over the mean side of the triangles."""
 _LEAST = 1e-9
 """Transmissivity of a triangle along the axis on which it is closed, over that along the other."""
+_CORNER = 1.0
+"""Angle from which two sides of the border meet at a corner; below they follow a curve [rad]."""
+_MOST_BENT = 0.25
+"""Largest way of the middle of a side towards the curve, over the height of its triangle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -69,7 +74,7 @@ class TriangleFace:
         _, first, node = np.unique(
             np.rint(places / near).astype(np.int64), axis=0, return_index=True, return_inverse=True
         )
-        nodes = places[first]
+        self._places = nodes = places[first]
         ends = [_near(nodes, one, 1e3 * near) for one in (inlet, outlet)]
         for name, on_edge in zip(("inlet", "outlet"), ends, strict=True):
             if not on_edge.any():
@@ -84,29 +89,78 @@ class TriangleFace:
         # gradients of the three shape functions, turned sides over twice the area
         opposite = np.roll(edges, -1, axis=1)
         twice = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
-        self._area = 0.5 * np.abs(twice)
+        self._twice, self._area = twice, 0.5 * np.abs(twice)
         turned = np.stack([-opposite[..., 1], opposite[..., 0]], axis=2)
         self._gradient = turned / twice[:, None, None]
 
-    def quartered(self) -> TriangleFace:
-        """Return the face with every triangle cut into four, between the same edges."""
+    def quartered(self, bent: float = 0.0) -> TriangleFace:
+        """Return the face with every triangle cut into four, between the same edges.
+
+        Args:
+            bent: Part of the way that the new nodes on its border go from the straight sides to
+                circles through the nodes beside them, `most_bent` at most; corners stay.
+        """
         a, b, c = (self.corners[:, k] for k in range(3))
         middles = np.stack([0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)], axis=1)
+        on_border = self._on_border
+        middles[on_border] += bent * self._bends
         ab, bc, ca = (middles[:, k] for k in range(3))
         parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
         corners = np.stack([np.stack(part, axis=1) for part in parts], axis=1)
         # sides on the border of the face, both ends of which lie on an edge
-        sides = np.sort(np.stack([self._own_node, np.roll(self._own_node, -1, axis=1)], -1), -1)
-        _, side, times = np.unique(
-            sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
-        )
-        on_border = (times[side] == 1).reshape(-1, 3)
         at = np.stack([self._node, np.roll(self._node, -1, axis=1)], axis=-1)
         ends = []
         for k, known in enumerate(self._ends):
             on_edge = on_border & (at == self._count + k).all(axis=-1)
             ends.append(np.concatenate([known, middles[on_edge]]))
         return TriangleFace(corners.reshape(-1, 3, 2), *ends)
+
+    @property
+    def most_bent(self) -> float:
+        """Largest part of the way to a curve that leaves every triangle its orientation."""
+        height = np.abs(self._twice[np.nonzero(self._on_border)[0]]) / self._border_lengths
+        way = np.hypot(*self._bends.T)
+        return float(min(1.0, (_MOST_BENT * height / np.maximum(way, 1e-300)).min(initial=1.0)))
+
+    @cached_property
+    def _on_border(self) -> Flags:
+        """Which sides of the triangles are on the border of the face, shape (n, 3)."""
+        sides = np.sort(np.stack([self._own_node, np.roll(self._own_node, -1, axis=1)], -1), -1)
+        _, side, times = np.unique(
+            sides.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True
+        )
+        return np.asarray((times[side] == 1).reshape(-1, 3))
+
+    @property
+    def _border_lengths(self) -> Array:
+        """Lengths of the sides on the border, shape (m,) [mm]."""
+        ends = np.roll(self.corners, -1, axis=1) - self.corners
+        return np.asarray(np.linalg.norm(ends[self._on_border], axis=1))
+
+    @cached_property
+    def _bends(self) -> Array:
+        """Ways from the middles of sides on the border onto a curve, shape (m, 2) [mm]."""
+        on_border = self._on_border
+        triangle = np.nonzero(on_border)[0]
+        ends = self._own_node, np.roll(self._own_node, -1, axis=1)
+        tail, head = (one[on_border] for one in ends)
+        turned = self._twice[triangle] < 0.0  # the face lies on the left of every side
+        tail, head = np.where(turned, head, tail), np.where(turned, tail, head)
+        way = self._places[head] - self._places[tail]
+        length = np.hypot(*way.T)
+        into = np.zeros(len(self._places), np.intp)
+        into[head] = np.arange(len(head))  # the side that leads to a node
+        before = into[tail]
+        cross = way[before, 0] * way[:, 1] - way[before, 1] * way[:, 0]
+        angle = np.arctan2(cross, (way[before] * way).sum(axis=1))  # at the tail of each side
+        follows = np.abs(angle) < _CORNER
+        curvature = np.where(follows, 2.0 * angle / (length[before] + length), 0.0)
+        after = np.zeros(len(self._places), np.intp)
+        after[tail] = np.arange(len(tail))
+        count = follows + follows[after[head]].astype(float)
+        mean = (curvature + curvature[after[head]]) / np.maximum(count, 1.0)
+        outwards = np.stack([way[:, 1], -way[:, 0]], axis=1)
+        return np.asarray((mean * length / 8.0)[:, None] * outwards)
 
     def flow(self, transmissivity: Array) -> FaceFlow:
         """Solve for the flow over the face.

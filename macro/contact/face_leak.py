@@ -98,6 +98,11 @@ class LeakingFace:
         """Triangles of the facets of all ranks, in the frame of the face, shape (n, 3, 2) [mm]."""
         return self._face.corners
 
+    @property
+    def most_bent(self) -> float:
+        """Largest part of the way to a curve for new nodes on the border of the face."""
+        return self._face.most_bent
+
     def _places(self, facets: NDArray[Any]) -> Array:
         """Return where the nodes of facets of all ranks lie in the plane of the face, (n, 2)."""
         frame, points = self._facets.frame, self._mesh.geometry.x
@@ -109,7 +114,12 @@ class LeakingFace:
         )
 
     def flow(
-        self, transmissivity: Array, *, harmonic: bool = False, quartered: bool = False
+        self,
+        transmissivity: Array,
+        *,
+        harmonic: bool = False,
+        quartered: bool = False,
+        bent: float = 0.0,
     ) -> FaceFlow:
         """Solve for the flow.
 
@@ -118,6 +128,7 @@ class LeakingFace:
             harmonic: Whether a facet has the harmonic mean over its points, as where T varies along
                 the flow, instead of the mean, as where it varies across.
             quartered: Whether every triangle is cut into four, with its transmissivity.
+            bent: Part of the way that new nodes on the border of the face then go to a curve.
 
         Returns:
             The flow, on every rank, with the pressures at the corners of the triangles of all
@@ -135,7 +146,7 @@ class LeakingFace:
         whole = np.concatenate(self.comm.allgather(own))[self._triangle_facet]
         if quartered:
             fourfold = np.repeat(whole, 4, axis=0)
-            return on_root(self.comm, lambda: self._face.quartered().flow(fourfold))
+            return on_root(self.comm, lambda: self._face.quartered(bent).flow(fourfold))
         return on_root(self.comm, lambda: self._face.flow(whole))
 
     def pressure(self, flow: FaceFlow, first: float, second: float, name: str = "fluid") -> Any:

@@ -67,6 +67,27 @@ def test_triangles_cut_into_four_tell_the_error_of_their_size(across, around):
     assert exact == pytest.approx(ring, rel=5e-3)
 
 
+@pytest.mark.parametrize(("across", "around"), [(2, 4), (8, 4), (4, 8), (8, 8), (16, 16)])
+def test_straight_sides_of_a_curve_are_in_the_stated_error(across, around):
+    """Cut into four between straight sides, the quarter of a ring is a polygon for ever."""
+    face = TriangleFace(*quarter_ring(across, around))
+    one = np.full((len(face.corners), 2), 3e-9)
+    four, bent = np.repeat(one, 4, axis=0), face.most_bent
+    own, straight = face.flow(one).total, face.quartered().flow(four).total
+    rounder = face.quartered(bent).flow(four).total
+    true = abs(own - 0.5 * np.pi * 3e-9 / np.log(OUTER / INNER))
+    by_size = 2.0 * abs(straight - own)
+    assert by_size < 0.9 * true
+    # what runs state
+    assert true < by_size + 4.0 / 3.0 * abs(rounder - straight) / bent < 2.0 * true
+
+
+def test_corners_stay_and_sides_with_them():
+    _, face = strip()
+    assert face.most_bent == 1.0
+    assert face.quartered(1.0).corners == pytest.approx(face.quartered().corners, abs=1e-15)
+
+
 def test_ring_whose_transmissivity_falls_outwards():
     """T = T₀ (r₀/r)³ along all directions: ∫ dr/(r T) across the ring."""
     corners, bore, rim = quarter_ring(24, 100)
