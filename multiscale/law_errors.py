@@ -45,7 +45,7 @@ if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
     from macro.contact.contact_response import ApproachResponse
 
-CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes"
+CAUSES = "mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"
 """The causes, in their order."""
 MOST_CHECKED_UNKNOWNS = 400_000
 """Unknowns of the same mesh with quadratic elements at most. Beyond, the error of linear elements
@@ -76,6 +76,8 @@ class LawErrorProbe:
         laws: The laws of the regions.
         samples: Their samples.
         probe_of: Returns what measures the errors of one sample.
+        edge_width_of: Returns the width along the edges of the face that the law of a sample errs
+            by under a mean pressure [mm].
         comm: MPI communicator; None for this process alone.
     """
 
@@ -86,6 +88,7 @@ class LawErrorProbe:
     laws: Sequence[PatchLaw]
     samples: Sequence[RegionSamples]
     probe_of: Callable[[RegionSamples, Surface], ErrorProbe]
+    edge_width_of: Callable[[RegionSamples, Surface, float], float]
     comm: Any = None
 
     @cached_property
@@ -140,14 +143,37 @@ class LawErrorProbe:
         forces = response.sampling.patch_sums(pressure)
         weighted = response.sampling.patch_sums(pressure * closure)
         means = np.divide(weighted, forces, out=np.zeros_like(forces), where=forces > 0.0)
-        grid, slopes = self._of_samples(means, forces)
+        grid, slopes, widths = self._of_samples(means, forces)
         # without load an unknown error is none
         return {
             "laws": by_region(interpolation_errors) * (pressure > 0.0),
             "samples": factors[patch] * by_region(lambda law, c: law.pressure_scatter(c)),
             "grid": np.where(pressure > 0.0, grid[patch], 0.0) * pressure,
             "slopes": np.where(pressure > 0.0, slopes[patch], 0.0) * pressure,
+            "edges": self._at_edges(response, widths),
         }
+
+    def _at_edges(self, response: ApproachResponse, widths: Array) -> Array:
+        """Return what strips along the edges of the face carry, at the samples next to them [MPa].
+
+        Args:
+            response: The contact at the load step.
+            widths: Widths of the strips by region, shape (regions,) [mm].
+        """
+        from macro.mesh.face_edges import outer_edges
+
+        sampling, pressure = response.sampling, self.state.sample_pressure
+        facets = self.face.sides[0].facets
+        edges, errors = outer_edges(facets, self.face.comm), np.zeros_like(pressure)
+        if len(edges.length):
+            _, nearest = scipy.spatial.cKDTree(np.column_stack([sampling.x, sampling.y])).query(
+                edges.middle
+            )
+            loaded = pressure[nearest] > 0.0
+            at, length = nearest[loaded], edges.length[loaded]
+            carried = widths[sampling.patch[at]] * length * pressure[at] / sampling.weight[at]
+            np.add.at(errors, at, carried)
+        return errors
 
     # --- elements
 
@@ -224,7 +250,7 @@ class LawErrorProbe:
     # --- samples
 
     def _of_samples(self, closures: Array, forces: Array) -> Array:
-        """Return the errors of pressures by cells and finite slopes, relative, (2, regions).
+        """Return relative errors by cells and by finite slopes, and widths at edges, (3, regions).
 
         Args:
             closures: Mean closures of the regions, weighted by pressure, shape (regions,) [mm].
@@ -237,7 +263,7 @@ class LawErrorProbe:
             if forces[number] > 0.0
         ]
 
-        def measure(task: int) -> tuple[float, float, float]:
+        def measure(task: int) -> tuple[float, float, float, float]:
             number, sample = tasks[task]
             probe = self.probe_of(self.samples[number], sample)
             reference = probe.model.reference_height - sample.mean_height
@@ -245,15 +271,16 @@ class LawErrorProbe:
             approach = reference - separation_of(law, closure, reference)
             force = probe.on_body(probe.model, probe.order).press(Control(approach=approach)).force
             if not force:  # the closure is that of others of the samples
-                return 0.0, 0.0, 0.0
+                return 0.0, 0.0, 0.0, 0.0
             parts = probe.measure(force, approach, (0.0, 0.0)).parts
-            return parts["grid"], parts["slopes"], force
+            width = self.edge_width_of(self.samples[number], sample, force / sample.area)
+            return parts["grid"], parts["slopes"], width * force, force
 
         found = shared(self.comm, len(tasks), measure)
-        sums = np.zeros((3, len(self.samples)))
+        sums = np.zeros((4, len(self.samples)))
         for (number, _), errors in zip(tasks, found, strict=True):
             sums[:, number] += errors
-        return np.divide(sums[:2], sums[2], out=np.zeros_like(sums[:2]), where=sums[2] > 0.0)
+        return np.divide(sums[:3], sums[3], out=np.zeros_like(sums[:3]), where=sums[3] > 0.0)
 
 
 def causes_of(samples: Sequence[RegionSamples]) -> list[str]:

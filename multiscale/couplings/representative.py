@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from geometry import PatchGrid, Regions, RigidPlane, Surface
+from geometry import NotConverged, PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from micro.closed_forms.hertz import crowned_peak
 from micro.friction.friction_model import FrictionModel
@@ -22,6 +22,7 @@ from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
+from multiscale.edge_errors import edge_width
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
 from multiscale.inputs.loads import check_load, load_history_on
@@ -220,6 +221,7 @@ class RepresentativeCoupling(LawCoupling):
             "laws": solver.table.laws,
             "samples": self.samples,
             "probe_of": self._probe_of,
+            "edge_width_of": self._edge_width_of,
             "comm": self.comm,
         }
         if self.scene.friction is None:
@@ -255,6 +257,17 @@ class RepresentativeCoupling(LawCoupling):
             on_body=on_body(None, region.materials, None),
             order=SLOPES if self.finite_slopes else 0,
         )
+
+    def _edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
+        """Return the width along the edges of the face that the law of a sample errs by [mm]."""
+        block = self.scene.block
+        if block is not None and block.sides == "roller":  # mirrors are no edges
+            return 0.0
+        model, pair = replace(self._model_of(region, sample), slopes=()), region.materials
+        try:
+            return edge_width(model, pressure, pair.first)
+        except NotConverged:
+            return math.inf
 
     def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what measured errors leave out."""

@@ -1,7 +1,7 @@
 """Are the errors of the shear that runs state those that they have?
 
     .venv/bin/python tests/benchmarks/shear_error_study.py [--scenes N] [--seed S]
-        [--laws | --samples]
+        [--laws | --samples | --normal]
 
 Scenes are drawn anew for every seed: rough half-spaces and blocks on 48² or 64² cells, with any
 Poisson's ratio up to 0.45 and a coefficient of friction from 0.1 to 0.8, pressed to 1 to 15 %
@@ -13,7 +13,8 @@ cells.
 With ``--laws`` the scenes have patch laws on 48² cells (consistent or isolated, 1 to 4 × 4
 patches), and are judged by coupled cells on the block, on twice as many a side. With ``--samples``
 a law of a sample on 16² cells stands for a face of 4 × 4 of them on a block, which is judged by
-coupled cells on 24² of every sample. Run it from the project's root.
+coupled cells on 24² of every sample, with the edges at any place of the sample. With ``--normal``
+such faces are pressed without friction. Run it from the project's root.
 """
 
 import argparse
@@ -41,7 +42,7 @@ def scene_of(random, kind):
     slope, waves = float(random.uniform(0.05, 0.2)), (2, int(random.integers(4, 9)))
     nu, mu = float(random.uniform(0.0, 0.45)), float(random.uniform(0.1, 0.8))
     modulus, area = BLOCK["young_modulus"] / (1.0 - nu**2), float(random.uniform(0.01, 0.15))
-    laws, samples = kind == "laws", kind == "samples"
+    laws, samples = kind == "laws", kind in ("samples", "normal")
     kinds = ("consistent", "isolated") if laws else ("analytic", "concurrent")
     coupling = str(random.choice(kinds))
     cells = 48 if laws else int(random.choice([48, 64]))
@@ -103,22 +104,42 @@ def finer(data, cells, **changes):
     return run(Scene.from_dict(data | {"surface": surface, "output": output} | changes)).steps[-1]
 
 
-def on_cells_of_face(data, cells):
+def on_cells_of_face(data, cells, place):
     """Return the last load step of a face of samples, each on some cells, pressures coupled."""
     said = dict(data["surface"]["spectrum"])
     heights = synthesise(Spectrum(**said), grid=(cells, cells), lengths=(1.0, 1.0)).heights
-    # a law knows no edge of the face: its phase is that which has the lowest heights there
-    lowest = [int(np.argmin(heights.max(axis=axis))) for axis in (1, 0)]
-    heights = np.roll(heights, [-one for one in lowest], axis=(0, 1))
-    coupled = {"friction": data["friction"] | {"coupled": True}}
+    heights = np.roll(heights, place, axis=(0, 1))
     alike = {key: data[key] for key in ("micro", "load")} | {"coupling": {"kind": "concurrent"}}
+    if "friction" in data:
+        alike["friction"] = data["friction"] | {"coupled": True}
     block = {key: data["block"][key] for key in ("young_modulus", "poisson_ratio", "height")}
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "face.npy"
         np.save(path, np.tile(heights, (TILES, TILES)))
         surface = {"file": str(path), "height_unit": "mm", "lengths": [float(TILES)] * 2}
         face = {"surface": surface, "block": block, "output": data["output"] | {"check": "none"}}
-        return run(Scene.from_dict(alike | coupled | face)).steps[-1]
+        return run(Scene.from_dict(alike | face)).steps[-1]
+
+
+def judged_without_friction(number, random):
+    """Press a face of samples without friction; print it, and return its true and stated error."""
+    data, *_ = scene_of(random, "normal")
+    del data["friction"]
+    step = run(Scene.from_dict(data)).steps[-1]
+    cells = 3 * data["surface"]["grid"][0] // 2
+    place = tuple(random.integers(0, cells, 2).tolist())
+    off = abs(on_cells_of_face(data, cells, place).approach_mm - step.approach_mm)
+    stated, whole = step.approach_error_mm, sum(error for _, error in step.errors)
+    told = ", ".join(
+        f"{cause} {error / whole * stated / step.approach_mm:.2%}" for cause, error in step.errors
+    )
+    nu, size, missed = data["block"]["poisson_ratio"], step.approach_mm, off > ALLOWED * stated
+    print(
+        f"{number:3d} ν {nu:.2f}: approach {off / size:.2%} off, {stated / size:.2%} stated: "
+        f"{told}{' MISSED' * missed}",
+        flush=True,
+    )
+    return {"normal": (off, stated)}
 
 
 def of(step, by_force):
@@ -145,7 +166,8 @@ def judged(number, random, kind):
         if kind == "laws":
             on["coupling"] = {"kind": "concurrent"}
         if kind == "samples":
-            exact = on_cells_of_face(data, 3 * cells // 2)
+            place = tuple(random.integers(0, 3 * cells // 2, 2).tolist())
+            exact = on_cells_of_face(data, 3 * cells // 2, place)
             by_load = not by_approach
             name = "approach_mm" if by_load else "force_N"
             off = abs(getattr(exact, name) - getattr(step, name))
@@ -182,13 +204,17 @@ def main():
     others = parser.add_mutually_exclusive_group()
     others.add_argument("--laws", action="store_true", help="patch laws in place of cells")
     others.add_argument("--samples", action="store_true", help="laws of samples in place of cells")
+    others.add_argument("--normal", action="store_true", help="those without friction")
     given = parser.parse_args()
     kind = "laws" if given.laws else "samples" if given.samples else "cells"
     found = {"cells": [], "coupling": [], "normal": []}
     for number in range(given.first, given.first + given.scenes):
         try:
             random = np.random.default_rng([given.seed, number])
-            rows = judged(number, random, kind)
+            if given.normal:
+                rows = judged_without_friction(number, random)
+            else:
+                rows = judged(number, random, kind)
         except NotConverged as error:
             print(f"{number:3d} not converged: {error}", flush=True)
             continue

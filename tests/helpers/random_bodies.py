@@ -351,6 +351,7 @@ def stated_and_true(body, comm, *, refinements=2):
         laws=(),
         samples=(),
         probe_of=None,
+        edge_width_of=None,
         comm=comm,
     )
     mesh, quadrature = (float(error[0]) for error in probe.discretisation())

@@ -60,7 +60,7 @@ FLOORS = {
         "exports results scene",
         "inputs",
         "bodies",
-        "law_solvers measured_errors",
+        "law_solvers measured_errors edge_errors",
         "law_errors shear_errors",
         "law_shear_errors",
         "couplings",

@@ -159,7 +159,7 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, approa
     history = of_samples(by_force=by_force, approach=approach)
     step = history.steps[-1]
     for parts in (dict(step.errors), dict(step.shear_errors)):
-        assert list(parts) == ["mesh", "quadrature", "laws", "grid", "slopes"]
+        assert list(parts) == ["mesh", "quadrature", "laws", "grid", "slopes", "edges"]
         assert all(0.0 < error < np.inf for error in parts.values())
     shear, size = sum(dict(step.shear_errors).values()), response(step, by_force=by_force)
     columns = step.shear_force_error_N, step.shear_error_mm
@@ -172,7 +172,7 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, approa
 
 def test_several_samples_add_their_scatter_to_the_error_of_the_shear():
     parts = dict(of_samples(law=(("seeds", (12, 5, 8)),), approach=True).steps[-1].shear_errors)
-    assert list(parts) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes"]
+    assert list(parts) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"]
     assert parts["samples"] > parts["slopes"] > 0.0
 
 

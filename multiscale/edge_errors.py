@@ -1,0 +1,119 @@
+"""What laws of samples miss at the edges of their face.
+
+A law knows its roughness without end. At the edge of a face contacts are cut, bear on material that
+ends there, and lie nearer to the edge or further away than their mean density says. A face of two
+by two periods of a sample between free sides tells how much: its cells, with the edges at four
+places of the period, against the law of the same cells on the same body. What the law carries too
+much or too little is a strip along the edge.
+
+Theory: docs/theory.md, section 13.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from geometry import Control, Material, NotConverged, Surface
+from micro import HalfSpaceModel
+from micro.boundary_elements.free_sides import FreeSides
+from support.arrays import Array
+
+_PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
+"""Periods along the face, cells along it that the law is solved on, and cells along a period that
+its contacts are solved on at most."""
+_LOADS = 0.125 * 2.0 ** np.arange(7)
+"""Pressures that the law is known at, over the mean one."""
+_STEPS, _TOLERANCE = 60, 1e-9
+
+
+def edge_width(model: HalfSpaceModel, pressure: float, material: Material) -> float:
+    """Return the width of the strip along a free edge whose pressure a law errs by [mm].
+
+    Args:
+        model: The periodic half-space of the sample, without finite slopes.
+        pressure: Mean pressure [MPa].
+        material: The material that ends at the edge.
+
+    Raises:
+        NotConverged: When a contact problem cannot be solved.
+    """
+    nx, ny = (min(count, _MOST_CELLS) for count in model.surface.grid)
+    period = model.resampled((nx, ny))
+    heights = np.tile(period.surface.heights, (_PERIODS, _PERIODS))
+    lengths = _PERIODS * model.surface.lengths[0], _PERIODS * model.surface.lengths[1]
+    sides = FreeSides(
+        lengths=lengths,
+        poisson_ratio=material.poisson_ratio,
+        decay_length=0.25 * min(lengths),
+        share=model.contact_modulus / material.contact_modulus,
+    )
+    face = replace(
+        period,
+        surface=Surface(heights=heights, lengths=lengths),
+        periodic=False,
+        sides=sides,
+    )
+    area, perimeter = lengths[0] * lengths[1], 2.0 * sum(lengths)
+    approach, stiffness = _by_law(period, face, pressure)
+    found = []
+    for place in ((0, 0), (nx // 2, 0), (0, ny // 2), (nx // 2, ny // 2)):
+        moved = replace(face.surface, heights=np.roll(heights, place, axis=(0, 1)))
+        state = replace(face, surface=moved).press(Control(force=pressure * area))
+        found.append((state.plane.approach - approach) * stiffness / (pressure * perimeter))
+    return float(np.abs(found).max())
+
+
+def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tuple[float, float]:
+    """Return approach and stiffness of a face under a law, on its own compliance [mm, N/mm].
+
+    Args:
+        period: The sample that the law belongs to.
+        face: A model of the face, which has its lengths, sides and contact modulus.
+        pressure: Mean pressure on the face [MPa].
+    """
+    area = float(np.prod(period.surface.lengths))
+    loads = np.concatenate([[0.0], pressure * _LOADS])
+    if period.hardness is not None:
+        loads = loads[loads < 0.95 * period.hardness]
+    closures = [period.first_touch]
+    closures += [period.press(Control(force=load * area)).plane.approach for load in loads[1:]]
+    law = scipy.interpolate.PchipInterpolator(closures, loads)
+    slope = law.derivative()
+
+    def of(closure: Array) -> tuple[Array, Array]:
+        inside = np.clip(closure, closures[0], closures[-1])
+        rate = slope(inside) * (closure > closures[0])
+        return law(inside) + slope(closures[-1]) * np.maximum(closure - closures[-1], 0.0), rate
+
+    flat = Surface(heights=np.zeros((_COARSE, _COARSE)), lengths=face.surface.lengths)
+    cells = replace(face, surface=flat, highest=None)
+    count = _COARSE**2
+    grid = cells.compliance.on_grid(flat.grid, flat.spacing)
+    units = np.eye(count).reshape(count, *flat.grid)
+    compliance = np.stack([grid.displacement(unit).ravel() for unit in units], axis=1)
+    compliance /= cells.contact_modulus
+    pressures = np.full(count, pressure)
+    # the law is convex where contacts are few: from a plane under which all cells bear more
+    approach = closures[1 + int(np.argmin(np.abs(_LOADS - 1.0)))] + float(
+        (compliance @ pressures).max()
+    )
+    for _ in range(_STEPS):
+        value, rate = of(approach - compliance @ pressures)
+        residual = np.append(pressures - value, pressures.mean() - pressure)
+        tangent = np.eye(count + 1)
+        tangent[:-1, :-1] += rate[:, None] * compliance
+        tangent[:-1, -1], tangent[-1, :-1], tangent[-1, -1] = -rate, 1.0 / count, 0.0
+        change = np.linalg.solve(tangent, residual)
+        pressures, approach = pressures - change[:-1], approach - change[-1]
+        if np.abs(residual).max() < _TOLERANCE * pressure:
+            rise = np.linalg.solve(np.eye(count) + rate[:, None] * compliance, rate)
+            return float(approach), float(rise.sum() * flat.spacing[0] * flat.spacing[1])
+    raise NotConverged(
+        "the law at the edge of a face",
+        reason="its pressures were not found",
+        iterations=_STEPS,
+        remedy="take more cells of the sample",
+    )
