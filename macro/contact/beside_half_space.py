@@ -5,124 +5,293 @@ Theory: sections 11 and 15 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 import numpy as np
+from petsc4py import PETSc
 
+from geometry.materials import Material
 from geometry.rigid_plane import Control
 from macro.contact.contact_forces import ContactForces
-from macro.contact.contact_response import ContactResponse
+from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_sliders import FaceSliders
-from macro.contact.frictional_forces import sliders_of
+from macro.contact.frictional_forces import FrictionalForces, sliders_of
+from macro.contact.loaded_face import ContactFace
 from macro.contact.opposite_half_space import OppositeHalfSpace
+from macro.contact.sampling import Sampling
+from macro.linear_solvers.solvers import solve_linear
 from support.arrays import Array
+from support.errors import NotConverged
+
+_ROUGHLY = 1e-4
+"""Residual of a solution of the body over that before it: as pressures converge, so does it."""
+_UNSUPPORTED = 1e-12
+"""Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
 
 class BesideHalfSpace:
-    """A load step of a body beside a half-space, see `opposite_half_space.Contact`.
+    """A body with laws beside a half-space.
+
+    The body is solved for under stresses that are known, with its own stiffness alone.
 
     Args:
-        forces: The forces of the laws.
-        response: First order changes of the body with the laws.
-        solve_body: Finds the equilibrium of the body alone, in the gap as it is.
-        control: What is prescribed of the plane.
-        gap: Gap of this rank's samples under a flat half-space, shape (n,) [mm].
+        face: The contact face of the body.
+        sampling: The samples that laws are evaluated at.
+        equilibrium: The equations of the body with the laws.
+        opposite: Elastic constants of the half-space.
 
     Note:
-        Every method is collective.
+        Construction and every method are collective.
     """
 
     def __init__(
-        self,
-        forces: ContactForces,
-        response: ContactResponse,
-        solve_body: Callable[[Control], FaceEquilibrium],
-        control: Control,
-        gap: Array,
+        self, face: ContactFace, sampling: Sampling, equilibrium: Equilibrium, opposite: Material
     ) -> None:
-        self._forces, self._response, self._solve_body = forces, response, solve_body
-        self._control, self._gap = control, gap
-        self._sliders = sliders_of(forces)
-        self._memory = self._sliders.memory if self._sliders else None
-        self._found: list[FaceEquilibrium] = []
-        self._sunk: Array = np.zeros_like(gap)
-        self._iterations = 0
-        self._wider: Array | float = 0.0  # gaps of samples, by shear stresses [mm]
+        self._equilibrium, self._sampling = equilibrium, sampling
+        materials = face.body.materials
+        all_of_them = [materials] if isinstance(materials, Material) else materials.values()
+        softest = max(one.surface_compliance for one in all_of_them)
+        self._half_space = OppositeHalfSpace(sampling, face.patches.lengths, opposite, softest)
+        self._body = _UnderStresses(equilibrium, sampling)
 
-    def solve(self, opposite: OppositeHalfSpace, preload: Array) -> FaceEquilibrium:
-        """Find the equilibrium of body and half-space.
+    def solve(self, control: Control, gap: Array) -> tuple[FaceEquilibrium, PETSc.Vec]:
+        """Find the equilibrium of body and half-space, and let sliders follow it.
 
         Args:
-            opposite: The half-space, which shear stresses displace as well.
-            preload: Displacements along the axes by other loads of the body, shape (n, 2) [mm].
+            control: What is prescribed of the plane.
+            gap: Gap of this rank's samples under a flat half-space, shape (n,) [mm].
 
         Returns:
-            The equilibrium, with the iterations of all solutions of the body alone.
+            The equilibrium, whose iterations are solutions of the body; and the displacements by
+            the contact [mm].
 
         Raises:
             NotConverged: When it is not found.
         """
-        what = f"the half-space at {self._control}"
-        if self._sliders is None:
-            opposite.follow(self, what)
-        else:
-            self._shear(opposite, preload, self._sliders, what)
-        return replace(
-            self._found[-1],
-            iterations=sum(one.iterations for one in self._found),
-            linear_iterations=self._iterations + sum(one.linear_iterations for one in self._found),
+        forces, body = self._equilibrium.forces, self._body
+        body.count()
+        contact = _LoadStep(forces, gap, body)
+        found = self._half_space.follow(contact, f"the half-space at {control}")
+        closure, shear = contact.closure, None
+        if isinstance(forces, FrictionalForces):
+            moved = self._half_space.at_both(found.along) + found.deviation[:, 1:]
+            at = closure, moved, forces.pressure(closure), forces.stiffness(closure)
+            shear = forces.sliders.accept(forces.sliders.respond(*at))
+        state = forces.state(
+            closure,
+            displacement=body.displacement.array_r.copy(),
+            reaction=self._equilibrium.body.reaction(body.displacement),
+            iterations=body.solutions,
+            linear_iterations=body.iterations,
+            residuals=np.array(body.residuals),
+            reason="CONVERGED_FNORM_RELATIVE",
+            shear=shear,
         )
+        return state, body.displacement.copy()
 
-    def _shear(
-        self, opposite: OppositeHalfSpace, preload: Array, sliders: FaceSliders, what: str
-    ) -> None:
-        """Find the equilibrium beside a half-space that shear stresses displace as well."""
+    def closed_in(self, way: Array) -> Array:
+        """Return the change of pressures where samples close in, to first order, (n,) [MPa].
 
-        def remaining(sheared: Array) -> Array:
-            along_x, along_y, self._wider = (opposite.at_samples(part) for part in sheared)
-            sliders.preload = preload + np.stack([along_x, along_y], axis=1)
-            opposite.follow(self, what)
-            state = self._found[-1]
-            assert state.shear is not None
-            found = opposite.by_shear(state.shear.sample_stress, state.sample_pressure)
-            return found - sheared
+        Stiffnesses are those that the forces of the laws were linearised with last.
 
-        opposite.shear(remaining, what)
+        Args:
+            way: What they close in by, shape (n,) [mm].
 
-    def pressed(self, moved: Array) -> Array:
-        """Solve the load step anew, from what friction left behind before it."""
+        Raises:
+            NotConverged: When it is not found.
+        """
+        return self._linear(_Linearised(self._equilibrium, self._sampling, way)).pressure
+
+    def sheared(self, way: Array, stuck: Array) -> tuple[Array, int]:
+        """Return the change of shear stresses where all samples slip on, to first order.
+
+        Args:
+            way: What they slip by, shape (n, 2) [mm].
+            stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
+
+        Returns:
+            The change, shape (n, 2) [MPa], and the linear iterations that it took.
+
+        Raises:
+            NotConverged: When it is not found.
+        """
+        closing = np.zeros(len(stuck))
+        contact = _Linearised(self._equilibrium, self._sampling, closing, way, stuck)
+        self._linear(contact)
+        return contact.stress, contact.body.iterations
+
+    def _linear(self, contact: _Linearised) -> _Linearised:
+        self._half_space.equilibrium(contact, "the response beside the half-space")
+        return contact
+
+
+class _UnderStresses:
+    """Displacements of the body under stresses, each solution a correction of the one before.
+
+    Args:
+        equilibrium: The equations of the body.
+        sampling: The samples of the stresses.
+
+    Attributes:
+        displacement: The latest displacements [mm].
+        solutions: Solutions since `count`.
+        iterations: Their linear iterations.
+        residuals: Norms of their residuals before them, relative to that of the load.
+    """
+
+    def __init__(self, equilibrium: Equilibrium, sampling: Sampling) -> None:
+        self._body, self._forces = equilibrium.body, equilibrium.forces
+        self._sampling, matrix = sampling, self._body.stiffness
+        self.displacement = matrix.createVecRight()
+        self._load, self._product = matrix.createVecLeft(), matrix.createVecLeft()
+        self._correction = matrix.createVecRight()
+        self.count()
+
+    def count(self) -> None:
+        """Begin to count."""
+        self.solutions, self.iterations = 0, 0
+        self.residuals: list[float] = []
+
+    def sunk(self, pressure: Array, stress: Array | None) -> Array:
+        """Return the displacements of the samples under stresses; see `Contact.sunk`."""
+        forces, load = self._forces, self._load
+        if stress is None:
+            self._sampling.values.array[:] = pressure
+            self._sampling.operator.mult(self._sampling.values, load)
+        else:
+            assert isinstance(forces, FrictionalForces)
+            forces.write_stresses(pressure, stress, load)
+        self._body.stiffness.mult(self.displacement, self._product)
+        size = load.norm()
+        load.axpy(-1.0, self._product)
+        self.residuals.append(load.norm() / size if size else 0.0)
+        self.iterations += solve_linear(
+            self._body.solver, load, self._correction, tolerance=_ROUGHLY
+        )
+        self.solutions += 1
+        self.displacement.axpy(1.0, self._correction)
+        into = self._sampling.displacements(self.displacement)[:, None]
+        return into if stress is None else np.hstack([into, forces.along(self.displacement)])
+
+
+class _LoadStep:
+    """The contact of a load step, see `opposite_half_space.Contact`.
+
+    Args:
+        forces: The forces of the laws, with what is prescribed of the plane.
+        gap: Gap of this rank's samples under a flat half-space, shape (n,) [mm].
+        body: Displacements of the body.
+
+    Attributes:
+        closure: Closures at the latest pressures, shape (n,) [mm].
+    """
+
+    def __init__(self, forces: ContactForces, gap: Array, body: _UnderStresses) -> None:
+        self._forces, self._gap, self.sunk = forces, gap, body.sunk
+        self.directions = 3 if isinstance(forces, FrictionalForces) else 1
+        self.closure: Array = np.zeros_like(gap)
+        self._by_slip: Array = np.zeros((len(gap), 2, 2))
+
+    def pressures(self, moved: Array) -> Array:
+        """Return the pressures in gaps that are wider by so much."""
         forces = self._forces
-        if self._sliders is not None and self._memory is not None:
-            self._sliders.memory = self._memory
-        forces.gap = self._gap + moved + self._wider
-        state = self._solve_body(self._control)
-        self._sunk = forces.levers.matrix @ forces.plane - forces.gap - state.sample_closure
-        self._found.append(state)
-        return state.sample_pressure
+        forces.gap = self._gap + moved
+        self.closure = forces.closure_of(np.zeros_like(moved))
+        self._stiffness = forces.stiffness(self.closure)
+        forces.linearise(self._stiffness)
+        self._pressure = forces.pressure(self.closure)
+        return self._pressure
 
-    def held(self, moved: Array) -> Array:
-        """Return the pressures on the body as it is displaced now."""
-        forces = self._forces
-        forces.gap = self._gap + moved + self._wider
-        closure = forces.closure_of(self._sunk)
-        forces.linearise(forces.stiffness(closure))
-        return forces.pressure(closure)
+    def changes(self, way: Array) -> Array:
+        """Return the change of pressures where samples close in, to first order."""
+        return _changes(self._forces, way)
 
-    def closed_in(self, way: Array, tolerance: float) -> Array:
-        """Return the change of pressures where samples close in."""
-        change, iterations = self._response.closed_in(way, tolerance)
-        self._iterations += iterations
-        return change
+    def stresses(self, moved: Array) -> Array:
+        """Return the shear stresses; all stick where no shift makes the prescribed force yet."""
+        sliders = self._sliders
+        at = self.closure, moved, self._pressure, self._stiffness
+        try:
+            found = sliders.respond(*at)
+        except NotConverged:
+            found = sliders.respond(*at, sticks=True)
+        self._by_slip = found.by_slip
+        return found.stress
 
-    def alone(self, way: Array, softer: float = 0.0) -> Array:
-        """Return that on a rigid body, or on a local compliance."""
-        forces, weight = self._forces, self._forces.weight
-        stiffness = forces.normal_slope * weight
-        stiffness = stiffness / (1.0 + softer * stiffness)
-        border = forces.border(stiffness)
-        change = stiffness * way
-        if border.shape[1]:
-            change -= border @ forces.levers.summed(border.T @ (weight * way))
+    def stress_changes(self, way: Array) -> Array:
+        """Return the change of stresses where samples slip on, the plane shifting where free."""
+        sliders = self._sliders
+        change = np.einsum("nij,nj->ni", self._by_slip, way)
+        if sliders.shifts:
+            whole = sliders.total(self._by_slip.reshape(-1, 4)).reshape(2, 2)
+            shift = np.linalg.lstsq(whole, sliders.total(change), rcond=_UNSUPPORTED)[0]
+            change -= self._by_slip @ shift
         return np.asarray(change)
+
+    @property
+    def _sliders(self) -> FaceSliders:
+        sliders = sliders_of(self._forces)
+        assert sliders is not None
+        return sliders
+
+
+class _Linearised:
+    """The change of a contact to first order, as a contact of its own.
+
+    Args:
+        equilibrium: The equations of the body with the laws, whose forces are linearised.
+        sampling: The samples.
+        way: What samples close in by, shape (n,) [mm].
+        slip: What they slip by, shape (n, 2) [mm]; None: shear stresses stay.
+        stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
+
+    Attributes:
+        body: Displacements of the body.
+        pressure: The latest changes of pressures, shape (n,) [MPa].
+        stress: The latest changes of shear stresses, shape (n, 2) [MPa].
+    """
+
+    def __init__(
+        self,
+        equilibrium: Equilibrium,
+        sampling: Sampling,
+        way: Array,
+        slip: Array | None = None,
+        stuck: Array | None = None,
+    ) -> None:
+        self._forces, self._way, self._slip = equilibrium.forces, way, slip
+        self._stuck = np.zeros((len(way), 1)) if stuck is None else stuck[:, None]
+        self.directions = 1 if slip is None else 3
+        self.body = _UnderStresses(equilibrium, sampling)
+        self.pressure: Array = np.zeros_like(way)
+        self.stress: Array = np.zeros((len(way), 2))
+
+    def pressures(self, moved: Array) -> Array:
+        """Return the changes of pressures in gaps that are wider by so much."""
+        self.pressure = _changes(self._forces, self._way - moved)
+        return self.pressure
+
+    def changes(self, way: Array) -> Array:
+        """Return the change of these where samples close in."""
+        return _changes(self._forces, way)
+
+    def stresses(self, moved: Array) -> Array:
+        """Return the changes of shear stresses where slip is less by so much."""
+        self.stress = self._stuck * (self._slip - moved)
+        return self.stress
+
+    def stress_changes(self, way: Array) -> Array:
+        """Return the change of these where samples slip on."""
+        return np.asarray(self._stuck * way)
+
+    def sunk(self, pressure: Array, stress: Array | None) -> Array:
+        """Return the displacements of the body."""
+        return self.body.sunk(pressure, stress)
+
+
+def _changes(forces: ContactForces, way: Array) -> Array:
+    """Return the change of pressures where samples close in on a rigid body, (n,) [MPa]."""
+    stiffness = forces.normal_slope * forces.weight
+    border = forces.border(stiffness)
+    change = stiffness * way
+    if border.shape[1]:
+        change -= border @ forces.levers.summed(border.T @ (forces.weight * way))
+    return np.asarray(change)

@@ -10,20 +10,17 @@ from typing import NamedTuple
 import numpy as np
 
 from macro import compat
+from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_preconditioner import ContactPreconditioner
 from macro.contact.equations import Equilibrium
 from macro.contact.frictional_forces import FrictionalForces
 from macro.contact.newton import Newton
-from macro.contact.opposite_half_space import Contact, OppositeHalfSpace
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.solvers import solve_linear
 from support.arrays import Array
 
 _LINEAR = 1e-9
 """Relative residual of the response to the approach."""
-
-_RESPONSE = 1e-6
-"""Relative difference of a half-space's displacements in the response."""
 
 _STIFFNESS = 1e-10
 """Relative residual of the tangential stiffness."""
@@ -83,15 +80,11 @@ class ContactResponse:
         self._equilibrium, self._sampling = equilibrium, sampling
         self._preconditioner, self._newton = preconditioner, newton
 
-    def closed_in(self, way: Array, tolerance: float = _LINEAR) -> tuple[Array, int]:
+    def _closed_in(self, way: Array) -> Array:
         """Return the change of pressures where samples close in, shapes (n,), to first order.
 
         Args:
             way: What they close in by [mm].
-            tolerance: Relative residual of the linear solve.
-
-        Returns:
-            The change, and the linear iterations that it took.
         """
         equilibrium, sampling = self._equilibrium, self._sampling
         forces = equilibrium.forces
@@ -101,22 +94,19 @@ class ContactResponse:
         sampling.operator.mult(sampling.values, load)
         solver = self._newton.snes.ksp
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
-        solver.setTolerances(rtol=tolerance)  # Newton's method sets its own for every solve
-        iterations = solve_linear(solver, load, moved)
+        solver.setTolerances(rtol=_LINEAR)  # Newton's method sets its own for every solve
+        solve_linear(solver, load, moved)
         sampling.operator.multTranspose(moved, sampling.values)
         change = risen - forces.pressure_change(sampling.values.array_r.copy())
         compat.collect_garbage(load.comm)
-        return np.asarray(change), iterations
+        return np.asarray(change)
 
-    def to_approach(
-        self, closure: Array, opposite: OppositeHalfSpace | None, contact: Contact
-    ) -> ApproachResponse:
+    def to_approach(self, closure: Array, beside: BesideHalfSpace | None) -> ApproachResponse:
         """Return the response to the approach, under what is prescribed of the plane.
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
-            opposite: The half-space on the other side; None: a rigid plane.
-            contact: Its contact with the body.
+            beside: The body beside a half-space; None: under a rigid plane.
 
         Raises:
             NotConverged: When the linear solve fails.
@@ -124,24 +114,24 @@ class ContactResponse:
         forces, sampling = self._equilibrium.forces, self._sampling
         stiffness = forces.stiffness(closure)
         forces.linearise(stiffness)
-        self._preconditioner.update()
         way = np.ones_like(sampling.weight)
-        change, _ = self.closed_in(way)
-        if opposite is not None:
-            moved = opposite.followed(opposite.under(change), contact, _RESPONSE)
-            change, _ = self.closed_in(way - opposite.at_samples(moved))
+        if beside is None:
+            self._preconditioner.update()
+            change = self._closed_in(way)
+        else:
+            change = beside.closed_in(way)
         closing = np.divide(change, stiffness, out=np.zeros_like(change), where=stiffness > 0.0)
         return ApproachResponse(float(forces.loads(change)[0]), closing, closure, sampling)
 
     def to_shift(
-        self, closure: Array, stuck: Array, opposite: OppositeHalfSpace | None
+        self, closure: Array, stuck: Array, beside: BesideHalfSpace | None
     ) -> tuple[float, int]:
         """Return the derivative of the shear force along the latest change of the shift [N/mm].
 
         Args:
             closure: Closures of this rank's samples at the equilibrium, shape (n,) [mm].
             stuck: Tangential stiffness of what sticks there, shape (n,) [MPa/mm].
-            opposite: The half-space on the other side; None: a rigid plane.
+            beside: The body beside a half-space; None: under a rigid plane.
 
         Returns:
             The derivative, and the linear iterations that it took.
@@ -149,26 +139,27 @@ class ContactResponse:
         Raises:
             NotConverged: When the linear solve fails.
         """
-        equilibrium, forces = self._equilibrium, self._equilibrium.forces
+        forces = self._equilibrium.forces
         assert isinstance(forces, FrictionalForces)
         ahead = forces.sliders.memory.direction
         forces.linearise_sticking(forces.stiffness(closure), stuck)
-        self._preconditioner.update()
+        way = np.broadcast_to(ahead, (len(stuck), 2))
+        if beside is None:
+            self._preconditioner.update()
+            stress, iterations = self._sheared(way, stuck, forces)
+        else:
+            stress, iterations = beside.sheared(way, stuck)
+        return float(forces.sliders.total(stress) @ ahead), iterations
+
+    def _sheared(self, way: Array, stuck: Array, forces: FrictionalForces) -> tuple[Array, int]:
+        """Return the change of shear stresses by slips (n, 2), and the linear iterations."""
+        equilibrium = self._equilibrium
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
-        solver, iterations = self._newton.snes.ksp, 0
+        solver, stress = self._newton.snes.ksp, stuck[:, None] * way
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
         solver.setTolerances(rtol=_STIFFNESS)
-
-        def stresses(way: Array) -> Array:
-            nonlocal iterations
-            stress = stuck[:, None] * way
-            forces.write_stresses(np.zeros(len(stress)), stress, load)
-            iterations += solve_linear(solver, load, moved) if load.norm() else 0
-            return np.asarray(stress - stuck[:, None] * forces.along(moved))
-
-        way = np.broadcast_to(ahead, (len(stuck), 2))
-        if opposite is not None:
-            way = way - opposite.moved_along(lambda part: stresses(way - part))
-        total = float(forces.sliders.total(stresses(way)) @ ahead)
+        forces.write_stresses(np.zeros(len(stress)), stress, load)
+        iterations = solve_linear(solver, load, moved) if load.norm() else 0
+        stress = stress - stuck[:, None] * forces.along(moved)
         compat.collect_garbage(load.comm)
-        return total, iterations
+        return np.asarray(stress), iterations

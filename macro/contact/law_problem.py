@@ -30,7 +30,6 @@ from macro.contact.frictional_forces import FrictionalForces, contact_forces, sl
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
-from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
@@ -90,14 +89,14 @@ class LawContactProblem:
         body, sampling = face.body, self._sampling
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
         self._flat_gap = self._undeformed_gap
-        self._opposite = None
-        if opposite is not None:
-            self._opposite = OppositeHalfSpace(sampling, face.patches.lengths, opposite)
         self._preload: Array | None = None
         self._flat_preload: Array = np.zeros((len(sampling.weight), 2))
         self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
         self._sliders = sliders_of(self.forces)
         self.equilibrium = Equilibrium(body, self.forces)
+        self._beside = None
+        if opposite is not None:
+            self._beside = BesideHalfSpace(face, sampling, self.equilibrium, opposite)
         self._preconditioner = ContactPreconditioner(
             self.equilibrium, face if mode == "pointwise" else None, sampling, body.solver
         )
@@ -134,14 +133,17 @@ class LawContactProblem:
         self._load_bodies(control.body_state)
         if control.tilt is None and control.force:
             control = replace(control, moment=self._face.pull_moments(control.body_state))
-        if self._opposite is None or control.force == 0.0:
+        beside = self._beside
+        if beside is None or control.force == 0.0:
             self.forces.gap = self._flat_gap
             return self._solved(control)
-        return self._beside(control).solve(self._opposite, self._flat_preload)
-
-    def _beside(self, control: Control) -> BesideHalfSpace:
-        """Return a load step beside a half-space."""
-        return BesideHalfSpace(self.forces, self._response, self._solved, control, self._flat_gap)
+        self.forces.prescribe(control, self._plane)
+        state, displacement = beside.solve(control, self._flat_gap)
+        if state.shear is not None:
+            self._stuck = state.shear.stuck
+        self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
+        self.basis.add(displacement, state.sample_pressure)
+        return replace(state, displacement=self._with_preload(state.displacement))
 
     def _solved(self, control: Control) -> FaceEquilibrium:
         """Find the equilibrium in the gap as it is; see `solve`."""
@@ -157,7 +159,7 @@ class LawContactProblem:
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
             self._closure,
-            displacement=solution.array_r + (0.0 if self._preload is None else self._preload),
+            displacement=self._with_preload(solution.array_r.copy()),
             reaction=body.reaction(solution),
             iterations=len(residuals) + report.iterations,
             linear_iterations=started + spent + report.linear_iterations,
@@ -167,6 +169,9 @@ class LawContactProblem:
         )
         compat.collect_garbage(solution.comm)
         return state
+
+    def _with_preload(self, displacement: Array) -> Array:
+        return displacement if self._preload is None else displacement + self._preload
 
     def _accepted(self, solution: PETSc.Vec) -> FaceShear | None:
         """Move sliders on to a solution, and return its shear; None without friction."""
@@ -232,7 +237,7 @@ class LawContactProblem:
         Note:
             Collective; one linear solve, or some against a half-space.
         """
-        return self._response.to_shift(self._closure, self._stuck, self._opposite)
+        return self._response.to_shift(self._closure, self._stuck, self._beside)
 
     def sticking_stiffness(self) -> float:
         """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
@@ -293,8 +298,7 @@ class LawContactProblem:
             Collective; one linear solve, or some against a half-space.
         """
         self.forces.prescribe(self.same_approach(), self._plane)
-        contact = self._beside(self.forces.control)
-        return self._response.to_approach(self._closure, self._opposite, contact)
+        return self._response.to_approach(self._closure, self._beside)
 
     def _load_bodies(self, state: float) -> None:
         """Let the bodies take the displacements of their other loads, and the gap with them."""

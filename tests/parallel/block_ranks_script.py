@@ -95,6 +95,16 @@ def shear_beside_half_space():
     return [state.force, *state.shear.force, state.shear.dissipated, stiffness]
 
 
+def pressed_on_soft_half_space():
+    """Press a block on a half-space 10³ times softer than it, with a force and a free tilt."""
+    block = block_of(comm=COMM, element="Q1", cells=(3, 3, 2))
+    face = LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
+    soft = Material(young_modulus=4.0, poisson_ratio=0.3)
+    pressed = LawContactProblem(face, [Springs(2e4)], "pointwise", opposite=soft)
+    state = pressed.solve(Control(force=0.02, tilt=None))
+    return [state.approach, state.force, pressed.approach_response().stiffness]
+
+
 def tractions_on_mesh():
     """Return norms of the displacements of a cube on a mesh by modes of traction, (3, 3)."""
     mesh = block_mesh(BlockShape(interface=(1.0, 1.0), height=1.0, cells=(3, 3, 3)), COMM)
@@ -176,6 +186,7 @@ if __name__ == "__main__":
     result |= {f"law, {mode}": fail_in_law(mode) for mode in modes}
     result |= {f"plane, {mode}": fail_to_hold(mode) for mode in modes}
     result |= {"newton": fail_to_converge(), "gmsh": fail_in_gmsh()}
-    result |= {"half-space": shear_beside_half_space(), "tractions": tractions_on_mesh()}
+    result |= {"half-space": shear_beside_half_space() + pressed_on_soft_half_space()}
+    result |= {"tractions": tractions_on_mesh()}
     if COMM.rank == 0:
         print(json.dumps(result))

@@ -1,18 +1,18 @@
 """A half-space on the other side of a face with laws: against dense matrices of rectangles."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
 
 from geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
 from macro import LawContactProblem, LoadedFace
-from macro.contact.contact_response import ContactResponse
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
 from micro.friction.goodman import CrossCompliance
 from micro.friction.tangential_grid import cerruti_kernels
-from support.errors import NotConverged
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
 NU = 0.3
@@ -42,26 +42,40 @@ def face_of(cells, modulus=1e9):
     return LoadedFace.of_regions(block, (top_facets(block.mesh),), (1.0, 1.0))
 
 
-def pressed(face, stiffness, control, opposite=COMPLIANCE):
+def pressed(face, stiffness, control, opposite=COMPLIANCE, law=None):
     other = half_space_of(opposite) if opposite else None
-    problem = LawContactProblem(face, [Line(stiffness)], "pointwise", opposite=other)
+    problem = LawContactProblem(face, [law or Line(stiffness)], "pointwise", opposite=other)
     return problem, problem.solve(control)
 
 
 def test_uniform_pressure_moves_a_square_as_love_says():
     sampling = face_of(16).pointwise
-    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE))
-    moved = half_space.at_samples(half_space.under(np.full(len(sampling.weight), 5.0)))
+    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE), 0.0)
+    moved = half_space.at_samples(
+        half_space.moved(half_space.spread(np.full(len(sampling.weight), 5.0)))
+    )
     mean = sampling.weight @ moved / sampling.weight.sum()
     assert mean == pytest.approx(0.9464 * 5.0 * COMPLIANCE, rel=3e-3)  # of 38 squares a side
 
 
 def test_its_compliance_is_symmetric():
+    """Its three directions together: by pressures and by shear stresses, and across."""
     sampling, rng = face_of(5).pointwise, np.random.default_rng(2)
-    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE))
-    one, other = rng.random((2, len(sampling.weight)))
+    half_space = OppositeHalfSpace(sampling, (1.0, 1.0), half_space_of(COMPLIANCE), 0.0)
+
+    def moved(stress):
+        forces = half_space.spread(stress)
+        along = half_space.moved_along(forces[1:])
+        own = np.concatenate([half_space.moved(forces[0])[None], along])
+        across = half_space.across(forces[0], forces[1:])
+        across[0] *= -1.0  # the half-space bears the opposite of stresses along the face
+        own[1:] *= -1.0
+        return half_space.at_samples(own + across)
+
+    one, other = rng.random((2, len(sampling.weight), 3))
+    signs = np.array([1.0, -1.0, -1.0])
     works = [
-        sampling.weight * left @ half_space.at_samples(half_space.under(right))
+        float(np.sum(sampling.weight[:, None] * left * signs * moved(right * np.array([1, 1, 1]))))
         for left, right in ((one, other), (other, one))
     ]
     assert works[0] == pytest.approx(works[1], rel=1e-12)
@@ -102,6 +116,57 @@ def test_a_soft_half_space_opens_the_middle_of_the_face():
     assert state.sample_pressure.max() > 3.0 * state.force  # of a flat punch, at its corners
 
 
+def punch_on_springs(compliance, stiffness, n=32):
+    """Return the force of a rigid square on springs on a half-space, by an active set."""
+    patches = PatchGrid(grid=(n, n), lengths=(1.0, 1.0))
+    matrix = influence_matrix(patches) * compliance / np.pi + np.eye(n * n) / stiffness
+    loaded = np.ones(n * n, bool)
+    while True:
+        pressure = np.zeros(n * n)
+        pressure[loaded] = np.linalg.solve(
+            matrix[np.ix_(loaded, loaded)], np.full(loaded.sum(), APPROACH)
+        )
+        now = (pressure > 0.0) | (~loaded & (matrix @ pressure < APPROACH))
+        if np.array_equal(now, loaded):
+            return pressure.mean()
+        loaded = now
+
+
+def test_a_flat_punch_on_a_half_space_that_is_far_softer_than_springs():
+    """Springs are 5·10⁴ times as stiff as the half-space: a rigid punch."""
+    expected = punch_on_springs(5e-3, 1e7)
+    assert expected == pytest.approx(1.15 * APPROACH / 5e-3, rel=0.01)  # E* L δ / 0.868 of a square
+    errors = [
+        pressed(face_of(cells), 1e7, Control(approach=APPROACH), opposite=5e-3)[1].force / expected
+        - 1
+        for cells in (4, 8)
+    ]
+    assert 0.0 < errors[1] < 0.6 * errors[0]  # squares of the border reach beyond the face
+    assert errors[1] < 0.05
+
+
+RATIOS = {1e-4: 0.134014784, 1e-2: 13.121229, 1.0: 521.210092, 1e2: 909.79741, 1e4: 916.844654}
+"""Forces on steep springs by moduli of the half-space over that of the body. From 1e-2 on they were
+found by Newton's method on the displacements of the half-space, with up to 260 responses of the
+body and 30 of its load steps; on a softer one it failed."""
+
+
+@pytest.mark.parametrize("ratio", RATIOS)
+def test_a_body_is_solved_for_a_few_times_whatever_the_moduli(ratio):
+    face, opposite = face_of(6, modulus=1e5), (1.0 - NU**2) / (1e5 * ratio)
+    problem, state = pressed(face, 1e6, Control(approach=APPROACH), opposite=opposite)
+    assert state.force == pytest.approx(RATIOS[ratio], rel=1e-7)
+    assert state.iterations <= 16
+    assert state.linear_iterations <= 5 * state.iterations  # each corrects the one before
+    slope = problem.approach_response().stiffness
+    step = problem.solve(Control(approach=APPROACH * (1.0 + 1e-4)))
+    assert step.iterations <= 16
+    assert (step.force - state.force) / (1e-4 * APPROACH) == pytest.approx(slope, rel=1e-3)
+    _, again = pressed(face, 1e6, Control(force=state.force, tilt=None), opposite=opposite)
+    assert again.approach == pytest.approx(APPROACH, rel=5e-4)  # the free plane turns by 2e-4
+    assert again.iterations <= 16
+
+
 class Explosive:
     """A law that leaves all numbers behind at the closures of a first guess."""
 
@@ -112,30 +177,13 @@ class Explosive:
         return np.where(closure > 0.0, 25.0 * np.exp(np.clip(closure / 4e-4, 0.0, 200.0)), 0.0)
 
 
-def test_numbers_out_of_all_proportion_end_as_other_failures_do():
-    face, other = face_of(4, modulus=2e5), half_space_of(5e-3)
-    problem = LawContactProblem(face, [Explosive()], "pointwise", opposite=other)
-    with np.errstate(over="ignore", invalid="ignore"):
-        with pytest.raises(NotConverged, match=r"the half-space at approach 0\.05 mm"):
-            problem.solve(Control(approach=0.05))
-
-
-def test_a_stiff_body_is_solved_a_few_times_alone(monkeypatch):
-    """The half-space settles on the body as it is: Newton's method needs no responses of it."""
-    responses = []
-    whole = ContactResponse.closed_in
-
-    def counted(response, *arguments):
-        responses.append(whole(response, *arguments)[1])
-        return whole(response, *arguments)
-
-    monkeypatch.setattr(ContactResponse, "closed_in", counted)
-    for control in (Control(approach=APPROACH), Control(force=2.0, tilt=None)):
-        _, state = pressed(face_of(6, modulus=1e6), 5e3, control)
-        assert not responses
-        assert state.iterations <= 12
-    _, soft = pressed(face_of(6, modulus=1e2), 5e3, Control(approach=APPROACH))
-    assert soft.linear_iterations > sum(responses) > 0  # which are counted
+def test_a_law_that_leaves_all_numbers_behind_is_a_rigid_punch_less_its_closure():
+    face = face_of(4, modulus=2e5)
+    _, state = pressed(face, None, Control(approach=0.05), opposite=5e-3, law=Explosive())
+    closure = float(state.sample_closure.mean())
+    rigid = pressed(face, 1e7, Control(approach=0.05 - closure), opposite=5e-3)[1].force
+    assert state.force == pytest.approx(rigid, rel=0.01)  # closures vary by a third of the mean
+    assert state.iterations <= 10
 
 
 # --- with friction
@@ -161,16 +209,16 @@ def rubbed(face, control, *, opposite=COMPLIANCE, nu=NU, friction=10.0):
     return state, problem.tangential_stiffness()[0]
 
 
-def rigid_square_on_springs(nu, n=24):
+def rigid_square_on_springs(nu, compliance, n=24):
     """Return normal and shear force of a rigid square on springs on a half-space, by squares.
 
     Pressures and tractions in turn until they agree, each by a dense matrix.
     """
-    material = Material(young_modulus=(1.0 - nu**2) / COMPLIANCE, poisson_ratio=nu)
+    material = Material(young_modulus=(1.0 - nu**2) / compliance, poisson_ratio=nu)
     pair, spacing = MaterialPair(first=material), (1.0 / n, 1.0 / n)
     patches = PatchGrid(grid=(n, n), lengths=(1.0, 1.0))
-    normal = influence_matrix(patches) * COMPLIANCE / np.pi + np.eye(n * n) / STIFF
-    kernels = cerruti_kernels((n, n), spacing, nu) * COMPLIANCE
+    normal = influence_matrix(patches) * compliance / np.pi + np.eye(n * n) / STIFF
+    kernels = cerruti_kernels((n, n), spacing, nu) * compliance
     i, j = (index.ravel() for index in np.indices((n, n)))
     di, dj = (np.subtract.outer(one, one) for one in (i, j))
     xx, yy, xy = (kernel[np.abs(di), np.abs(dj)] for kernel in kernels)
@@ -187,18 +235,34 @@ def rigid_square_on_springs(nu, n=24):
     return pressure.mean(), traction[0].mean()
 
 
-@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
-def test_a_rigid_body_shears_a_half_space_as_dense_matrices_say(nu):
+@pytest.mark.parametrize(("nu", "opposite"), [(0.0, 1e-3), (0.3, 1e-3), (0.49, 1e-3), (0.3, 0.02)])
+def test_a_rigid_body_shears_a_half_space_as_dense_matrices_say(nu, opposite):
     control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
-    state, stiffness = rubbed(face_of(8), control, nu=nu)
-    force, shear = rigid_square_on_springs(nu)
-    assert state.force == pytest.approx(force, rel=3e-3)  # of 8 linear cells a side
-    assert state.shear.force[0] == pytest.approx(shear, rel=3e-3)
+    state, stiffness = rubbed(face_of(8), control, nu=nu, opposite=opposite)
+    force, shear = rigid_square_on_springs(nu, opposite)
+    allowed = 3e-3 if opposite == COMPLIANCE else 0.02  # of 8 linear cells a side, and its edges
+    assert state.force == pytest.approx(force, rel=allowed)
+    assert state.shear.force[0] == pytest.approx(shear, rel=allowed)
     assert state.shear.force[1] == pytest.approx(0.0, abs=1e-4 * shear)
-    # everything sticks; the stiffness leaves out that shear lifts the half-space, 0.2 % at ν = 0
+    # everything sticks
     assert stiffness == pytest.approx(state.shear.force[0] / SHIFT, rel=3e-3)
     _, rigid = rubbed(face_of(8), control, opposite=None)
     assert stiffness < 0.9 * rigid
+
+
+@pytest.mark.parametrize("ratio", [1e-3, 1.0, 1e3])
+def test_with_friction_too_a_body_is_solved_for_a_few_times(ratio):
+    """The sum of both load steps; 341 Newton steps for the second one at 0.01 before."""
+    opposite, control = (1.0 - NU**2) / (STIFF * 10.0 * ratio), Control(approach=APPROACH)
+    face = face_of(4, modulus=STIFF * 10.0)
+    state, _ = rubbed(
+        face,
+        replace(control, shear=ShearControl(shift=(SHIFT, 0.0))),
+        opposite=opposite,
+        friction=0.3,
+    )
+    assert 0.0 < state.shear.force[0] < 0.3 * state.force
+    assert state.iterations <= 12
 
 
 def test_a_shear_force_finds_the_shift_that_makes_it_and_sliding_is_the_coefficient():
