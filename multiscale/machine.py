@@ -30,6 +30,21 @@ _LAUNCHED = re.compile("RANK|PMI|PROCID|ALPS_APP_PE")
 """Parts of the variables by which every launcher tells a process which of its ranks it is."""
 
 
+def share_petsc_options(comm: Any) -> None:
+    """Give all processes the PETSc options of the first one, as PETSc does when it starts.
+
+    Launchers do not send the environment to other nodes, and what is computed depends on options.
+
+    Args:
+        comm: MPI communicator; None for this process alone.
+
+    Note:
+        Collective.
+    """
+    if comm is not None:
+        os.environ["PETSC_OPTIONS"] = comm.bcast(os.environ.get("PETSC_OPTIONS", ""))
+
+
 def keep_petsc_from_signals() -> None:
     """Keep PETSc from handling SIGHUP and SIGTERM, which end a run in time.
 

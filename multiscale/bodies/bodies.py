@@ -10,6 +10,7 @@ Theory: docs/theory.md, section 11.
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -41,7 +42,13 @@ of length nor the number of ranks changes a result. It costs a tenth more than 1
 
 
 def solver_options_given() -> bool:
-    """Tell whether the user set options of PETSc's solver; before PETSc starts there are none."""
+    """Tell whether the user set options of PETSc's solver: behind ``--`` or in ``PETSC_OPTIONS``.
+
+    PETSc has the options behind ``--`` once it has started, and takes those of the environment when
+    it does.
+    """
+    if any(word.startswith("-patchlaw_") for word in os.environ.get("PETSC_OPTIONS", "").split()):
+        return True
     if "petsc4py.PETSc" not in sys.modules:
         return False
     from macro.linear_solvers.options import users_options

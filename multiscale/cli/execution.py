@@ -17,6 +17,7 @@ from multiscale.machine import (
     check_address_space,
     keep_petsc_from_signals,
     refuse_detached_processes,
+    share_petsc_options,
     world,
 )
 from support.collective import on_root
@@ -57,6 +58,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
         quiet = quietly(getattr(choice, "quiet", False))
         with ended_if_told(), optional_packages(), quiet:
             command = getattr(import_module(f"multiscale.cli.{module}"), function)
+            share_petsc_options(comm)
             command(choice, _start_petsc(options), comm)
     except PatchlawError as error:
         together = _all_arrive(meeting)

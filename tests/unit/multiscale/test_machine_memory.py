@@ -89,7 +89,8 @@ def test_a_block_of_many_nodes_is_let_through_there():
     check_memory(given, of(4))
     text = (
         "block.cells = [500, 500, 200]: needs about 250 GB of memory (allowed: what fits into "
-        "one node of 64 GB; 4 such nodes would do, filled evenly by mpirun over several hosts)"
+        "one node of 64 GB; 4 such nodes would do, filled evenly by mpirun over several hosts; or "
+        "coupling.newton = 'condensed', which needs 16 GB)"
     )
     with pytest.raises(InputError, match=re.escape(text)):
         check_memory(given, of(1))
@@ -285,3 +286,41 @@ def test_files_read_in_parts_burden_no_single_rank():
 def test_earlier_states_are_kept_up_to_a_number():
     one, many, more = (body_request("body", "Q1", 1000, steps).total for steps in (1, 32, 500))
     assert one < many == more
+
+
+PLAIN = ("coupling.kind=isolated", *LARGE)
+
+
+def test_a_block_without_a_mesh_asks_for_what_its_solver_takes():
+    condensed = scene(*PLAIN, "coupling.newton=condensed")
+    sizes = {request.key: request.total for request in requests(condensed)}
+    assert sizes["block.cells"] == 320.0 * 500 * 500 * 200
+    check_memory(condensed, of(1))
+    with pytest.raises(
+        InputError, match=r"250 GB .* or coupling\.newton = 'condensed', which needs 16 GB"
+    ):
+        check_memory(scene(*PLAIN), of(1))
+    for more in ("coupling.newton=full", "block.element=P1", "output.fields=true"):
+        sizes = {request.key: request.total for request in requests(scene(*PLAIN, more))}
+        assert sizes["block.cells"] == 5000.0 * 500 * 500 * 200
+
+
+def test_what_a_block_without_a_mesh_takes_was_measured():
+    """Peak memory in a process of its own, in which nothing else is large."""
+    lines = (
+        "import re, numpy as np",
+        "from geometry import Material, PatchGrid",
+        "from geometry.meshes.block import BlockShape",
+        "from macro.compliance.lattice_patches import lattice_compliance",
+        "status = lambda: open('/proc/self/status').read()",
+        "peak = lambda: 1024 * int(re.search(r'VmHWM:\\s*(\\d+)', status())[1])",
+        "shape = BlockShape(interface=(1.0, 1.0), height=0.6, cells=(56, 56, 32))",
+        "patches = PatchGrid(grid=(4, 4), lengths=(1.0, 1.0))",
+        "material, before = Material(young_modulus=4e3, poisson_ratio=0.3), peak()",
+        "lattice_compliance(shape, material, 'free', patches, np.arange(16), None)",
+        "print((peak() - before) / (56 * 56 * 32))",
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines)], capture_output=True, text=True, check=True
+    )
+    assert 50.0 < float(done.stdout) < 320.0

@@ -1,6 +1,7 @@
 """PETSc options behind ``--``, in processes of their own: PETSc takes options once."""
 
 import csv
+import os
 import subprocess
 import sys
 
@@ -14,7 +15,7 @@ SMALL = [
 
 @pytest.fixture
 def patchlaw(root, tmp_path):
-    def run(*options):
+    def run(*options, environment=None, settings=()):
         words = [
             "run",
             "demos/scenes/paper.toml",
@@ -22,12 +23,14 @@ def patchlaw(root, tmp_path):
             tmp_path,
             "--set",
             *SMALL,
+            *settings,
             "--",
             *options,
         ]
         return subprocess.run(
             [sys.executable, "-m", "patchlaw", *map(str, words)],
             cwd=root,
+            env={**os.environ, **(environment or {})},
             capture_output=True,
             text=True,
             check=False,
@@ -51,6 +54,30 @@ def test_options_reach_the_solver_and_a_misspelt_one_is_named(patchlaw, tmp_path
     assert patchlaw("-patchlaw_ksp_rtol", "1e-2").returncode == 0
     loose = [int(row["linear_iterations"]) for row in history(tmp_path)]
     assert tight[-1] > 1.5 * loose[-1], (tight, loose)
+
+
+ISOLATED = ["coupling.kind=isolated"]
+
+
+def test_options_in_the_environment_take_the_mesh_as_those_behind_dashes_do(patchlaw, tmp_path):
+    found = []
+    for options, variable in (
+        ((), ""),
+        ((), "-patchlaw_ksp_rtol 1e-4"),
+        (("-ksp_rtol", "1e-4"), ""),
+    ):
+        done = patchlaw(*options, environment={"PETSC_OPTIONS": variable}, settings=ISOLATED)
+        assert done.returncode == 0, done.stderr
+        found.append([int(row["linear_iterations"]) for row in history(tmp_path)])
+    alone, environment, dashes = found
+    assert environment == dashes
+    assert min(environment) > 2 * max(alone)  # of the compliance, which needs no mesh
+
+
+def test_a_log_of_petsc_is_printed(patchlaw):
+    done = patchlaw("-log_view", settings=[*ISOLATED, "coupling.newton=full"])
+    assert done.returncode == 0, done.stderr
+    assert {"MatMult", "KSPSolve", "PCApply"} <= set(done.stdout.split())
 
 
 def test_impossible_option_is_wrong_input_and_leaves_nothing(patchlaw, tmp_path):
