@@ -257,7 +257,8 @@ class _Linearised:
         slip: Array | None = None,
         stuck: Array | None = None,
     ) -> None:
-        self._forces, self._way, self._slip = equilibrium.forces, way, slip
+        self._forces, self._way = equilibrium.forces, way
+        self._slip = np.zeros((len(way), 2)) if slip is None else slip
         self._stuck = np.zeros((len(way), 1)) if stuck is None else stuck[:, None]
         self.directions = 1 if slip is None else 3
         self.body = _UnderStresses(equilibrium, sampling)

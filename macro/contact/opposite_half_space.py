@@ -162,7 +162,7 @@ class OppositeHalfSpace:
         wider = -self._convolved(along, pulls[None])
         return np.concatenate([wider, self._convolved(forces[None], pulls[:, None])])
 
-    def _convolved(self, forces: Array, transforms: Array) -> Array:
+    def _convolved(self, forces: Array, transforms: NDArray[np.complex128]) -> Array:
         """Return displacements by forces, of k directions where there are (l, k) kernels.
 
         Args:
