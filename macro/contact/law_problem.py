@@ -142,7 +142,7 @@ class LawContactProblem:
         if state.shear is not None:
             self._stuck = state.shear.stuck
         self._closure, self._plane = state.sample_closure, self.forces.plane.copy()
-        self.basis.add(displacement, state.sample_pressure)
+        self.basis.add(displacement, state.sample_pressure, self.forces.last_shear)
         return replace(state, displacement=self._with_preload(state.displacement))
 
     def _solved(self, control: Control) -> FaceEquilibrium:
