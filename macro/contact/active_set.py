@@ -151,7 +151,7 @@ class PrimalDualActiveSet:
         None when a load acts along a motion that they do not resist.
         """
         motions = self._plane.supported_motions(now.control.free, now.active)
-        loads = now.control.loads[now.control.free]
+        loads = (now.control.loads * self._plane.levers.unit)[now.control.free]
         borne = motions @ np.linalg.lstsq(motions, loads, rcond=None)[0]
         lost = np.abs(loads - borne).max(initial=0.0)
         return None if lost > self._tolerance * (now.control.force or 0.0) else motions
@@ -173,7 +173,8 @@ class PrimalDualActiveSet:
         if not self._count(now.active):
             return 0, 0.0
         free, levers = now.control.free, self._plane.levers
-        dofs, loads = self._top.dofs[now.active], supported.T @ now.control.loads[free]
+        loads = supported.T @ (now.control.loads * levers.unit)[free]
+        dofs = self._top.dofs[now.active]
         motions = levers.scaled(free)[now.active] @ supported
         before = now.displacement.array_r[dofs].copy()
         residual = self._residual.copy()

@@ -380,7 +380,7 @@ class HalfSpaceModel:
             compliance=self.compliance,
             spacing=surface.spacing,
             interference=interference,
-            motions=Motions.of_plane(x, y, free, loads / (modulus * cell)),
+            motions=Motions.of_plane(x, y, free, loads * unit / (modulus * cell)),
             tolerance=self.tolerance,
             bound=self._bound,
         )

@@ -64,6 +64,15 @@ def test_no_point_interferes_and_none_is_pulled(element):
     np.testing.assert_allclose(state.moment, 0.0, atol=1e-8)
 
 
+@pytest.mark.parametrize("method", ["active-set", "augmented-lagrangian"])
+def test_a_plane_that_turns_bears_the_prescribed_moment(method):
+    found = problem(replace(SHAPE, cells=(8, 8, 2), element="Q1"), method)
+    moment = (2.0, -1.2)
+    state = found.solve(Control(force=30.0, tilt=None, moment=moment))
+    assert state.force == pytest.approx(30.0, rel=1e-9)
+    np.testing.assert_allclose(state.moment, moment, atol=1e-7)
+
+
 @pytest.mark.parametrize("element", ["Q1", "P1"])
 def test_no_point_presses_across_a_gap(element):
     shape = replace(SHAPE, height=1.0, cells=(8, 8, 4), grading=1.0, element=element)

@@ -78,6 +78,13 @@ def test_free_plane_has_no_moment(model, share):
     assert there.force == pytest.approx(force, rel=1e-6)  # the residual of the half-space
 
 
+def test_a_plane_that_turns_bears_the_prescribed_moment(model):
+    force = press(model).force
+    moment = 0.1 * HALF * force * np.array([1.0, -0.6])
+    found = press(model, force=force, tilt=None, moment=tuple(moment))
+    assert found.moment == pytest.approx(moment, rel=1e-7)
+
+
 def test_plane_turns_under_a_given_approach(model):
     found = press(model, approach=APPROACH, tilt=None)
     assert found.plane.approach == APPROACH
