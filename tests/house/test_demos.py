@@ -10,7 +10,7 @@ import pytest
 DEMOS = sorted((Path(__file__).parents[2] / "demos").glob("*.py"))
 
 
-QUICK = {"four_models", "own_problem", "paper_figures"}
+QUICK = {"four_models"}
 """Demos that take seconds; the others are among the long tests."""
 SLOW = {"compare"}
 """Demos that take minutes even in reduced size: some forty processes, each with its own imports."""
