@@ -39,7 +39,7 @@ def sections(folder):
     sample = {"surface": {**SURFACE, "lengths": [0.1, 0.1]}, "law": {"kind": "representative"}}
     load = {"load": {"force": "2 N", "steps": 1, "tilt": "free"}}
     yield "sample", {**sample, **load, "body": body, "output": QUIET}
-    shear = {"shear": [["0.3 um", "0.1 um"], ["-0.3 um", "0 um"]], "shear_steps": 1}
+    shear = {"shear": [["0.3 um", "0.1 um"]], "shear_steps": 1}
     rubbed = {"load": load["load"] | shear, "friction": {"coefficient": 0.3}}
     measured = QUIET | {"check": "last"}
     yield "friction", {**sample, **rubbed, "body": body, "output": measured}
