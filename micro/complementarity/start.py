@@ -42,11 +42,14 @@ def admissible_start(problem: CellProblem, pressure: Array) -> tuple[Array, Arra
         admissible = problem.admissible(pressure + even if share else pressure)
         if admissible is not None:
             return admissible, np.zeros(problem.motions.count)
+    turns = problem.motions.turns and np.any(problem.motions.loads[1:])
     raise NotConverged(
         "the pressures to start from",
         reason="no pressures within their bounds meet the loads on these cells",
         iterations=0,
-        remedy="give a smaller force",
+        remedy="let the force act within the face, by smaller moments"
+        if turns
+        else "give a smaller force",
     )
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers.along import respond
 
-from geometry import Control, InputError, PatchGrid, Spectrum, patch_means, synthesise
+from geometry import Control, InputError, NotConverged, PatchGrid, Spectrum, patch_means, synthesise
 from micro import MODEL_NAMES, HalfSpaceModel, micro_model, press_along
 
 SPECTRUM = Spectrum(hurst=0.9, waves=(2, 6), rms_slope=0.2, seed=5)
@@ -83,6 +83,12 @@ def test_a_plane_that_turns_bears_the_prescribed_moment(model):
     moment = 0.1 * HALF * force * np.array([1.0, -0.6])
     found = press(model, force=force, tilt=None, moment=tuple(moment))
     assert found.moment == pytest.approx(moment, rel=1e-7)
+
+
+def test_a_force_beside_the_face_is_refused_in_words():
+    model = HalfSpaceModel(SURFACE, contact_modulus=4000.0)
+    with pytest.raises(NotConverged, match="let the force act within the face, by smaller moments"):
+        press(model, force=1.0, tilt=None, moment=(0.51 * SURFACE.lengths[0], 0.0))
 
 
 def test_plane_turns_under_a_given_approach(model):
