@@ -124,9 +124,14 @@ class ActiveSet:
         total, elastic, pressed = np.sum(in_threads(work, parts), axis=0)
         self._energy = float(elastic - 2.0 * pressed)
         if motions.count and total > 0.0:
-            self.motion = np.array([(elastic - pressed) / total])  # mean gap under the pressures
-            if motions.turns or problem.bound.is_finite:
+            if motions.turns or problem.bound.is_finite or self._constrained.size:
                 self.motion = self._closing(pressure)
+            else:  # mean gap under the pressures; gaps differ by less than heights, which round
+                base = gap.flat[np.argmax(pressure)]
+                beyond = in_threads(
+                    lambda rows: float(np.vdot(pressure[rows], gap[rows] - base)), parts
+                )
+                self.motion = np.array([base + sum(beyond) / total])
         largest = np.max(in_threads(extremes, parts), axis=0)
         self.scale = float(largest[0])
         if self.scale <= 0.0 and total > 0.0:  # clear of all cells, and yet loaded
