@@ -35,7 +35,7 @@ def said(place):
     """
     short = " --set load.steps=1 output.figures=false output.report=false output.check=none"
     return {
-        command: said_by(command + short * command.endswith("mine.toml"), place)
+        command: said_by(command + short * (command == "run results/mine.toml"), place)
         for command in COMMANDS
     }
 
