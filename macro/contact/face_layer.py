@@ -172,6 +172,9 @@ class _Layer:
         self.sampled = self._values.array_r != 0.0
         self._moved.set(0.0)
         self._stiff, self._border = self._alone, np.zeros((0, 0))
+        # entries between two bodies are new; others would only make one more copy of the matrix
+        patterns = PETSc.Mat.Structure
+        self._pattern = patterns.SUBSET if len(parts) == 1 else patterns.DIFFERENT
 
     def step(self, change: Array, stiffness: Array) -> Array:
         """Move the nodes to equilibrium with laws that are lines, and return how samples move.
@@ -188,7 +191,7 @@ class _Layer:
         self._border = forces.border(stiffness)
         springs = springs_at(self._points, stiffness / forces.weight)
         self._stiff = self._alone.copy()
-        self._stiff.axpy(1.0, springs)  # entries between two bodies are new
+        self._stiff.axpy(1.0, springs, self._pattern)
         load, move = self._moved.duplicate(), self._moved.duplicate()
         self._values.array[:] = change
         self._points.multTranspose(self._values, load)
