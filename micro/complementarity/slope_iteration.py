@@ -104,13 +104,16 @@ class AndersonMixing:
         self._last = interference, moved
 
 
-def solve_contact(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+def solve_contact(
+    problem: CellProblem, start: ContactPressures | None, *, same_slopes: bool = False
+) -> ContactPressures:
     """Solve a contact on all cells of a surface, with the displacements by its finite slopes.
 
     Args:
         problem: The contact problem; with the finite slopes of its compliance, if there are any.
         start: A solution nearby, its motion that of the solution where the approach is free; None
             starts from coarser grids.
+        same_slopes: Whether finite slopes add what they add at the start, where that is known.
 
     Raises:
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by
@@ -119,11 +122,20 @@ def solve_contact(problem: CellProblem, start: ContactPressures | None) -> Conta
     compliance = problem.compliance
     if not compliance.slopes:
         return solve_on_surface(problem, start)
+    if same_slopes and start is not None and start.by_slopes is not None:
+        solution = solve_on_surface(_lowered(problem, start.by_slopes), start)
+        return solution._replace(by_slopes=start.by_slopes)
     found = _solved_on_few(problem, start)
     if found is not None and not penetrates_outside(*found):
         return found[2]
     start = start if found is None else found[2]
     return _solved(_SlopeIteration(problem, start, solve_on_surface, compliance.slope_displacement))
+
+
+def _lowered(problem: CellProblem, displaced: Array) -> CellProblem:
+    """Return a problem without finite slopes, the surface lowered by what they displace it."""
+    interference = problem.interference - displaced
+    return replace(problem, interference=interference, lowered=displaced)
 
 
 def _solved_on_few(
@@ -149,8 +161,7 @@ def _solved_on_few(
     pressure = np.zeros(shape)
     pressure[place] = found.pressure
     displaced = compliance.slope_displacement(pressure)
-    lowered = replace(problem, interference=problem.interference - displaced, lowered=displaced)
-    return lowered, place, found._replace(pressure=pressure, by_slopes=displaced)
+    return _lowered(problem, displaced), place, found._replace(pressure=pressure, by_slopes=displaced)
 
 
 def _solved(iteration: _SlopeIteration) -> ContactPressures:
@@ -210,13 +221,8 @@ class _SlopeIteration:
 
     def next_solution(self) -> ContactPressures:
         """Solve the contact with the displacements by slopes as they are, from the last one."""
-        lowered = replace(
-            self._problem,
-            interference=self._problem.interference - self.displaced,
-            lowered=self.displaced,
-            tolerance=self._accuracy,
-        )
-        self._start = self._solve(lowered, self._start)
+        problem = replace(self._problem, tolerance=self._accuracy)
+        self._start = self._solve(_lowered(problem, self.displaced), self._start)
         return self._start
 
     def judged(self, solution: ContactPressures) -> float | None:

@@ -311,6 +311,7 @@ class HalfSpaceModel:
         depth: Array | None,
         displaced: Array | None = None,
         tolerance: float = 0.0,
+        same_slopes: bool = False,
     ) -> tuple[ContactPressures, RigidPlane]:
         """Return the solution of a contact problem without its sums: pressures / E* and the plane.
 
@@ -320,6 +321,7 @@ class HalfSpaceModel:
             depth: Plastic depth of the surface, shape (nx, ny) [mm]; None: none.
             displaced: As for `press`.
             tolerance: Largest residual, where it is larger than the model's.
+            same_slopes: Whether finite slopes add what they add at the start, where that is known.
         """
         motion = control.prescribed(np.zeros(3))
         interference = self.interference(RigidPlane.moved(self.surface, motion), depth)
@@ -335,7 +337,7 @@ class HalfSpaceModel:
             first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         problem = replace(problem, tolerance=max(tolerance, self.tolerance))
         with blas_threads(1):  # all cores are taken by threads of ours
-            solved = solve_contact(problem, first)
+            solved = solve_contact(problem, first, same_slopes=same_slopes)
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
 
