@@ -161,7 +161,8 @@ def _solved_on_few(
     pressure = np.zeros(shape)
     pressure[place] = found.pressure
     displaced = compliance.slope_displacement(pressure)
-    return _lowered(problem, displaced), place, found._replace(pressure=pressure, by_slopes=displaced)
+    found = found._replace(pressure=pressure, by_slopes=displaced)
+    return _lowered(problem, displaced), place, found
 
 
 def _solved(iteration: _SlopeIteration) -> ContactPressures:

@@ -107,7 +107,7 @@ def touches_few_cells(problem: CellProblem) -> bool:
         problem: The contact problem.
     """
     touchable = problem.interference > 0.0
-    return not touchable.any() or not isinstance(place_of(problem, touchable)[0], slice)
+    return not touchable.any() or _are_few(np.count_nonzero(touchable), touchable)
 
 
 def solve_few(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
@@ -138,11 +138,16 @@ def place_of(problem: CellProblem, touchable: Flags) -> Place:
     if deepest := float(depth[touchable].max()):
         deepest = _DEPTHS ** math.ceil(math.log(deepest, _DEPTHS))
     within = touchable | (depth <= deepest)
-    count = np.count_nonzero(within)
-    if count > _MATRIX_CELLS or count**3 > _MATRIX_WORK * touchable[box].size:
+    if not _are_few(np.count_nonzero(within), touchable):
         return box
     row, column = np.nonzero(within)
     return row[:, None], column[:, None]
+
+
+def _are_few(count: int, touchable: Flags) -> bool:
+    """Return whether a matrix of so many cells pays where a box holds those that can touch."""
+    size = touchable[box_around(touchable)].size
+    return count <= _MATRIX_CELLS and count**3 <= _MATRIX_WORK * size
 
 
 def on_place(problem: CellProblem, place: Place) -> CellProblem:

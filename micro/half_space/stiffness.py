@@ -25,7 +25,7 @@ the stiffness over what going back half and twice as far changes it by. On 24 su
 of which half or nearly all that touch yield, the error was 1.5 times that or less on 21 and at most
 twice that. As single cells come and go, it is 10 % in the median where 40 cells yield."""
 _ROUGH = 1e-5
-"""Residual of the solutions there. Stiffnesses then differ by 1.2e-5 at most from those with 1e-9."""
+"""Residual of the solutions there. Stiffnesses differ by 1.2e-5 at most from those with 1e-9."""
 _ROUNDING = 1e-7
 """Plastic depth, relative to the largest interference, that counts as none."""
 
