@@ -160,19 +160,16 @@ class LawErrorProbe:
             response: The contact at the load step.
             widths: Widths of the strips by region, shape (regions,) [mm].
         """
-        from macro.mesh.face_edges import outer_edges
+        from macro.mesh.face_edges import nearest_samples, outer_edges
 
         sampling, pressure = response.sampling, self.state.sample_pressure
-        facets = self.face.sides[0].facets
-        edges, errors = outer_edges(facets, self.face.comm), np.zeros_like(pressure)
-        if len(edges.length):
-            _, nearest = scipy.spatial.cKDTree(np.column_stack([sampling.x, sampling.y])).query(
-                edges.middle
-            )
-            loaded = pressure[nearest] > 0.0
-            at, length = nearest[loaded], edges.length[loaded]
-            carried = widths[sampling.patch[at]] * length * pressure[at] / sampling.weight[at]
-            np.add.at(errors, at, carried)
+        edges = outer_edges(self.face.sides[0].facets, self.face.comm)
+        beside = nearest_samples(edges, sampling.x, sampling.y, self.face.comm)
+        errors = np.zeros_like(pressure)
+        for length, (samples, share) in zip(edges.length, beside, strict=True):
+            at = samples[pressure[samples] > 0.0]
+            carried = widths[sampling.patch[at]] * pressure[at] * length * share
+            errors[at] += carried / sampling.weight[at]
         return errors
 
     # --- elements
