@@ -81,6 +81,7 @@ def test_friction_takes_few_steps_more():
         steps[rubs] = [problem.solve(load).iterations for load in loads]
     shears = [ShearControl(force=(part * 3.0, 0.0)) for part in (0.25, 0.5, 0.75, 0.25)]
     sheared = [problem.solve(Control(force=10.0, shear=shear)).iterations for shear in shears]
-    assert sum(steps[friction]) <= 1.3 * sum(steps[None])
+    assert sum(steps[friction]) <= sum(steps[None]) + 3
+    assert max(steps[None][1:]) <= 2
     assert max(steps[friction][2:]) <= 3
     assert max(sheared) <= 4
