@@ -45,11 +45,13 @@ def share_petsc_options(comm: Any) -> None:
         os.environ["PETSC_OPTIONS"] = comm.bcast(os.environ.get("PETSC_OPTIONS", ""))
 
 
-def keep_petsc_from_signals() -> None:
-    """Keep PETSc from handling SIGHUP and SIGTERM, which end a run in time.
+def keep_libraries_from_signals() -> None:
+    """Keep PETSc and UCX from handling SIGHUP and SIGTERM, which end a run in time.
 
-    Its handlers would end the process with exit code 59. Call this before PETSc is imported.
+    PETSc's handlers would end the process with exit code 59. UCX, by which MPICH communicates,
+    would go on after SIGHUP and print all that it does. Call this before either is loaded.
     """
+    os.environ.setdefault("UCX_DEBUG_SIGNO", "0")
     option, given = "-no_signal_handler", os.environ.get("PETSC_OPTIONS", "")
     if option not in given.split():
         os.environ["PETSC_OPTIONS"] = f"{given} {option}".strip()

@@ -109,9 +109,15 @@ def _with_unit(text: str, unit: str) -> float:
     if quantity.unitless and unit and text.strip():
         raise InputError(f"has no unit{hint}", allowed=allowed)
     try:
-        return float(quantity.to(unit or "dimensionless").magnitude)
+        number, zero = (
+            float(one.to(unit or "dimensionless").magnitude)
+            for one in (quantity, _registry().Quantity(0.0, quantity.units))
+        )
     except Exception as error:
         raise InputError(f"has the wrong unit{hint}", allowed=allowed) from error
+    if zero != 0.0:  # degrees of a scale; whether pint reads them depends on its release
+        raise InputError(f"cannot be read as a quantity{hint}", allowed=allowed)
+    return number
 
 
 def _correction(text: str, target: _Unit) -> str:

@@ -15,7 +15,7 @@ from multiscale.cli.interruption import ended_if_told
 from multiscale.console import quietly
 from multiscale.machine import (
     check_address_space,
-    keep_petsc_from_signals,
+    keep_libraries_from_signals,
     refuse_detached_processes,
     share_petsc_options,
     world,
@@ -42,7 +42,7 @@ def execute(choice: argparse.Namespace | str, options: list[str]) -> int:
     Note:
         Collective over all processes of the MPI job, which starts here.
     """
-    keep_petsc_from_signals()
+    keep_libraries_from_signals()
     try:
         check_address_space()
         comm = world()

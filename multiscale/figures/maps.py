@@ -104,7 +104,7 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     text = fill(label, max(12, int(high / 0.06)))
-    bar.set_label(text, labelpad=1.0 if "\n" in text else 4.0, linespacing=1.0)
+    bar.set_label(text, labelpad=2.5 if "\n" in text else 4.0, linespacing=1.0)
     if high < 1.5:
         bar.locator = MaxNLocator(max(2, int(high / 0.25)), steps=[1, 2, 5, 10])
     return bar

@@ -166,7 +166,7 @@ def draw_bearing_ratio(axes: Any, surface: Surface) -> None:
     unit, heights = _centred(surface)
     axes.plot(share, np.percentile(heights, 100.0 - share), color=BLUE)
     axes.axhline(0.0, color=GREY, lw=0.8, zorder=1)
-    axes.set(xlabel="bearing ratio: share of the surface above [%]", xlim=(0.0, 100.0))
+    axes.set(xlabel="share of the surface above [%]", xlim=(0.0, 100.0))
     axes.set(
         ylabel=f"height over the mean plane [{unit}]", title="bearing ratio (Abbott–Firestone)"
     )

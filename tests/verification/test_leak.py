@@ -160,7 +160,7 @@ def by_finite_elements(gap, parts):
     cells = len(gap) * parts
     ends, kind = [[0.0, 0.0], [1.0, 1.0]], dmesh.CellType.quadrilateral
     mesh = dmesh.create_rectangle(MPI.COMM_SELF, ends, [cells, cells], kind)
-    space, constant = scalar_space(mesh, 1), fem.FunctionSpace(mesh, ("DG", 0))
+    space, constant = scalar_space(mesh, 1), scalar_space(mesh, 0, "DG")
     reached = np.isfinite(gap_flow(gap, (1.0, 1.0)).pressure)
     cube = fem.Function(constant)
     x, y, _ = (np.minimum((one * len(gap)).astype(int), len(gap) - 1) for one in _centres(mesh))

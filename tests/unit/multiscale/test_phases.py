@@ -2,6 +2,7 @@
 
 import itertools
 import time
+from importlib.metadata import PackageNotFoundError, version
 from types import ModuleType
 
 import pytest
@@ -37,10 +38,17 @@ def test_versions_of_libraries_without_an_attribute(monkeypatch):
     odd.version = ModuleType("version")
     odd.version.version = "9.9"
     run = Run(Scene.from_dict(BASE))
+
+    def installed(name):
+        if name == "gmsh":
+            raise PackageNotFoundError(name)
+        return version(name)
+
     for name in LIBRARIES:
         monkeypatch.delitem(sys.modules, name, raising=False)
     monkeypatch.setitem(sys.modules, "numpy", bare)
-    monkeypatch.setitem(sys.modules, "gmsh", odd)
+    monkeypatch.setitem(sys.modules, "gmsh", odd)  # of a packaging without a distribution
+    monkeypatch.setattr("multiscale.output.provenance.version", installed)
     versions = provenance(run, options=[])["versions"]
     assert versions["numpy"][0].isdecimal()  # of the installed distribution
     assert versions["gmsh"] == "9.9"

@@ -145,7 +145,7 @@ def test_elements_of_dolfinx_on_the_same_triangles():
     from macro.compat import assemble_matrix, compile_form, scalar_space
 
     mesh = dmesh.create_rectangle(MPI.COMM_SELF, [[0.0, 0.0], [2.0, 0.6]], [7, 6])
-    space, constant = scalar_space(mesh, 1), fem.VectorFunctionSpace(mesh, ("DG", 0))
+    space, constant = scalar_space(mesh, 1), scalar_space(mesh, 0, "DG", shape=(2,))
     count = mesh.topology.index_map(2).size_local
     corners = mesh.geometry.x[mesh.geometry.dofmap.array.reshape(count, 3), :2]
     values = 10.0 ** np.random.default_rng(2).uniform(-3.0, 0.0, (count, 2))

@@ -55,6 +55,7 @@ def test_a_warning_is_no_failure(monkeypatch, capsys):
 
 def test_a_launcher_that_is_missing_is_a_warning(monkeypatch):
     assert doctor.launcher(None).state == "ok"
+    monkeypatch.setattr(doctor.sys, "prefix", "/nowhere")  # a launcher beside Python is named
     monkeypatch.setattr(doctor.shutil, "which", lambda name: None)
     found = doctor.launcher(None)
     assert (found.state, "no mpirun on PATH" in found.text) == ("warning", True)

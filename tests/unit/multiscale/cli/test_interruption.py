@@ -224,7 +224,7 @@ def test_what_a_compiled_module_prints_of_a_signal_is_not_shown(capsys):
     assert "of somebody else" in capsys.readouterr().err
 
 
-def test_petsc_does_not_take_the_signals(root):
+def test_petsc_and_mpi_do_not_take_the_signals(root):
     done = subprocess.run(
         [sys.executable, "-c", HUNG_UP], cwd=root, capture_output=True, text=True, check=False
     )

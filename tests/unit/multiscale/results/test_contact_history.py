@@ -211,7 +211,7 @@ def test_fields_are_those_of_the_body(fields):
 
 @pytest.mark.parametrize("name", ["fields.xdmf", "fields.h5"])
 def test_fields_that_are_cut_short_are_refused(fields, tmp_path, name):
-    for path in fields[1].glob("fields.*"):
+    for path in (fields[1] / "fields.xdmf", fields[1] / "fields.h5"):
         content = path.read_bytes()
         (tmp_path / path.name).write_bytes(content[: len(content) // (1 + (path.name == name))])
     with pytest.raises(InputError, match=r"fields\.xdmf: cannot be read with fields\.h5 beside it"):
