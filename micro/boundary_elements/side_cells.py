@@ -92,8 +92,6 @@ class _SidePair:
 
     def among(self, rows: Indices, cells: Indices) -> _SidePair:
         """Return the same sides with some of these rows, and some of the cells of each."""
-        if len(rows) == self.means.shape[0] and len(cells) == len(self.place):
-            return self  # and what is cached for it
         means, place = self.means[rows], self.place[cells]
         return _SidePair(means, _transposed(means), self.kernels, place - place[0])
 
@@ -104,12 +102,10 @@ class _SidePair:
 
     def waves_of(self, lines: Array) -> Waves:
         """Return the waves of lines of loads at the nodes by f fields, shape (2 a, f cells)."""
-        cells, last = len(self.place), int(self.place[-1])
+        cells = len(self.place)
         count = lines.shape[1] // cells
-        placed = lines.reshape(-1, cells)
-        if cells <= last:
-            placed = np.zeros((len(lines) * count, last + 1))
-            placed[:, self.place] = lines.reshape(-1, cells)
+        placed = np.zeros((len(lines) * count, self.place[-1] + 1))
+        placed[:, self.place] = lines.reshape(-1, cells)
         waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
         parts = waves.reshape(2, -1, count, len(self.kernels)).transpose(3, 2, 1, 0)
         return np.ascontiguousarray(parts.reshape(len(self.kernels), -1, 2))
@@ -123,39 +119,24 @@ class _SidePair:
         """Return lines of values at the nodes by f fields' waves, shape (2 a, f cells)."""
         parts = waves.reshape(len(self.kernels), count, -1, 2).transpose(3, 2, 1, 0)
         by_side = parts.reshape(-1, len(self.kernels))
-        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)
-        cells, last = len(self.place), int(self.place[-1])
-        lines = lines[:, :cells] if cells == last + 1 else lines[:, self.place]
+        lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
         return lines.reshape(self.means.shape[1], -1)
 
     def between(self, row: Indices, cell: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
-        apart = np.abs(cell[:, None] - cell)
-        if self.means.shape[0] ** 2 * len(self.kernels) <= _LINES:  # for other cells, too
-            return np.asarray(_lines_between(self)[apart, row[:, None], row])
         used, row = np.unique(row, return_inverse=True)
         means = np.asarray(_full(self.means)[used])
+        low, high = np.split(means, 2, axis=1)
         matrix = np.empty((len(row), len(row)))
         step = max(1, _LINES // (len(used) * len(self.kernels)))
         for first in range(0, len(used), step):  # some rows at a time, for the memory
-            lines = self.lines_between(means[first : first + step], means)
+            here = slice(first, first + step)
+            waves = sum(one[here] @ self.kernels @ one.T for one in (low, high))
+            lines = fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)
             some = np.flatnonzero((row >= first) & (row < first + step))
-            matrix[some] = lines[apart[some], row[some][:, None] - first, row]
+            apart = np.abs(cell[some][:, None] - cell)
+            matrix[some] = lines[apart, row[some][:, None] - first, row]
         return matrix
-
-    def lines_between(self, means: Array, others: Array) -> Array:
-        """Return displacements of rows by unit pressures on a cell of other rows.
-
-        Args:
-            means: Means over the rows' cells of values at the nodes, shape (r, 2 a).
-            others: Those over the cells of the other rows, shape (s, 2 a).
-
-        Returns:
-            By the distance along the rows, shape (2 waves − 2, r, s) [mm].
-        """
-        pairs = zip(np.split(means, 2, axis=1), np.split(others, 2, axis=1), strict=True)
-        waves = sum(one @ self.kernels @ other.T for one, other in pairs)
-        return np.asarray(fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0))
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
@@ -177,13 +158,6 @@ class _SidePair:
         for each, one in zip(made, three.transpose(1, 0, 2, 3), strict=True):
             each[:] = _multiplied(kernels, np.ascontiguousarray(one))
         return self.on_cells(made.transpose(1, 0, 2, 3).reshape(len(kernels), -1, 2), count)
-
-
-@lru_cache(maxsize=8)
-def _lines_between(pair: _SidePair) -> Array:
-    """Return `_SidePair.lines_between` of all rows, cached: 16 MB at most."""
-    means = _full(pair.means)
-    return pair.lines_between(means, means)
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
