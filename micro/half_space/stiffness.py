@@ -91,7 +91,8 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiff
     if not _yields_anew(model, state, largest):
         value, used = elastic_stiffness(model, state, turns=turns)
         return Stiffness(value if np.isfinite(value) else None, used)
-    tilt, rates, used = None if turns else state.tilt, {}, 0
+    rates: dict[float, float] = {}
+    tilt, used = None if turns else state.tilt, 0
     here = start = replace(state.guess, plastic_depth=state.earlier_depth)
     cell = float(np.prod(model.surface.spacing))
     for part in (1.0, 0.5, 2.0):

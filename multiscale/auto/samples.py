@@ -28,9 +28,9 @@ from multiscale.auto.rule import (
 )
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.representative import RepresentativeCoupling
-from multiscale.law_errors import MOST_CHECKED_UNKNOWNS, OF_LINEAR, OF_QUADRATIC
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import load_steps
+from multiscale.measured_errors.samples import MOST_CHECKED_UNKNOWNS, OF_LINEAR, OF_QUADRATIC
 from multiscale.scene.scene import Scene
 
 MOST_UNKNOWNS = 1_000_000

@@ -1,9 +1,9 @@
 """Resolves auto values by a rule from errors that are measured at the largest load.
 
 What the scene states is kept. The contact problem on the scene's body is solved on coarse cells,
-its errors are measured (`multiscale.measured_errors`), and the cells are refined until the sum of
-the errors keeps the accuracy, the mesh of a body likewise. Where causes other than the cells exceed
-it, and the scene leaves the coupling open, the roughness is meshed, and the meshes of this
+its errors are measured (`multiscale.measured_errors.contact`), and the cells are refined until the
+sum of the errors keeps the accuracy, the mesh of a body likewise. Where causes other than the cells
+exceed it, and the scene leaves the coupling open, the roughness is meshed, and the meshes of this
 reference are refined in the same way. Laws of samples: `multiscale.auto.samples`. Neither clocks
 nor the machine take part: the same scene gets the same values everywhere, or is refused where their
 memory is missing. The rule in words: docs/choosing.md.
@@ -47,7 +47,7 @@ from multiscale.inputs.loads import load_history_on
 from multiscale.inputs.surfaces import make_surface
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stepper import step_count
-from multiscale.measured_errors import ZERO, ErrorProbe
+from multiscale.measured_errors.contact import ZERO, ErrorProbe
 from multiscale.results.accuracy import Decision, relative_error
 from multiscale.scene.scene import Scene
 from support.collective import on_root_alone

@@ -30,9 +30,9 @@ from multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS
 from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
-from multiscale.measured_errors import MOST_CHECKED_CELLS, ErrorProbe, checked
+from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe, checked
+from multiscale.measured_errors.shear import shear_errors, with_shear_errors
 from multiscale.readable import times
-from multiscale.shear_errors import shear_errors, with_shear_errors
 from support.arrays import Array
 from support.collective import on_root_alone
 

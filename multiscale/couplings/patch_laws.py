@@ -27,9 +27,9 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors import checked
+from multiscale.measured_errors.contact import checked
+from multiscale.measured_errors.shear import behind_laws, shear_errors, with_shear_errors
 from multiscale.readable import Detail, Observer, times
-from multiscale.shear_errors import behind_laws, shear_errors, with_shear_errors
 from support.collective import on_root_alone
 
 _CYCLES_PER_PATCH = 11

@@ -22,7 +22,6 @@ from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
-from multiscale.edge_errors import edge_width
 from multiscale.inputs.bodies import BodyFacts, second_material
 from multiscale.inputs.cost import SET_UP_CYCLES, SOLUTIONS_OF_LAWS, Work, check_memory
 from multiscale.inputs.loads import check_load, load_history_on
@@ -34,15 +33,6 @@ from multiscale.inputs.surfaces import (
     region_samples,
     sample_surface,
 )
-from multiscale.law_errors import (
-    CHECKS_OF_SAMPLE,
-    COUPLED_ON_SAMPLE,
-    LawErrorProbe,
-    causes_of,
-    check_cycles,
-    check_requests,
-    omission_notes,
-)
 from multiscale.law_solvers.embedded import ExtendedLaws
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
@@ -51,9 +41,19 @@ from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
-from multiscale.measured_errors import ErrorProbe, with_errors
+from multiscale.measured_errors.contact import ErrorProbe, with_errors
+from multiscale.measured_errors.edges import edge_width
+from multiscale.measured_errors.samples import (
+    CHECKS_OF_SAMPLE,
+    COUPLED_ON_SAMPLE,
+    LawErrorProbe,
+    causes_of,
+    check_cycles,
+    check_requests,
+    omission_notes,
+)
+from multiscale.measured_errors.shear import path_of, with_shear_errors
 from multiscale.readable import Observer, number, times
-from multiscale.shear_errors import path_of, with_shear_errors
 from support.arrays import Array
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
@@ -226,7 +226,7 @@ class RepresentativeCoupling(LawCoupling):
         }
         if self.scene.friction is None:
             return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
-        from multiscale.law_shear_errors import LawShearProbe  # others do without
+        from multiscale.measured_errors.shear_of_samples import LawShearProbe  # others do without
 
         probe = LawShearProbe(
             **known,

@@ -13,10 +13,10 @@ import numpy as np
 
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
+from multiscale.measured_errors.shear import shear_error_notes
 from multiscale.observers.step_observers import ErrorCheck, StepObserver
 from multiscale.readable import Caution, Detail, number, percent, quantity
 from multiscale.results.history import History
-from multiscale.shear_errors import shear_error_notes
 
 _SAME = 1e-9
 """Distance of two shears, relative to the largest, at which a loop counts as closed."""

@@ -23,10 +23,10 @@ import numpy as np
 
 from micro.flow.gap_flow import cell_network
 from multiscale.couplings.coupling import Coupling
-from multiscale.law_errors import mean_error
 from multiscale.laws.transmissivity import CAUSES, Transmissivity
 from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
+from multiscale.measured_errors.samples import mean_error
 from multiscale.observers.leak import LeakObserver
 from support.arrays import Array
 from support.collective import on_root_alone

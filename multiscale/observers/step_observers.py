@@ -18,7 +18,7 @@ from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.energy import energy_notes, with_work, yielding_notes
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors import error_notes
+from multiscale.measured_errors.contact import error_notes
 from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History

@@ -29,7 +29,7 @@ from macro.mesh.from_file import cell_tags, facet_tags
 from macro.mesh.refinement import refined
 from macro.mesh.tagged import planar_face
 from multiscale import Scene
-from multiscale.law_errors import LawErrorProbe
+from multiscale.measured_errors.samples import LawErrorProbe
 
 SHAPES = "feet", "foot", "pad", "ring", "wedge"
 FACES = {"support": 1, "contact": 2, "x": 3, "y": 4}

@@ -10,8 +10,9 @@ The factors were set before they were tried, on bodies drawn at random, against 
 (docs/accuracy.md).
 
 The cells and the finite slopes of samples are judged as those of any contact problem, by
-`multiscale.measured_errors`, at the mean closure of every region. The scatter among samples gives
-the error of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's t.
+`multiscale.measured_errors.contact`, at the mean closure of every region. The scatter among samples
+gives the error of their mean that is not exceeded in 19 of 20 sets of as many samples, by Student's
+t.
 
 Theory: docs/theory.md, section 13.
 """
@@ -36,7 +37,7 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import LEAST_LOAD
 from multiscale.loading.load_step import LoadStep
 from multiscale.machine import MemoryRequest
-from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
 from multiscale.readable import Caution
 from support.arrays import Array
 from support.collective import shared

@@ -30,7 +30,7 @@ from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors import ZERO, ErrorProbe
+from multiscale.measured_errors.contact import ZERO, ErrorProbe
 from multiscale.readable import percent, quantity
 from support.arrays import Array
 

@@ -13,7 +13,7 @@ import pytest
 from geometry.rigid_plane import Control
 from micro import HalfSpaceModel
 from multiscale import Run, Scene, run
-from multiscale.measured_errors import ErrorProbe, MeasuredErrors
+from multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
 from multiscale.output.checkpoint import checkpoint_of
 from multiscale.output.results import write_results, write_tables
 from multiscale.readable import quantity, with_error

@@ -1,8 +1,8 @@
 """Errors of load steps under laws of samples with friction: what the path of a shear has left.
 
 Shear depends on its path. The path is gone once more through its turning points: on the same
-elements, on those that `multiscale.law_errors` compares with, and with laws whose pressures are
-higher by what they may be off.
+elements, on those that `multiscale.measured_errors.samples` compares with, and with laws whose
+pressures are higher by what they may be off.
 
 What the springs of a law leave out is told by the cells of its samples, under the mean closure and
 slip (or shear stress) of their region at every turning point. Pressures and tractions see each
@@ -31,11 +31,11 @@ from geometry.shear_state import ShearControl
 from geometry.sliders import Sliders
 from micro.friction.friction_model import FrictionModel
 from multiscale.inputs.surfaces import RegionSamples
-from multiscale.law_errors import LawErrorProbe, causes_of, separation_of
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.measured_errors import MeasuredErrors
-from multiscale.shear_errors import BY_NORMAL, FEWEST_CELLS, gone, grid_error, resampled
+from multiscale.measured_errors.contact import MeasuredErrors
+from multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
+from multiscale.measured_errors.shear import BY_NORMAL, FEWEST_CELLS, gone, grid_error, resampled
 from support.arrays import Array
 from support.collective import shared
 

@@ -11,8 +11,9 @@ from scipy.stats import norm
 from geometry import BlockShape
 from geometry.rigid_plane import Control
 from macro import LawContactProblem
-from multiscale import Run, Scene, law_errors, run
-from multiscale.law_errors import interpolation_errors, mean_error
+from multiscale import Run, Scene, run
+from multiscale.measured_errors import samples as law_errors
+from multiscale.measured_errors.samples import interpolation_errors, mean_error
 from multiscale.readable import quantity
 from support.errors import InputError
 

@@ -4,8 +4,9 @@ import pytest
 
 from geometry import Material, Spectrum, synthesise
 from micro import HalfSpaceModel
-from multiscale import Scene, edge_errors, run
-from multiscale.edge_errors import edge_width
+from multiscale import Scene, run
+from multiscale.measured_errors import edges as edge_errors
+from multiscale.measured_errors.edges import edge_width
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
 SPECTRUM = {"hurst": 0.8, "waves": [1, 3], "rms_slope": 0.1, "seed": 11}
