@@ -10,7 +10,6 @@ from petsc4py import PETSc
 
 from geometry.materials import Material
 from geometry.rigid_plane import Control
-from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
@@ -69,7 +68,6 @@ class BesideHalfSpace:
             NotConverged: When it is not found.
         """
         forces, body = self._equilibrium.forces, self._body
-        compat.collect_garbage(body.displacement.comm)  # every step and response leaves fields
         body.count()
         contact = _LoadStep(forces, gap, body)
         found = self._half_space.follow(contact, f"the half-space at {control}")
@@ -153,8 +151,8 @@ class _UnderStresses:
         self.solutions, self.iterations = 0, 0
         self.residuals: list[float] = []
 
-    def displacements(self, pressure: Array, stress: Array | None) -> Array:
-        """Return the displacements of the samples under stresses; see `Contact.displacements`."""
+    def sunk(self, pressure: Array, stress: Array | None) -> Array:
+        """Return the displacements of the samples under stresses; see `Contact.sunk`."""
         forces, load = self._forces, self._load
         if stress is None:
             self._sampling.values.array[:] = pressure
@@ -188,7 +186,7 @@ class _LoadStep:
     """
 
     def __init__(self, forces: ContactForces, gap: Array, body: _UnderStresses) -> None:
-        self._forces, self._gap, self.displacements = forces, gap, body.displacements
+        self._forces, self._gap, self.sunk = forces, gap, body.sunk
         self.directions = 3 if isinstance(forces, FrictionalForces) else 1
         self.closure: Array = np.zeros_like(gap)
         self._by_slip: Array = np.zeros((len(gap), 2, 2))
@@ -285,9 +283,9 @@ class _Linearised:
         """Return the change of these where samples slip on."""
         return np.asarray(self._stuck * way)
 
-    def displacements(self, pressure: Array, stress: Array | None) -> Array:
+    def sunk(self, pressure: Array, stress: Array | None) -> Array:
         """Return the displacements of the body."""
-        return self.body.displacements(pressure, stress)
+        return self.body.sunk(pressure, stress)
 
 
 def _changes(forces: ContactForces, way: Array) -> Array:
