@@ -194,9 +194,9 @@ def copied(array: Any, out: Any = None) -> Any:
 
     Args:
         array: Shape (nx, ny).
-        out: Overwritten by the copy; new memory if not given.
+        out: Overwritten by the copy; new memory, row by row, if not given.
     """
-    out = np.empty_like(array) if out is None else out
+    out = np.empty(array.shape, array.dtype) if out is None else out
     rows = blocks(len(array), BLOCK // (array.itemsize * array.shape[1]))
     in_threads(lambda some: np.copyto(out[some], array[some]), rows)
     return out

@@ -10,6 +10,7 @@ from petsc4py import PETSc
 
 from geometry.materials import Material
 from geometry.rigid_plane import Control
+from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
@@ -68,6 +69,7 @@ class BesideHalfSpace:
             NotConverged: When it is not found.
         """
         forces, body = self._equilibrium.forces, self._body
+        compat.collect_garbage(body.displacement.comm)  # every step and response leaves fields
         body.count()
         contact = _LoadStep(forces, gap, body)
         found = self._half_space.follow(contact, f"the half-space at {control}")
@@ -151,8 +153,8 @@ class _UnderStresses:
         self.solutions, self.iterations = 0, 0
         self.residuals: list[float] = []
 
-    def sunk(self, pressure: Array, stress: Array | None) -> Array:
-        """Return the displacements of the samples under stresses; see `Contact.sunk`."""
+    def displacements(self, pressure: Array, stress: Array | None) -> Array:
+        """Return the displacements of the samples under stresses; see `Contact.displacements`."""
         forces, load = self._forces, self._load
         if stress is None:
             self._sampling.values.array[:] = pressure
@@ -186,7 +188,7 @@ class _LoadStep:
     """
 
     def __init__(self, forces: ContactForces, gap: Array, body: _UnderStresses) -> None:
-        self._forces, self._gap, self.sunk = forces, gap, body.sunk
+        self._forces, self._gap, self.displacements = forces, gap, body.displacements
         self.directions = 3 if isinstance(forces, FrictionalForces) else 1
         self.closure: Array = np.zeros_like(gap)
         self._by_slip: Array = np.zeros((len(gap), 2, 2))
@@ -283,9 +285,9 @@ class _Linearised:
         """Return the change of these where samples slip on."""
         return np.asarray(self._stuck * way)
 
-    def sunk(self, pressure: Array, stress: Array | None) -> Array:
+    def displacements(self, pressure: Array, stress: Array | None) -> Array:
         """Return the displacements of the body."""
-        return self.body.sunk(pressure, stress)
+        return self.body.displacements(pressure, stress)
 
 
 def _changes(forces: ContactForces, way: Array) -> Array:

@@ -72,7 +72,7 @@ class Contact(Protocol):
         """Return the change of these stresses where samples slip on, to first order, (n, 2)."""
         ...
 
-    def sunk(self, pressure: Array, stress: Array | None, /) -> Array:
+    def displacements(self, pressure: Array, stress: Array | None, /) -> Array:
         """Return the displacements of the body at the samples, shape (n, 1 or 3) [mm].
 
         Into the body, and with shear stresses along the axes of the face.
@@ -226,7 +226,7 @@ class OppositeHalfSpace:
 
         def remaining(deviation: Array) -> Array:
             nonlocal forces, along
-            forces = self._settled(
+            forces = self._on_half_spaces(
                 lambda moved: contact.pressures(deviation[:, 0] + moved),
                 contact.changes,
                 self.moved,
@@ -236,9 +236,9 @@ class OppositeHalfSpace:
             moved = self.moved(forces)[None]
             pressure = contact.pressures(deviation[:, 0] + self._on_both(moved[0]))
             if contact.directions == 1:
-                beyond = contact.sunk(pressure, None)
+                beyond = contact.displacements(pressure, None)
             else:
-                along = self._settled(
+                along = self._on_half_spaces(
                     lambda moved: contact.stresses(deviation[:, 1:] + moved),
                     contact.stress_changes,
                     self.moved_along,
@@ -247,7 +247,7 @@ class OppositeHalfSpace:
                 )
                 moved = np.concatenate([moved, self.moved_along(along)])
                 stress = contact.stresses(deviation[:, 1:] + self._on_both(moved[1:]))
-                beyond = contact.sunk(pressure, stress)
+                beyond = contact.displacements(pressure, stress)
                 beyond = beyond + self.at_samples(self.across(forces, along))
             largest[0] = np.abs(deviation + self._on_both(moved)).max(initial=0.0)
             return beyond - self._softer * self.at_samples(moved) - deviation
@@ -265,7 +265,7 @@ class OppositeHalfSpace:
         """Return the displacements of samples where the body is a half-space as well [mm]."""
         return (1.0 + self._softer) * self.at_samples(moved)
 
-    def _settled(
+    def _on_half_spaces(
         self,
         stresses: Callable[[Array], Array],
         changes: Callable[[Array], Array],
@@ -323,7 +323,7 @@ class OppositeHalfSpace:
         need no inverse of laws, which have none where there is no contact.
 
         Args:
-            changes: S, see `_settled`.
+            changes: S, see `_on_half_spaces`.
             moved: The compliance of the half-space.
             rest: r, on the grid [N].
         """

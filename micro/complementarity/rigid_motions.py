@@ -146,7 +146,7 @@ class Motions:
         if not self.turns and not bound.is_finite:
             parts = blocks(len(pressure), BLOCK // (8 * pressure.shape[1]))
             total = sum(in_threads(lambda rows: float(pressure[rows].sum()), parts))
-            if total <= 0.0:
+            if not total > 0.0:
                 return None
             factor = float(self.loads[0]) / total
             in_threads(lambda rows: np.multiply(pressure[rows], factor, pressure[rows]), parts)

@@ -97,11 +97,11 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
     compliance /= cells.contact_modulus
     pressures = np.full(count, pressure)
     # the law is convex where contacts are few: from a plane under which all cells bear more
-    approach = closures[1 + int(np.argmin(np.abs(_LOADS - 1.0)))] + float(
-        (compliance @ pressures).max()
-    )
+    approach = float(np.interp(pressure, loads, closures) + (compliance @ pressures).max())
     for _ in range(_STEPS):
         value, rate = of(approach - compliance @ pressures)
+        if not rate.any():
+            break
         residual = np.append(pressures - value, pressures.mean() - pressure)
         tangent = np.eye(count + 1)
         tangent[:-1, :-1] += rate[:, None] * compliance

@@ -1,5 +1,7 @@
 """What laws of samples miss at the edges of their face."""
 
+from dataclasses import replace
+
 import pytest
 
 from geometry import Material, Spectrum, synthesise
@@ -38,6 +40,12 @@ def test_width_belongs_to_the_edge_and_not_to_the_face(monkeypatch):
     monkeypatch.setattr(edge_errors, "_COARSE", 24)
     # 0.78 to 0.85 of it on four surfaces, as corners soften the smaller face more
     assert edge_width(sample(), PRESSURE, MATERIAL) == pytest.approx(width, rel=0.35)
+
+
+def test_width_is_known_where_nearly_all_yields():
+    """The law is known up to 0.95 of the hardness, and goes on as a line."""
+    model = replace(sample(), hardness=PRESSURE / 0.97)
+    assert 0.0 < edge_width(model, PRESSURE, MATERIAL) < 0.5 / SPECTRUM["waves"][0]
 
 
 def laws_on_block(**block):
