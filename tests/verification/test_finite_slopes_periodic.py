@@ -6,39 +6,15 @@ cannot widen.
 
 import numpy as np
 import pytest
-from mpi4py import MPI
+from helpers.meshed_slopes import forces_with_slopes_and_without
 from scipy.optimize import brentq
 
-from geometry import RefinedShape, Surface, places_in_reach
-from geometry.rigid_plane import Control
-from macro import Block, Material, UnilateralContactProblem, rough_block_mesh
+from geometry import Material, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 
-YOUNG, HEIGHT, APPROACH, FINE, LOW, CELLS = 4000.0, 0.5, 0.03, 2.5e-2, 0.01, 64
+YOUNG, HEIGHT, APPROACH, FINE, CELLS = 4000.0, 0.5, 0.03, 2.5e-2, 64
 ACROSS = (np.arange(CELLS) + 0.5) / CELLS
 WAVE = 0.03 * np.outer(*2 * [np.cos(2.0 * np.pi * ACROSS)])
-
-
-def meshed(surface, material):
-    """Return the force, and that by heights and approach × 0.01, on meshes that are else alike."""
-    shape = RefinedShape(
-        interface=(1.0, 1.0),
-        height=HEIGHT,
-        places=places_in_reach(surface, APPROACH, spacing=FINE),
-        fine=FINE,
-        coarse=0.12,
-        growth=0.3,
-        element="P2",
-    )
-    forces = []
-    for scale in (1.0, LOW):
-        scaled = surface.scaled(scale)
-        mesh, _ = rough_block_mesh(shape, scaled, MPI.COMM_SELF)
-        block = UnilateralContactProblem(
-            Block(mesh, material, sides="roller"), scaled.highest - scaled.mean_height
-        )
-        forces.append(block.solve(Control(approach=APPROACH * scale)).force / scale)
-    return forces
 
 
 def in_series(surface, material, slopes):
@@ -58,7 +34,9 @@ def in_series(surface, material, slopes):
 def test_slopes_soften_a_periodic_sample_as_its_mesh():
     material = Material(young_modulus=YOUNG, poisson_ratio=0.3)
     surface = Surface(heights=WAVE, lengths=(1.0, 1.0), periodic=True)
-    steep, flat = meshed(surface, material)
+    steep, flat = forces_with_slopes_and_without(
+        surface, material, height=HEIGHT, approach=APPROACH, fine=FINE, sides="roller"
+    )
     expected = steep / flat - 1.0
     small, held = (
         in_series(surface, material, slopes)
