@@ -6,7 +6,7 @@ from helpers.block_cases import block_of
 from mpi4py import MPI
 
 from macro.mesh.contact_face import top_facets
-from macro.mesh.face_edges import outer_edges
+from macro.mesh.face_edges import FaceEdges, nearest_samples, outer_edges
 
 
 @pytest.mark.parametrize("kind", ["Q1", "P1"])
@@ -18,3 +18,28 @@ def test_edges_of_a_rectangle_are_its_sides(kind):
     x, y = edges.middle.T
     on_side = np.isclose(x % 3.0, 0.0) | np.isclose(y % 2.0, 0.0)
     assert on_side.all()
+
+
+def test_samples_that_are_as_near_share_an_edge():
+    edges = FaceEdges(middle=np.array([[0.5, 0.0], [2.5, 0.0]]), length=np.ones(2))
+    x, y = np.array([2.5, 0.25, 0.75, 0.5]), np.array([0.25, 0.25, 0.25, 0.75])
+    first, second = nearest_samples(edges, x, y, MPI.COMM_SELF)
+    assert (sorted(first[0]), first[1]) == ([1, 2], 0.5)
+    assert (second[0].tolist(), second[1]) == ([0], 1.0)
+
+
+class TwoRanks:
+    """The communicator of two ranks, and what the other one sends to each call."""
+
+    def __init__(self, other):
+        self.other = iter(other)
+
+    def allgather(self, own):
+        return [own, next(self.other)]
+
+
+def test_a_rank_without_samples_takes_no_part():
+    edges = FaceEdges(middle=np.array([[0.5, 0.0]]), length=np.ones(1))
+    none = np.empty(0)
+    ((found, share),) = nearest_samples(edges, none, none, TwoRanks([np.array([0.1]), [2]]))
+    assert (found.size, share) == (0, 0.5)
