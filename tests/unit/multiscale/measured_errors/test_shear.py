@@ -115,7 +115,7 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     laws = run(pressed_cells(kind, loads, output=quiet | {"check": "last"}, **sections))
     own = laws.steps[-1]
     sections["friction"] = {"coefficient": 0.3, "coupled": True}
-    cells = run(pressed_cells("concurrent", loads, output=quiet | {"check": "none"}, **sections))
+    cells = run(pressed_cells("concurrent", loads, output=quiet | {"check": "last"}, **sections))
     exact = cells.steps[-1]
     parts = dict(own.shear_errors)
     assert list(parts)[:3] == ["laws", "grid", "body"]
@@ -123,6 +123,7 @@ def test_errors_of_laws_are_those_against_coupled_cells_on_the_body(kind, load):
     apart = np.hypot(*(response(own) - response(exact)))
     assert parts["laws"] == pytest.approx(apart, rel=0.01)  # of steps that agree to 1e-6
     assert parts["laws"] > 0.02 * np.hypot(*response(exact))
+    assert parts["grid"] == pytest.approx(dict(exact.shear_errors)["grid"], rel=1e-3)  # of cells
     assert own.shear_force_error_N == pytest.approx(sum(parts.values()))
     under_approach = dict(own.errors)["laws"]
     if "approach" in load:
