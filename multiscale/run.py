@@ -7,7 +7,6 @@ from contextlib import nullcontext
 from functools import cached_property
 from typing import Any
 
-from geometry import NotConverged
 from multiscale.auto.keys import resolved_sections
 from multiscale.clock import Clock
 from multiscale.couplings.coupling import Coupling
@@ -24,6 +23,7 @@ from multiscale.results.history import History
 from multiscale.scene.scene import Scene, checked_scene, identity
 from multiscale.setup import make_setup
 from support.collective import check_comm, on_root
+from support.errors import NotConverged
 from support.packages import optional_packages
 
 

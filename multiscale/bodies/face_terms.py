@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from geometry import InputError, Material, Surface
+from geometry import Material, Surface
 from micro import (
     BodyModes,
     BodyStresses,
@@ -35,6 +35,7 @@ from micro import (
 )
 from support.arrays import Array
 from support.checks import process_memory
+from support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from geometry import BlockShape, PatchGrid

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from geometry import InputError, Material
+from geometry import Material
 from geometry.face_frame import UPWARD, FaceFrame
 from multiscale.inputs.bodies import BodyFacts, SceneBody
 from multiscale.inputs.loads import body_states
@@ -21,6 +21,7 @@ from multiscale.loading.stages import BodyLoads
 from multiscale.scene.bodies import CounterBodySection
 from multiscale.scene.scene import Scene, content_digest
 from support.collective import on_root
+from support.errors import InputError
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import ContactFacets, Loads, MeshedBody, TaggedMesh

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry import Control, InputError, PatchGrid, RigidPlane, Surface, overlaps
+from geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
 from geometry.contact_state import ContactState, Start
 from geometry.patches import patch_means
 from geometry.shear_state import ShearState
@@ -22,6 +22,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, load_steps
 from support.arrays import Array
 from support.collective import on_root, on_root_alone
+from support.errors import InputError
 
 
 class ContactSolver(StepSolver):

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from geometry import InputError, PatchGrid, RigidPlane, Surface
+from geometry import PatchGrid, RigidPlane, Surface
 from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
@@ -38,6 +38,7 @@ from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
+from support.errors import InputError
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
 """The body and the counter-body where these are meshes."""

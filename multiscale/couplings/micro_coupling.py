@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import Asperities, Control, InputError, PatchGrid, Surface
+from geometry import Asperities, Control, PatchGrid, Surface
 from micro import AsperityModel, HalfSpaceModel, MicroModel
 from micro.friction.friction_model import FrictionModel
 from multiscale.bodies.bodies import SLOPES, OnBody, on_body
@@ -35,6 +35,7 @@ from multiscale.measured_errors.shear import shear_errors, with_shear_errors
 from multiscale.readable import times
 from support.arrays import Array
 from support.collective import on_root_alone
+from support.errors import InputError
 
 _TRACTIONS = 12.0
 """Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
@@ -243,7 +244,7 @@ class MicroCoupling(PressedSurface):
         if self.scene.friction is None:
             return 0.0
         each = _CHECK_OF_LAWS if self.has_laws else _CHECK_OF_CELLS
-        return each * (len(self.load_history.shear_points) + 1)
+        return each * (self.load_history.shear_legs + 1)
 
     def _law_cycles(self, steps: int, rows: int) -> float:
         """Return the multigrid cycles of load steps on a mesh, and of rows of laws."""

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from geometry import NotConverged, PatchGrid, Regions, RigidPlane, Surface
+from geometry import PatchGrid, Regions, RigidPlane, Surface
 from micro import FiniteSlopes, HalfSpaceModel
 from micro.closed_forms.hertz import crowned_peak
 from micro.friction.friction_model import FrictionModel
@@ -55,6 +55,7 @@ from multiscale.measured_errors.samples import (
 from multiscale.measured_errors.shear import path_of, with_shear_errors
 from multiscale.readable import Observer, number, times
 from support.arrays import Array
+from support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LoadedFace
@@ -177,7 +178,7 @@ class RepresentativeCoupling(LawCoupling):
         cycles = unknowns * (SET_UP_CYCLES + 24 * steps)  # 6 to 60 a step on four parts
         each, checked = CHECKS_OF_SAMPLE, check_cycles(self.shown_bodies)
         if self.scene.friction is not None:
-            ways = len(self.load_history.shear_points) + 1
+            ways = self.load_history.shear_legs + 1
             each, checked = each + ways * COUPLED_ON_SAMPLE, 2.0 * ways * checked
         return Work(
             size=int(self.surface.heights.size),

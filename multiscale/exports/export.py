@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry import InputError, Regions
+from geometry import Regions
 from multiscale.exports import FORMATS
 from multiscale.exports.keywords import ABAQUS, CALCULIX, keyword_text
 from multiscale.exports.law_module import law_modules
 from multiscale.exports.sampling import Conducts, places, sample_law
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
+from support.errors import InputError
 from support.whole_files import remove, write_text, written
 
 TOLERANCE = 1e-4

@@ -9,13 +9,14 @@ import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Self
 
-from geometry import BlockShape, InputError, Material, PatchGrid, Surface
+from geometry import BlockShape, Material, PatchGrid, Surface
 from geometry.face_frame import FaceFrame
 from geometry.meshes.block import BlockMeshing
 from multiscale.inputs.surfaces import located
 from multiscale.readable import times
 from multiscale.scene.bodies import BlockSection
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 from support.fields import part_of
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them

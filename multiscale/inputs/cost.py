@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from geometry import InputError
 from geometry.files.content import BYTES_PER_HEIGHT
 from multiscale.inputs.bodies import Cells, block_section
 from multiscale.inputs.scene_parts import SceneParts
 from multiscale.machine import ClusterNodes, MemoryRequest
 from multiscale.readable import duration, number
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 
 
 class MemoryLacking(InputError):

@@ -8,13 +8,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from geometry import InputError, Surface
+from geometry import Surface
 from geometry.zero import Zero
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.surfaces import located
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.stages import BodyLoads, states_of
 from multiscale.scene.scene import Scene
+from support.errors import InputError
 from support.fields import part_of
 
 Problem = tuple[str, Any, str, str]

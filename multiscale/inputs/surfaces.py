@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from geometry import (
-    InputError,
     Material,
     MaterialPair,
     Spectrum,
@@ -32,6 +31,7 @@ from geometry.preparation import Preparation, prepared
 from multiscale.scene.scene import Scene
 from multiscale.scene.surface import CounterSurfaceSection, SurfaceSection
 from support.arrays import Array
+from support.errors import InputError
 from support.fields import part_of
 
 WHOLE = "face"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from geometry import Control, NotConverged, PatchGrid, RigidPlane
+from geometry import Control, PatchGrid, RigidPlane
 from geometry.plane_equilibrium import UNSUPPORTED
 from geometry.rigid_plane import normal_stiffness, plane_failure
 from micro.model import Stiffness
@@ -23,6 +23,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaws
 from multiscale.loading.load_step import LoadStep
 from support.arrays import Array
+from support.errors import NotConverged
 
 
 class CondensedLaws(LawSolver):

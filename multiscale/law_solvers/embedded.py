@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from geometry import Control, InputError, NotConverged, PatchGrid, ShearControl
+from geometry import Control, PatchGrid, ShearControl
 from micro.model import Stiffness
 from multiscale.bodies.fields import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
@@ -19,6 +19,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import BeyondLaws
 from support.arrays import Array
+from support.errors import InputError, NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

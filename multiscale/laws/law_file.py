@@ -16,13 +16,14 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError, PatchGrid, Regions
+from geometry import PatchGrid, Regions
 from multiscale.laws.law_table import LawTable, part_key
 from multiscale.laws.patch_law import PatchLaw, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.laws.transmissivity import Transmissivity
 from multiscale.removed import refuse_removed_laws
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
+from support.errors import InputError
 from support.packages import optional_packages
 from support.whole_files import write_bytes
 

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError, PatchGrid, Regions
+from geometry import PatchGrid, Regions
 from geometry.zero import FIRST_TOUCH
 from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import PlanePath
 from multiscale.readable import Caution, Detail, column, number, percent, quantity
 from support.displayed import Displayed, Table, of_columns, spread
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from geometry import InputError
 from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
 from multiscale.laws.transmissivity import Transmissivity
 from multiscale.readable import column, span
 from support.displayed import Displayed, Table, of_columns, spread
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

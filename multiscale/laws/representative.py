@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry import InputError, Regions, Surface
+from geometry import Regions, Surface
 from micro import HalfSpaceModel
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.mean_law import Limit, PeriodicSamples
@@ -21,6 +21,7 @@ from multiscale.laws.periodic_sample import PeriodicSample
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.readable import Observer
 from support.checks import of_kind
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 MakeModel = Callable[[Surface], HalfSpaceModel]

@@ -13,7 +13,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from geometry import InputError
+from support.errors import InputError
 
 Array = NDArray[np.float64]
 

@@ -6,24 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from geometry import Control, InputError
+from geometry import Control
 from geometry.shear_state import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
 from multiscale.loading.shear_path import ShearPath
-from multiscale.loading.stages import (
-    Leg,
-    Pairs,
-    Quantity,
-    Repeats,
-    Stage,
-    legs_of,
-    shears_of,
-    stated_shears,
-)
+from multiscale.loading.stages import Leg, Quantity, Repeats, Stage, legs_of, stated_shears
+from support.errors import InputError
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example
 
@@ -91,7 +83,7 @@ class LoadHistory(ShearPath):
             raise InputError(
                 "needs exactly one load", allowed="'approach', 'force', 'pressure' or 'stage'"
             )
-        if self.cycles > 1 and len(self.points) < 2:
+        if self.cycles > 1 and len(self._stated_points) < 2:
             raise InputError(
                 f"cycles = {self.cycles} needs two turning points",
                 allowed="a list of loads, or cycles = 1; of a stage, its own cycles",
@@ -102,10 +94,7 @@ class LoadHistory(ShearPath):
     @property
     def quantity(self) -> Quantity:
         """What is prescribed; a force where stages prescribe both."""
-        if self.stage:
-            of_stages = {leg.quantity for leg in self.ways}
-            return "force" if "force" in of_stages else "approach"
-        return "force" if self.approach is None else "approach"
+        return "force" if any(leg.quantity == "force" for leg in self.ways) else "approach"
 
     def quantity_in(self, stage: int | None) -> Quantity:
         """Return what is prescribed in a stage.
@@ -133,12 +122,11 @@ class LoadHistory(ShearPath):
 
     def _ends(self, quantity: Quantity) -> tuple[float, ...]:
         """Return the values of a quantity at the ends of the legs that prescribe it."""
-        known = []
-        for leg in self.ways if self.stage else self.ways[: len(self.ways) // self.cycles]:
-            if leg.quantity == quantity and leg.end is not None:
-                pull = self._pull(self._state(leg, 1.0)) if quantity == "force" else 0.0
-                known.append(leg.end + pull)
-        return tuple(known)
+        return tuple(
+            leg.end + (self._pull(self._state(leg, 1.0)) if quantity == "force" else 0.0)
+            for leg in self.ways
+            if leg.quantity == quantity and leg.end is not None
+        )
 
     @property
     def slopes(self) -> tuple[float, float] | None:
@@ -148,16 +136,19 @@ class LoadHistory(ShearPath):
     @cached_property
     def ways(self) -> tuple[Leg, ...]:
         """The straight ways between turning points, or through stages."""
-        if self.stage:
-            return tuple(legs_of(self.stage, self.steps))
-        points = self.cycles * self._stated_points
-        ends = pairwise((0.0, *points))
-        ways = [Leg(0, self.quantity, start, end, self.steps) for start, end in ends]
-        if self.shear_path == "after":
-            count = self.shear_cycles * len(self.stated_shear)
-            steps = self.shear_steps or self.steps
-            ways += [Leg(0, self.quantity, points[-1], points[-1], steps)] * count
-        return tuple(ways)
+        return tuple(legs_of(self.stage or self._turning_points(), self.steps))
+
+    def _turning_points(self) -> list[Stage]:
+        """Return turning points of the load, and those of the shear, as stages."""
+        key = "force" if self.approach is None else "approach"
+        points: list[Any] = [{key: point} for point in self._stated_points]
+        pairs: list[Any] = [{self.shear_key: (pair,)} for pair in self.stated_shear]
+        if self.shear_path == "along" and pairs:
+            points = [point | pair for point, pair in zip(points, pairs, strict=True)]
+            pairs = []
+        stages = [Stage(**point) for point in points]
+        after = [Stage(**pair, steps=self.shear_steps) for pair in pairs]
+        return self.cycles * stages + self.shear_cycles * after
 
     @property
     def _stated_points(self) -> tuple[float, ...]:
@@ -169,23 +160,11 @@ class LoadHistory(ShearPath):
         """Whether ``shear`` or ``shear_force`` is prescribed; empty without any."""
         return next((key for one in (self, *self.stage) for key in stated_shears(one)), "")
 
-    @cached_property
-    def shear_points(self) -> Pairs:
-        """Ends of the legs of the shear, the first of which starts at zero [mm or N]."""
-        if self.stage:
-            return shears_of(self.stage, self.ways, self.shear_key) if self.shear_key else ()
-        cycles = self.shear_cycles if self.shear_path == "after" else self.cycles
-        return cycles * self.stated_shear
-
-    def _shear_at(self, time: float) -> ShearControl | None:
-        """Return the shear of a load step, counted as in `control_at`; None without any."""
-        points = self.shear_points
-        if not points:
-            return None
-        begins = self._begins[-len(points) - 1 :]
-        x, y = np.array([(0.0, 0.0), *points]).T
-        pair = float(np.interp(time, begins, x)), float(np.interp(time, begins, y))
-        return ShearControl(shift=pair) if self.shear_key == "shear" else ShearControl(force=pair)
+    @property
+    def shear_legs(self) -> int:
+        """Number of legs from the first on that shears."""
+        sheared = (index for index, leg in enumerate(self.ways) if any(map(any, leg.shear)))
+        return self.legs - next(sheared, self.legs)
 
     @cached_property
     def _begins(self) -> list[int]:
@@ -282,14 +261,20 @@ class LoadHistory(ShearPath):
             origin: The plane when the stage began.
         """
         index = self._leg_at(time)
-        leg, begin = self.ways[index], self._begins[index]
-        done = time - begin
+        leg, done = self.ways[index], time - self._begins[index]
         state = self._state(leg, done / leg.steps)
         pull_before = self._pull(2.0 * leg.stage)
         now = origin[0] if leg.quantity == "approach" else origin[1] - pull_before
-        start, end = (now if value is None else value for value in (leg.start, leg.end))
-        value = end if done == leg.steps else start + done * ((end - start) / leg.steps)
-        shear = self._shear_at(time)
+
+        def reached(start: float, end: float) -> float:
+            return end if done == leg.steps else start + done * ((end - start) / leg.steps)
+
+        value = reached(*(now if end is None else end for end in (leg.start, leg.end)))
+        shear = None
+        if self.shear_key:
+            x, y = (reached(*ends) for ends in zip(*leg.shear, strict=True))
+            shifts = self.shear_key == "shear"
+            shear = ShearControl(shift=(x, y)) if shifts else ShearControl(force=(x, y))
         if leg.quantity == "approach":
             return Control(approach=value, tilt=self.slopes, body_state=state, shear=shear)
         force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand

@@ -108,7 +108,8 @@ def _replaced(loads: Sequence[Any], later: Sequence[Any]) -> tuple[Any, ...]:
 
 Quantity = Literal["approach", "force"]
 Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
-Pairs = tuple[tuple[float, float], ...]
+Pair = tuple[float, float]
+Pairs = tuple[Pair, ...]
 _SHEARS = ("shear", "shear_force")
 _OF_PLANE = ("approach", "force", "pressure", "hold")
 
@@ -185,12 +186,13 @@ class Leg(NamedTuple):
     """A straight way of all loads from one state to another.
 
     Attributes:
-        stage: Index of its stage; 0 of a history without stages.
+        stage: Index of its stage.
         quantity: What is prescribed of the plane.
         start: Its value at the start [mm or N]; None stands for that under which the plane was when
             the stage began.
         end: Its value at the end; None likewise.
         steps: Number of load steps.
+        shear: Shear along x and y at the start, and at the end [mm or N].
         there: Whether the loads go to those of the stage; False where they go back.
     """
 
@@ -199,6 +201,7 @@ class Leg(NamedTuple):
     start: float | None
     end: float | None
     steps: int
+    shear: tuple[Pair, Pair]
     there: bool = True
 
 
@@ -211,6 +214,7 @@ def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:
     """
     quantity: Quantity = "force"
     value: float | None = 0.0  # of the quantity, where it is known beforehand
+    shear = (0.0, 0.0)
     for index, stage in enumerate(stages):
         before = quantity
         start, end = value, value
@@ -222,32 +226,14 @@ def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:
         if quantity != before:
             start = 0.0 if index == 0 else None
             end = start if stage.hold is not None else end
-        there = Leg(index, quantity, start, end, stage.steps or steps)
+        sheared = next((getattr(stage, key)[0] for key in stated_shears(stage)), shear)
+        there = Leg(index, quantity, start, end, stage.steps or steps, (shear, sheared))
+        back = there._replace(start=end, end=start, shear=(sheared, shear), there=False)
         for _ in range(stage.cycles or 1):
             yield there
             if stage.cycles:
-                yield there._replace(start=end, end=start, there=False)
-        value = start if stage.cycles else end
-
-
-def shears_of(stages: Sequence[Stage], legs: Sequence[Leg], key: str) -> Pairs:
-    """Return the shear at the end of every leg of stages.
-
-    Args:
-        stages: The stages.
-        legs: Their legs.
-        key: Which shear they state, ``shear`` or ``shear_force``.
-    """
-    before, now, stage = (0.0, 0.0), (0.0, 0.0), 0
-    ends = []
-    for leg in legs:
-        if leg.stage != stage:
-            before, stage = now, leg.stage
-        stated = getattr(stages[leg.stage], key)
-        there = before if stated is None else stated[0]
-        now = there if leg.there else before
-        ends.append(now)
-    return tuple(ends)
+                yield back
+        value, shear = (start, shear) if stage.cycles else (end, sheared)
 
 
 def states_of(

@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from geometry import Control, NotConverged, PatchGrid
+from geometry import Control, PatchGrid
 from geometry.contact_state import ContactState
 from micro.model import Stiffness
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from support.arrays import Array
+from support.errors import NotConverged
 
 _MOST_HALVINGS = 8
 """Halvings of a load step that does not converge, or that changes the force by too much."""

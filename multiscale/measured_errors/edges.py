@@ -16,10 +16,11 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from geometry import Control, Material, NotConverged, Surface
+from geometry import Control, Material, Surface
 from micro import HalfSpaceModel
 from micro.boundary_elements.free_sides import FreeSides
 from support.arrays import Array
+from support.errors import NotConverged
 
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 """Periods along the face, cells along it that the law is solved on, and cells along a period that

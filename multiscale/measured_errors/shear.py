@@ -22,7 +22,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from geometry import Control, NotConverged
+from geometry import Control
 from geometry.contact_state import ContactState
 from geometry.shear_state import ShearControl, ShearState
 from micro import HalfSpaceModel
@@ -33,6 +33,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.measured_errors.contact import ZERO, ErrorProbe
 from multiscale.readable import percent, quantity
 from support.arrays import Array
+from support.errors import NotConverged
 
 _HALF, _QUARTER, _COUPLING = 1.0, 0.25, 1.5
 """Errors over what half as many cells change, over what a quarter changes against half, and over

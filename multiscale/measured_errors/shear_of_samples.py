@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from geometry import Control, NotConverged, Surface
+from geometry import Control, Surface
 from geometry.shear_state import ShearControl
 from geometry.sliders import Sliders
 from micro.friction.friction_model import FrictionModel
@@ -38,6 +38,7 @@ from multiscale.measured_errors.samples import LawErrorProbe, causes_of, separat
 from multiscale.measured_errors.shear import BY_NORMAL, FEWEST_CELLS, gone, grid_error, resampled
 from support.arrays import Array
 from support.collective import shared
+from support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace

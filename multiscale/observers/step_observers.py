@@ -14,7 +14,6 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, TypeVar
 
-from geometry import NotConverged
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.energy import energy_notes, with_work, yielding_notes
 from multiscale.loading.load_step import LoadStep
@@ -22,6 +21,7 @@ from multiscale.measured_errors.contact import error_notes
 from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
+from support.errors import NotConverged
 
 T = TypeVar("T")
 

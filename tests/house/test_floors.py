@@ -130,6 +130,13 @@ def test_folders_and_flat_modules_go_down_only(package):
                 assert floor[other] < floor[here], f"{path.name} imports {module}"
 
 
+def test_errors_are_imported_from_where_they_are():
+    others = {f"{package}.{name}" for package in BELOW for name in ("InputError", "NotConverged")}
+    for package in BELOW:
+        for path in (ROOT / package).rglob("*.py"):
+            assert not others & set(modules_imported(path)), path
+
+
 def test_no_module_needs_itself():
     paths = [path.relative_to(ROOT) for package in BELOW for path in (ROOT / package).rglob("*.py")]
     modules = {".".join(path.with_suffix("").parts): path for path in paths}

@@ -19,6 +19,10 @@ from support.errors import InputError
         ({"force": (0.0, 1.0)}, "force = [0.0, 1.0]: must be greater than 0"),
         ({"approach": (1.0, -1.0)}, "approach = [1.0, -1.0]: must not turn below 0"),
         ({"force": (1.0,), "cycles": 2}, "cycles = 2 needs two turning points"),
+        (
+            {"force": (1.0,), "cycles": 2, "shear": ((1.0, 0.0), (0.0, 0.0))},
+            "cycles = 2 needs two turning points",
+        ),
         ({"force": (1.0,), "steps": 0}, "steps = 0: must be greater than or equal to 1"),
         ({"force": (1.0,), "zero": "sea"}, "zero: is no height that approaches count from"),
     ],
@@ -48,6 +52,24 @@ def test_stages_follow_each_other():
     assert [step for step in range(8) if history.begins_stage(step)] == [0, 2, 6]
     assert history.quantity_in(3) == "approach"
     assert history.unloads
+
+
+def test_turning_points_are_stages():
+    """Of the shear too, which follows the load or goes along with it."""
+    loads, pairs = (4.0, 2.0), ((1.0, 0.0), (0.0, -1.0))
+    plain = LoadHistory(force=loads, shear=pairs, cycles=2, steps=2, shear_steps=3)
+    by_load = 2 * [Stage(force=load) for load in loads]
+    by_shear = [Stage(shear=(pair,), steps=3) for pair in pairs]
+    after = LoadHistory(stage=(*by_load, *by_shear), steps=2)
+    along = LoadHistory(force=loads, shear=pairs, cycles=2, steps=2, shear_path="along")
+    both = 2 * [Stage(force=f, shear=(s,)) for f, s in zip(loads, pairs, strict=True)]
+    for one, other in ((plain, after), (along, LoadHistory(stage=tuple(both), steps=2))):
+        assert (one.count, one.points, one.largest) == (other.count, other.points, 4.0)
+        for time in range(2 * one.count + 1):
+            found, known = one.control_at(time / 2), other.control_at(time / 2)
+            assert (found.force, found.shear) == (known.force, known.shear)
+    assert (plain.points[-1], plain.shear_legs, along.shear_legs) == (2.0, 2, 4)
+    assert (plain.stage_at(1), after.stage_at(1)) == (None, 1)
 
 
 def test_the_contact_bears_forces_pulls_and_pressures():
