@@ -24,6 +24,7 @@ from multiscale.figures.style import (
     map_panels,
     panels,
     plain_logarithmic,
+    powers_of_ten,
     show_unit,
     styled,
 )
@@ -175,8 +176,7 @@ def _draw_leak(axes: Any, history: Any, ways: Sequence[str]) -> None:
         )  # fmt: skip
     title = "leak" + "; triangles: closed" * any_closed
     axes.set(yscale="log", ylabel="leak [mm³/s]", title=title, xlim=(0.0, None))
-    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
-        plain_logarithmic(axes.yaxis)
+    _label_decades(axes)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
     if len(ways) > 1:
         axes.legend()
@@ -198,4 +198,12 @@ def _draw_factors(axes: Any, history: Any, ways: Sequence[str]) -> None:
         axes.plot(pressure[leaks], factor[leaks], _LOOKS[way], ms=3.0, color=_COLOURS[way])
     axes.set(yscale="log", ylabel="flow factor T/ḡ³", title="against a gap of parallel plates")
     axes.set_xlim(0.0, None)
+    _label_decades(axes)
     show_unit(axes.xaxis, "mean pressure", "MPa", pressure)
+
+
+def _label_decades(axes: Any) -> None:
+    """Label a logarithmic y axis: its powers of ten, or plain numbers where these are few."""
+    powers_of_ten(axes.yaxis)
+    if axes.get_ylim()[1] < 100.0 * axes.get_ylim()[0]:
+        plain_logarithmic(axes.yaxis)

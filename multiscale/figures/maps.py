@@ -7,12 +7,14 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
+from multiscale.figures.plain_axes import PlainAxes
 from multiscale.figures.style import BLUE, GREY, NO_CONTACT, ORANGE, PRESSURES
 from multiscale.readable import number, usual_unit
 from support.arrays import Array
@@ -100,7 +102,9 @@ def colour_bar(mappable: Any, axes: Any, label: str, *, extend: str = "neither")
     """
     inches, high = _drawn_inches(axes)
     wide = 0.11 / inches
-    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0))
+    # a layout made while drawing needs the boxes of labels before they are drawn
+    kind = PlainAxes if isinstance(axes, PlainAxes) else Axes
+    beside = axes.inset_axes((1.0 + 0.8 * wide, 0.0, wide, 1.0), axes_class=kind)
     beside.grid(False)
     bar = axes.figure.colorbar(mappable, cax=beside, extend=extend)
     text = fill(label, max(12, int(high / 0.06)))
