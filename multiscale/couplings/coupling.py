@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -295,9 +295,6 @@ class Coupling(SceneParts, ABC):
     def unmeasured(self) -> str:
         """Return why a run does not measure the errors of its load steps; empty where it does."""
 
-    checks_shear: ClassVar[bool] = False
-    """Whether errors of the shear are measured by themselves, see `MicroCoupling.shear_checked`."""
-
     @property
     def checks_steps(self) -> bool:
         """Whether further solutions measure the errors of load steps, see `checked`."""
@@ -380,12 +377,15 @@ class Coupling(SceneParts, ABC):
         detail = self.solver.detail(latest)
         return None if detail is None else (step, detail)
 
-    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
+    def checked(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> LoadStep:
         """Return a load step with its errors measured; as it is where they cannot be.
 
         Args:
             step: The load step.
             past: All load steps before it.
+            normal: Whether those of the normal force are, and not those of a shear alone.
 
         Raises:
             NotConverged: When a contact problem cannot be solved.

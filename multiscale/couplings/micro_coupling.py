@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -31,7 +31,7 @@ from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe, checked
-from multiscale.measured_errors.shear import shear_errors, with_shear_errors
+from multiscale.measured_errors.shear import behind_laws, shear_errors, with_shear_errors
 from multiscale.readable import times
 from support.arrays import Array
 from support.collective import on_root_alone
@@ -165,19 +165,28 @@ class MicroCoupling(PressedSurface):
             zero=self.zero_error,
         )
 
-    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
-        """Return a load step of contacts on cells with its errors measured."""
+    def checked(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> LoadStep:
+        """Return a load step with the errors of its normal force and of its shear measured."""
         known = None if self.has_laws else self.solver.latest
         start = None if known is None else known.guess
-        return checked(step, self.error_probe(), self.load_history, self.comm, start=start)
-
-    def shear_checked(self, step: LoadStep, past: Sequence[LoadStep]) -> LoadStep:
-        """Return a load step of contacts on cells with the errors of its shear; collective."""
         probe, friction, history = self.error_probe(), self.friction_model, self.load_history
-        assert friction is not None
-        measured = partial(shear_errors, probe, friction, [*past, step], history)
-        by_shift = history.shear_key != "shear_force"
-        return with_shear_errors(step, on_root_alone(self.comm, measured), by_shift=by_shift)
+
+        def measured() -> LoadStep:
+            force = shear = None
+            if friction is not None and self.has_laws:
+                contact, shear = behind_laws(probe, friction, [*past, step], history)
+                force = contact.force
+            found = step
+            if normal:
+                found = checked(step, probe, history, start=start, behind=force)
+            if friction is None:
+                return found
+            parts = shear_errors(probe, friction, [*past, found], history, shear)
+            return with_shear_errors(found, parts, by_shift=history.by_shift)
+
+        return on_root_alone(self.comm, measured)
 
     def coarser_gap(self, step: LoadStep) -> Array | None:
         """Return the gaps under the load of a step on half as many cells a side."""
@@ -333,7 +342,6 @@ class ConcurrentCoupling(MicroCoupling):
     """The whole surface on the scene's body at every load step, without laws."""
 
     shows_contacts: ClassVar[bool] = True
-    checks_shear: ClassVar[bool] = True
 
     def _make_solver(self) -> StepSolver:
         return self.contact_solver(self.model_on_body())

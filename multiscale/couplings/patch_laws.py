@@ -6,14 +6,12 @@ Theory: docs/theory.md, sections 10 and 11.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any, ClassVar
 
 from geometry import Control
 from geometry.contact_state import ContactState
-from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import on_body, solver_options_given
 from multiscale.couplings.contact_solver import plane_at_largest_load
@@ -27,8 +25,6 @@ from multiscale.laws.isolated import isolated_laws
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.refinement import MOST_ROWS
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.contact import checked
-from multiscale.measured_errors.shear import behind_laws, shear_errors, with_shear_errors
 from multiscale.readable import Detail, Observer, times
 from support.collective import on_root_alone
 
@@ -150,23 +146,6 @@ class PatchLaws(LawCoupling, MicroCoupling):
     def model_behind_laws(self) -> MicroModel:
         """Return the micro model on the body, which laws stand for; collective."""
         return self.model_on_body()
-
-    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
-        """Return a load step with its errors measured; with friction those of its shear as well."""
-        if self.scene.friction is None:
-            return super().checked(step, past)
-        probe, friction, history = self.error_probe(), self.friction_model, self.load_history
-        assert friction is not None
-        steps, by_shift = [*past, step], history.shear_key != "shear_force"
-
-        def behind() -> tuple[float, ShearState]:
-            contact, shear = behind_laws(probe, friction, steps, history)
-            return contact.force, shear
-
-        force, shear = on_root_alone(self.comm, behind)
-        step = checked(step, probe, history, self.comm, behind=force)
-        measured = partial(shear_errors, probe, friction, [*past, step], history, shear)
-        return with_shear_errors(step, on_root_alone(self.comm, measured), by_shift=by_shift)
 
     def contact(self, step: LoadStep, latest: Any) -> tuple[LoadStep, ContactState] | None:
         """Solve the contact problem that laws stand for, under the plane of a load step."""

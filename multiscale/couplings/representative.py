@@ -208,7 +208,9 @@ class RepresentativeCoupling(LawCoupling):
 
     # --- errors
 
-    def checked(self, step: LoadStep, past: Sequence[LoadStep] = ()) -> LoadStep:
+    def checked(
+        self, step: LoadStep, past: Sequence[LoadStep] = (), *, normal: bool = True
+    ) -> LoadStep:
         """Return a load step with its errors measured, by further steps on the same bodies."""
         solver = self.solver
         assert isinstance(solver, ExtendedLaws)
@@ -236,8 +238,8 @@ class RepresentativeCoupling(LawCoupling):
             problem_with=self._problem,
             friction_of=self._friction_of,
         )
-        normal, shear = probe.measure_both()
-        step = with_errors(step, normal, by_force=by_force)
+        found, shear = probe.measure_both()
+        step = with_errors(step, found, by_force=by_force)
         return with_shear_errors(step, shear, by_shift=probe.by_shift)
 
     def _friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:

@@ -161,6 +161,11 @@ class LoadHistory(ShearPath):
         return next((key for one in (self, *self.stage) for key in stated_shears(one)), "")
 
     @property
+    def by_shift(self) -> bool:
+        """Whether the shear, where there is one, is prescribed as a shift, and not as a force."""
+        return self.shear_key != "shear_force"
+
+    @property
     def shear_legs(self) -> int:
         """Number of legs from the first on that shears."""
         sheared = (index for index, leg in enumerate(self.ways) if any(map(any, leg.shear)))
@@ -273,8 +278,7 @@ class LoadHistory(ShearPath):
         shear = None
         if self.shear_key:
             x, y = (reached(*ends) for ends in zip(*leg.shear, strict=True))
-            shifts = self.shear_key == "shear"
-            shear = ShearControl(shift=(x, y)) if shifts else ShearControl(force=(x, y))
+            shear = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
         if leg.quantity == "approach":
             return Control(approach=value, tilt=self.slopes, body_state=state, shear=shear)
         force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand

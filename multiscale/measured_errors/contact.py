@@ -26,7 +26,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -38,7 +37,6 @@ from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Caution, percent, quantity
 from support.arrays import Array
-from support.collective import on_root_alone
 from support.errors import InputError
 
 ZERO = "zero"
@@ -275,35 +273,32 @@ def checked(
     step: LoadStep,
     probe: ErrorProbe,
     load_history: LoadHistory,
-    comm: Any,
     *,
     start: Start | None = None,
     behind: float | None = None,
 ) -> LoadStep:
-    """Return a load step with its errors measured; rank 0 solves for all.
+    """Return a load step with its errors measured.
 
     Args:
         step: The load step.
         probe: Measures the errors.
         load_history: The loads.
-        comm: MPI communicator; None for this process alone.
-        start: The solution of the load step on rank 0, where the run has it.
+        start: The solution of the load step, where the run has it.
         behind: See `ErrorProbe.measure`.
 
     Raises:
         NotConverged: When a contact problem cannot be solved.
-
-    Note:
-        Collective.
     """
     by_force = load_history.quantity_in(step.stage) == "force"
-    turns = load_history.slopes is None
-    plane = step.force_N, step.approach_mm, step.tilt
-
-    def measured() -> MeasuredErrors:
-        return probe.measure(*plane, start=start, turns=turns, stiffness=by_force, behind=behind)
-
-    found = on_root_alone(comm, measured)
+    found = probe.measure(
+        step.force_N,
+        step.approach_mm,
+        step.tilt,
+        start=start,
+        turns=load_history.slopes is None,
+        stiffness=by_force,
+        behind=behind,
+    )
     return with_errors(step, found, by_force=by_force)
 
 

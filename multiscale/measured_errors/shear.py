@@ -69,7 +69,7 @@ def shear_errors(
         By cause the error of the shear force where the shift is prescribed [N], of the shift where
         the shear force is [mm]; infinite where it is not measured.
     """
-    step, by_shift = steps[-1], history.shear_key != "shear_force"
+    step, by_shift = steps[-1], history.by_shift
     grid = probe.model.surface.grid
     if min(grid) < FEWEST_CELLS:
         return {"grid": math.inf}
@@ -145,7 +145,7 @@ def _of(shear: ShearState, *, by_shift: bool) -> Array:
 
 def path_of(steps: Sequence[LoadStep], history: LoadHistory, *, every_load: bool) -> list[Control]:
     """Return what the load steps prescribe that the path of a shear cannot do without."""
-    by_shift = history.shear_key != "shear_force"
+    by_shift = history.by_shift
     kept = turning_points(steps, by_shift=by_shift, every_load=every_load)
     return [_control(one, history) for one in kept]
 
@@ -222,7 +222,7 @@ def _response(step: LoadStep, *, by_shift: bool) -> Array:
 
 def _control(step: LoadStep, history: LoadHistory) -> Control:
     """Return what a load step prescribed."""
-    by_shift = history.shear_key != "shear_force"
+    by_shift = history.by_shift
     tilt = None if history.slopes is None else step.tilt
     x, y = (float(one) for one in _prescribed(step, by_shift))
     shear = ShearControl(shift=(x, y)) if by_shift else ShearControl(force=(x, y))

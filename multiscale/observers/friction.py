@@ -14,7 +14,7 @@ import numpy as np
 from multiscale.couplings.coupling import Coupling
 from multiscale.loading.load_step import LoadStep
 from multiscale.measured_errors.shear import shear_error_notes
-from multiscale.observers.step_observers import ErrorCheck, StepObserver
+from multiscale.observers.step_observers import StepObserver
 from multiscale.readable import Caution, Detail, number, percent, quantity
 from multiscale.results.history import History
 
@@ -54,17 +54,13 @@ class FrictionObserver(StepObserver):
             yield loop
         by_laws = self._coupling.scene.rubs_on_mesh
         yield from self._law_notes() if by_laws else self._coupling_notes()
-        yield from shear_error_notes(steps, by_shift=self._by_shift)
+        yield from shear_error_notes(steps, by_shift=self._coupling.load_history.by_shift)
 
     def figures(self, history: History) -> Iterator[tuple[str, str, tuple[Any, ...]]]:
         """Yield what sticks and slips at the last recorded load step, and the loop of the shear."""
         contact = history.contact
         if contact is not None and contact.slipping is not None:
             yield "shear", "contact.shear_figure", (history, contact)
-
-    @property
-    def _by_shift(self) -> bool:
-        return self._coupling.load_history.shear_key != "shear_force"
 
     def _coupling_notes(self) -> Iterator[str]:
         """Yield what cells leave out of shear: the body, and what pressures and tractions do."""
@@ -108,23 +104,6 @@ class FrictionObserver(StepObserver):
                 f"surface sideways (Dundurs' β = {number(beta, 3)}) is left out; what pressures on "
                 "the whole face do is part of the mesh"
             )
-
-
-class ShearErrorCheck(ErrorCheck):
-    """Adds measured errors of the shear to load steps, as the scene's ``output.check`` says."""
-
-    _coupling: Any
-
-    def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
-        """Return the load step with the errors of its shear, where they are to be measured."""
-        if not self._asked(last=last) or step.shear_force_x_N is None:
-            return step
-        with self._coupling.clock.phase("check"):
-            return self._coupling.shear_checked(step, past)
-
-    def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
-        """Yield nothing: the errors are among the notes on friction."""
-        return iter(())
 
 
 def last_loop(steps: Sequence[LoadStep]) -> str:

@@ -210,19 +210,17 @@ class ErrorCheck(StepObserver):
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""
-        if not self._asked(last=last):
+        coupling, check = self._coupling, self._coupling.scene.output.check
+        if not (coupling.checks_steps and (check == "all" or (check == "last" and last))):
             return step
-        if self._plastic_past(step, past):
+        normal = not self._plastic_past(step, past)
+        if not normal:
             self._failures[_AFTER_UNLOADING] = None
-            return step
-        with self._coupling.clock.phase("check"):
-            solve = partial(self._coupling.checked, step, past)
+            if coupling.scene.friction is None:
+                return step
+        with coupling.clock.phase("check"):
+            solve = partial(coupling.checked, step, past, normal=normal)
             return self._tried(f"errors of load step {step.step} not measured", solve) or step
-
-    def _asked(self, *, last: bool) -> bool:
-        """Tell whether errors are to be measured at a load step."""
-        check = self._coupling.scene.output.check
-        return (check == "all" or (check == "last" and last)) and self._coupling.checks_steps
 
     def notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield why errors were not measured, and those that were."""
@@ -372,8 +370,6 @@ def _beside(coupling: Coupling) -> Iterator[StepObserver]:
     yield from (_loaded(place, coupling) for place in _places(coupling))
     yield EnergyObserver(coupling)
     yield ErrorCheck(coupling)
-    if coupling.scene.friction is not None and coupling.checks_shear:
-        yield _loaded("friction.ShearErrorCheck", coupling)
 
 
 def _loaded(place: str, coupling: Coupling) -> StepObserver:

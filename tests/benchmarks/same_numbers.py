@@ -126,6 +126,9 @@ def scenes(folder):
     yield "consistent friction", scene("consistent", load=SHEARED, **RUBS)
     yield "representative friction", sampled(load=SHEARED, **RUBS, **body)
     hard = {**HALF, "hardness": "312.7 MPa"}
+    pairs = [["0.1 um", "0"], ["0.2 um", "0.1 um"], ["0.1 um", "0"]]
+    turned = {**CYCLE, "shear": pairs, "shear_path": "along"}
+    yield "analytic friction", scene("analytic", hard, turned, CHECKED, **RUBS)
     yield "analytic leak", scene("analytic", hard, CYCLE, CHECKED, leak=OIL)
     yield "concurrent leak", scene("concurrent", output=CHECKED, leak=OIL)
     yield "consistent leak", scene("consistent", output=CHECKED, leak=OIL)
@@ -172,7 +175,7 @@ def numbers(history):
             if field.name in ("wall_s", "reason", "warnings", "newton_iterations",
                               "linear_iterations"):  # fmt: skip
                 continue
-            if field.name == "errors":
+            if field.name in ("errors", "shear_errors"):
                 value = dict(value)
             elif field.name == "patches":
                 value = {one.name: getattr(value, one.name) for one in dataclasses.fields(value)}
