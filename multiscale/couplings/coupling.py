@@ -21,7 +21,7 @@ from geometry.contact_state import ContactState
 from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import Bodies, free_bodies
+from multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
 from multiscale.bodies.fields import write_solved
 from multiscale.clock import Clock
 from multiscale.couplings import describe, validity
@@ -38,6 +38,7 @@ from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord
 from multiscale.scene.scene import Scene
 from support.arrays import Array
+from support.collective import on_root
 from support.errors import InputError
 
 Meshes = tuple[SceneBody | None, SceneBody | None]
@@ -60,6 +61,7 @@ class Coupling(SceneParts, ABC):
         table: The patch laws, once made, counted from first touch; set it to laws that are at hand.
             None without laws.
         start: What the first load step starts from, see `state`; set it before the solver is made.
+        solver_options: Whether the user set options of PETSc's solver, on rank 0.
     """
 
     micro: MicroModel | None = None
@@ -68,6 +70,7 @@ class Coupling(SceneParts, ABC):
     clock: Clock = field(default_factory=Clock, init=False)
     table: LawTable | None = field(default=None, init=False)
     start: Any = field(default=None, init=False)
+    solver_options: bool = field(default=False, init=False)
     _meshes: Meshes = field(default=(None, None), init=False)
 
     def __post_init__(self) -> None:
@@ -113,6 +116,8 @@ class Coupling(SceneParts, ABC):
             Collective.
         """
         self.comm, self._meshes = comm, meshes
+        # environments may differ, and ranks with another Newton would wait for each other
+        self.solver_options = on_root(comm, solver_options_given)
 
     def changed(self, **attributes: Any) -> Self:
         """Return a coupling on the same bodies, nothing of which is made yet.
@@ -121,7 +126,8 @@ class Coupling(SceneParts, ABC):
             attributes: Those that differ.
         """
         other = replace(self, **attributes)
-        other.comm, other._meshes = self.comm, self._meshes
+        for name in ("comm", "_meshes", "solver_options"):
+            setattr(other, name, getattr(self, name))
         return other
 
     @classmethod

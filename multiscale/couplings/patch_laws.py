@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, MicroModel
-from multiscale.bodies.bodies import on_body, solver_options_given
+from multiscale.bodies.bodies import on_body
 from multiscale.couplings.contact_solver import plane_at_largest_load
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
 from multiscale.couplings.micro_coupling import MicroCoupling
@@ -92,7 +92,7 @@ class PatchLaws(LawCoupling, MicroCoupling):
             return NewtonChoice(True, why)
         if coupling.newton != "auto":
             return NewtonChoice(coupling.newton == "condensed", "as the scene asks")
-        if solver_options_given():
+        if self.solver_options:
             return NewtonChoice(False, "PETSc's options are for its solver")
         steps = self.load_history.count
         compliance, full = self._compliance_cycles, self._full_cycles(steps)
