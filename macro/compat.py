@@ -321,67 +321,6 @@ def assemble_matrix(form: Any, conditions: Sequence[Any], kind: str = "aij") -> 
     return matrix
 
 
-def assemble_symmetric(form: Any, conditions: Sequence[Any], space: Any) -> PETSc.Mat:
-    """Assemble a symmetric form of displacements, see `assemble_matrix`, of which half is stored.
-
-    PETSc's type ``sbaij`` holds the 3 × 3 blocks on and above the diagonal. Beside ``baij`` it
-    takes half the memory, and its products 0.65 of the time.
-
-    Args:
-        form: Compiled form.
-        conditions: Dirichlet conditions.
-        space: Vector space of the form.
-
-    Note:
-        Collective.
-    """
-    nodes, comm = space.dofmap.index_map, space.mesh.comm
-    every = np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32)
-    numbers = nodes.local_to_global(every).astype(PETSc.IntType)
-    matrix = PETSc.Mat().create(comm)
-    matrix.setSizes(((3 * nodes.size_local, 3 * nodes.size_global),) * 2)
-    matrix.setType("sbaij")
-    matrix.setBlockSize(3)
-    matrix.setPreallocationNNZ(_blocks_above(space, numbers))
-    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
-    matrix.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
-    local = PETSc.LGMap().create(numbers, bsize=3, comm=comm)
-    matrix.setLGMap(local, local)
-    assemble_matrix_into(matrix, form, conditions)
-    return matrix
-
-
-def _blocks_above(space: Any, numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Return how many nodes from itself on this rank's nodes share cells with.
-
-    Args:
-        space: Vector space.
-        numbers: Global numbers of this rank's nodes, those of ghosts included.
-
-    Returns:
-        For every node of this rank, of this rank's nodes and of those of higher ranks.
-    """
-    cells = cell_nodes(space)[: space.mesh.topology.index_map(3).size_local]
-    own = space.dofmap.index_map.size_local
-    starts = np.arange(0, cells.size + 1, cells.shape[1] or 1, dtype=PETSc.IntType)
-    pattern = starts[: len(cells) + 1], numbers[cells.ravel()], np.ones(cells.size)
-    members = PETSc.Mat().createAIJ(
-        ((len(cells), None), (own, None)), csr=pattern, comm=space.mesh.comm
-    )
-    shared = members.transposeMatMult(members)
-    members.destroy()
-    first, last = shared.getOwnershipRange()
-    starts, columns, _ = shared.getValuesCSR()
-    shared.destroy()
-    row = np.repeat(np.arange(first, last), np.diff(starts))
-    above = columns >= row
-    counts = [
-        np.bincount(row[part] - first, minlength=own).astype(PETSc.IntType)
-        for part in (above & (columns < last), above & (columns >= last))
-    ]
-    return counts[0], counts[1]
-
-
 def assemble_vector(form: Any) -> PETSc.Vec:
     """Assemble a compiled linear form, contributions of all ranks added."""
     vector = fem_petsc.assemble_vector(form)

@@ -18,7 +18,7 @@ from petsc4py import PETSc
 from geometry.materials import Material
 from macro import compat
 from macro.linear_solvers.multigrid import Lattice
-from macro.linear_solvers.node_matrices import Stiffened
+from macro.linear_solvers.node_matrices import Stiffened, assemble_symmetric
 from macro.linear_solvers.options import PREFIX
 from macro.linear_solvers.selection import body_solver, vertex_transfer
 from macro.linear_solvers.solvers import solve_linear
@@ -239,7 +239,7 @@ class ElasticBody:
         """
         kind, form = "baij" if self.lattice else "aij", compat.compile_form(self.form)
         if not self.lattice and self.degree == 2:
-            kind, matrix = "sbaij", compat.assemble_symmetric(form, self.conditions, self.space)
+            kind, matrix = "sbaij", assemble_symmetric(form, self.conditions, self.space)
         else:
             matrix = compat.assemble_matrix(form, self.conditions, kind)
         if kind == "aij":

