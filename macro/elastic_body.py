@@ -19,9 +19,13 @@ from geometry.materials import Material
 from macro import compat
 from macro.linear_solvers.multigrid import Lattice
 from macro.linear_solvers.node_matrices import Stiffened, assemble_symmetric
-from macro.linear_solvers.options import PREFIX
-from macro.linear_solvers.selection import body_solver, vertex_transfer
-from macro.linear_solvers.solvers import solve_linear
+from macro.linear_solvers.selection import (
+    Spectrum,
+    body_solver,
+    takes_rigid_body_modes,
+    vertex_transfer,
+)
+from macro.linear_solvers.solvers import LinearSolver, solve_linear
 from macro.mesh.supports import Loads, Traction
 from support.arrays import Array
 from support.errors import InputError
@@ -233,18 +237,15 @@ class ElasticBody:
     def stiffness(self) -> PETSc.Mat:
         """Stiffness matrix [N/mm] with unit rows for constrained degrees of freedom.
 
-        Lattices and quadratic elements have it in blocks of 3 × 3, which geometric multigrid takes,
-        quadratic elements without a lattice those above the diagonal alone. Algebraic multigrid
-        takes none.
+        It is in blocks of 3 × 3, without a lattice those on and above the diagonal alone. Algebraic
+        multigrid and the user's direct solvers take none: they get a copy.
         """
-        kind, form = "baij" if self.lattice else "aij", compat.compile_form(self.form)
-        if not self.lattice and self.degree == 2:
-            kind, matrix = "sbaij", assemble_symmetric(form, self.conditions, self.space)
+        form = compat.compile_form(self.form)
+        if self.lattice:
+            matrix = compat.assemble_matrix(form, self.conditions, "baij")
         else:
-            matrix = compat.assemble_matrix(form, self.conditions, kind)
-        if kind == "aij":
-            matrix.setOption(PETSc.Mat.Option.SPD, True)  # for the user's direct solvers
-        if kind == "aij" or PETSc.Options(PREFIX).hasName("pc_type"):  # 48 bytes an unknown
+            matrix = assemble_symmetric(form, self.conditions, self.space)
+        if takes_rigid_body_modes():  # 48 bytes an unknown
             points = self.space.tabulate_dof_coordinates()[: self.owned_dofs // 3]
             matrix.setNearNullSpace(rigid_body_modes(points, self.comm))
         return matrix
@@ -255,22 +256,31 @@ class ElasticBody:
         return [self.stiffness]
 
     @cached_property
-    def solver(self) -> PETSc.KSP:
+    def solver(self) -> LinearSolver:
         """Linear solver of the body alone; its preconditioner also serves the contact solves."""
         _ = self._held_row  # needs 70 bytes an unknown for a moment, which are free as yet
-        return self.solver_of()
+        return body_solver(self)
+
+    @cached_property
+    def spectrum(self) -> Spectrum:
+        """What the preconditioner of the body alone leaves of its eigenvalues."""
+        return Spectrum.of(self.solver)
+
+    def release_solver(self) -> None:
+        """Drop the solver of the body alone; it is made again when it is asked for."""
+        _ = self.spectrum
+        self.__dict__.pop("solver", None)
 
     @cached_property
     def from_vertices(self) -> PETSc.Mat:
         """Interpolation of quadratic displacements from those of the vertices."""
         return vertex_transfer(self.space, self.linear.space, self.free)
 
-    def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
-        """Return a linear solver for the stiffness, and for what else holds the body.
+    def solver_of(self, stiffened: Stiffened) -> LinearSolver:
+        """Return a linear solver for the stiffness whose preconditioner knows springs.
 
         Args:
-            stiffened: The stiffness with springs, which the preconditioner then knows; keep it as
-                long as the solver. None: no springs.
+            stiffened: The stiffness with springs; keep it as long as the solver.
         """
         return body_solver(self, stiffened)
 

@@ -39,17 +39,13 @@ class ContactPreconditioner:
         face: The contact face that laws stand on at points; None for other laws. On a lattice,
             whose multigrid is geometric, laws do not enter the matrix.
         sampling: The samples that laws are evaluated at.
-        solver: Linear solver of the body alone.
 
     Note:
         Everything is collective.
     """
 
-    def __init__(
-        self, equilibrium: Equilibrium, face: Any, sampling: Sampling, solver: PETSc.KSP
-    ) -> None:
-        self._equilibrium, self._face, self._alone = equilibrium, face, solver
-        self._sampling = sampling
+    def __init__(self, equilibrium: Equilibrium, face: Any, sampling: Sampling) -> None:
+        self._equilibrium, self._face, self._sampling = equilibrium, face, sampling
         self._knows_laws = face is not None and equilibrium.body.lattice is None
         self._rubs = isinstance(equilibrium.forces, FrictionalForces)
         self._with_laws: PETSc.KSP | None = None
@@ -82,6 +78,8 @@ class ContactPreconditioner:
             self._with_laws = self._stiffened = None
         if forces.comm.allreduce(slope.any(), op=MPI.LOR):
             face = self._face
+            body.release_solver()
+            compat.collect_garbage(body.stiffness.comm)
             points = face.points_in_all_directions if self._rubs else face.points_by_dofs
             springs = springs_at(points, slope)
             self._stiffened = Stiffened(body.stiffness, body.stiffnesses, springs)
@@ -103,7 +101,7 @@ class ContactPreconditioner:
     @property
     def _fixed(self) -> PETSc.PC:
         """The preconditioner under a plane in a given place."""
-        return (self._with_laws or self._alone).pc
+        return (self._with_laws or self._equilibrium.body.solver).pc
 
     def apply(self, pc: PETSc.PC, x: PETSc.Vec, y: PETSc.Vec) -> None:
         """Write y for x; PETSc calls this."""

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from macro.contact.equations import Equilibrium
 from macro.contact.law_lines import Lines, law_lines
 from macro.contact.sampling import Sampling
-from macro.linear_solvers.node_matrices import joined_diagonal, springs_at
+from macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from macro.linear_solvers.options import conjugate_gradients, shell
 
 Array = NDArray[np.float64]
@@ -154,27 +154,24 @@ class _Layer:
 
     def __init__(self, equilibrium: Equilibrium, points: PETSc.Mat, nodes: Flags) -> None:
         self._forces, comm = equilibrium.forces, points.comm
-        parts, first = [], 0
+        self._parts, first = list[PETSc.Mat](), 0
         for stiffness in equilibrium.body.stiffnesses:
             last = first + stiffness.getLocalSize()[0] // 3
             own = _dofs(nodes[first:last], stiffness)
-            part, first = stiffness.createSubMatrix(own, own), last
-            parts.append(part.convert("aij", PETSc.Mat()))
-            part.destroy()
+            self._parts.append(stiffness.createSubMatrix(own, own))
+            first = last
         rows = PETSc.IS().createStride(
             points.getLocalSize()[0], points.getOwnershipRange()[0], step=1, comm=comm
         )
         self._points = points.createSubMatrix(rows, _dofs(nodes, points))
-        self._alone = parts[0] if len(parts) == 1 else joined_diagonal(parts)
+        one = len(self._parts) == 1
+        self._alone = self._parts[0] if one else joined_diagonal(self._parts)
         self._values, self._moved = self._points.createVecLeft(), self._points.createVecRight()
         self._moved.array[:] = np.random.default_rng(1).uniform(1.0, 2.0, self._moved.local_size)
         self._points.mult(self._moved, self._values)
         self.sampled = self._values.array_r != 0.0
         self._moved.set(0.0)
         self._stiff, self._border = self._alone, np.zeros((0, 0))
-        # entries between two bodies are new; others would only make one more copy of the matrix
-        patterns = PETSc.Mat.Structure
-        self._pattern = patterns.SUBSET if len(parts) == 1 else patterns.DIFFERENT
 
     def step(self, change: Array, stiffness: Array) -> Array:
         """Move the nodes to equilibrium with laws that are lines, and return how samples move.
@@ -190,19 +187,19 @@ class _Layer:
         forces = self._forces
         self._border = forces.border(stiffness)
         springs = springs_at(self._points, stiffness / forces.weight)
-        self._stiff = self._alone.copy()
-        self._stiff.axpy(1.0, springs, self._pattern)
+        stiffened = Stiffened(self._alone, self._parts, springs)
+        self._stiff, blocks = stiffened.product, stiffened.block_diagonal()
         load, move = self._moved.duplicate(), self._moved.duplicate()
         self._values.array[:] = change
         self._points.multTranspose(self._values, load)
         self._alone.mult(self._moved, move)
         load.axpy(-1.0, move)
-        operator = shell(self._stiff, self)
-        solver = conjugate_gradients(operator, self._stiff, None)
+        operator = shell(self._alone, self)
+        solver = conjugate_gradients(operator, blocks, None)
         solver.setTolerances(rtol=_ROUGHLY)
         solver.solve(load, move)
         self._moved.axpy(1.0, move)
-        for part in (springs, self._stiff, solver, operator, load, move):
+        for part in (springs, blocks, self._stiff, solver, operator, load, move):
             part.destroy()
         self._points.mult(self._moved, self._values)
         return self._values.array_r.copy()

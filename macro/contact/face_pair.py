@@ -109,15 +109,20 @@ class BodyPair:
         solver.setUp()
         return solver
 
-    def solver_of(self, stiffened: Stiffened | None = None) -> PETSc.KSP:
-        """Return a linear solver for the stiffness, and for what joins the bodies.
+    def release_solver(self) -> None:
+        """Drop the solvers of both; see `ElasticBody.release_solver`."""
+        for name in ("solver", "_preconditioner"):
+            self.__dict__.pop(name, None)
+        self.body.release_solver()
+        self.counter.release_solver()
+
+    def solver_of(self, stiffened: Stiffened) -> PETSc.KSP:
+        """Return a linear solver whose preconditioner knows what joins the bodies.
 
         Args:
-            stiffened: The stiffness with springs, which the preconditioner then knows; keep it as
-                long as the solver. None: no springs.
+            stiffened: The stiffness with springs; keep it as long as the solver.
         """
-        both = self.body, self.counter
-        return self.solver if stiffened is None else joint_solver(both, self.stiffness, stiffened)
+        return joint_solver((self.body, self.counter), self.stiffness, stiffened)
 
     def preload(self, state: float = 0.0) -> Array | None:
         """Return the displacements without contact; see `ElasticBody.preload`."""

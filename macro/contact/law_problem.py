@@ -98,7 +98,7 @@ class LawContactProblem:
         if opposite is not None:
             self._beside = BesideHalfSpace(face, sampling, self.equilibrium, opposite)
         self._preconditioner = ContactPreconditioner(
-            self.equilibrium, face if mode == "pointwise" else None, sampling, body.solver
+            self.equilibrium, face if mode == "pointwise" else None, sampling
         )
         options = None if friction is None else UNSYMMETRIC
         self.newton = Newton(self.equilibrium, self._preconditioner, options)

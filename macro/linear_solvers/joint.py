@@ -93,7 +93,7 @@ def _slow_modes(bodies: Sequence[Any]) -> Array | None:
     modes = []
     for body in bodies:
         own = body.linear if body.degree == 2 else body
-        modes.append(body.solver.modes)
+        modes.append(body.spectrum.modes)
         if modes[-1] is None:
             if body.degree == 2 and body.lattice is None:
                 return None

@@ -259,15 +259,15 @@ def conjugate_gradients(operator: PETSc.Mat, matrix: PETSc.Mat, preconditioner: 
     Args:
         operator: The operator.
         matrix: The matrix that the preconditioner is made of.
-        preconditioner: Has ``apply``; keep it as long as the solver. None: symmetric sweeps of
-            Gauss and Seidel on every rank.
+        preconditioner: Has ``apply``; keep it as long as the solver. None: the matrix has diagonal
+            blocks alone, which are inverted.
     """
     solver = PETSc.KSP().create(operator.comm)
     solver.setOperators(operator, matrix)
     solver.setType("cg")
     solver.setNormType(PETSc.KSP.NormType.UNPRECONDITIONED)
     solver.setTolerances(max_it=_MOST_ITERATIONS)
-    solver.pc.setType("sor" if preconditioner is None else "python")
+    solver.pc.setType("pbjacobi" if preconditioner is None else "python")
     if preconditioner is not None:
         solver.pc.setPythonContext(WeakContext(preconditioner))
     return solver

@@ -48,6 +48,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -73,7 +74,13 @@ from macro.linear_solvers.options import (
     has_mumps,
     largest_eigenvalue,
 )
-from macro.linear_solvers.solvers import MARGINS, CoarserGrid, LinearSolver, linear_solver
+from macro.linear_solvers.solvers import (
+    MARGINS,
+    CoarserGrid,
+    LinearSolver,
+    linear_solver,
+    pointwise,
+)
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -155,6 +162,32 @@ _SMOOTHING_FLAT: Mapping[str, object] = {
 as long as high. The vertices do not see bending within a cell, which is soft there."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Spectrum:
+    """What is known of a body's matrix with its preconditioner, which serves with springs too.
+
+    Args:
+        modes: This rank's rows of the modes that its solver solves for; None: not looked for.
+        largest: Largest eigenvalue on all nodes of quadratic elements; 0 where none was estimated.
+    """
+
+    modes: NDArray[np.float64] | None
+    largest: float
+
+    @classmethod
+    def of(cls, solver: LinearSolver) -> Spectrum:
+        """Return what a body's solver found; collective."""
+        two_grids = solver.method == "mg" and solver.pc.getMGLevels() == 2
+        smoother = solver.pc.getMGSmoother(1) if two_grids else None
+        return cls(solver.modes, largest_eigenvalue(smoother) if smoother else 0.0)
+
+
+def takes_rigid_body_modes() -> bool:
+    """Tell whether a matrix may get a preconditioner that reads its near-nullspace."""
+    user = PETSc.Options(PREFIX)
+    return not has_hypre() or user.hasName("pc_type") or user.hasName("mg_coarse_pc_type")
+
+
 def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
     """Return a solver for a body's stiffness; PETSc's options of the user win.
 
@@ -175,7 +208,7 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
     if lattice is not None and requested in ("", "mg"):
         smoother = smoothing(ratio, hexahedral=compat.is_hexahedral(mesh))
         return linear_solver(matrix, coarser_grids(lattice, matrix, body.free), smoother)
-    modes = None if stiffened is None else body.solver.modes
+    modes = None if stiffened is None else body.spectrum.modes
     if lattice is None and body.degree == 2 and requested in ("", "mg"):
         springs, finest = None, (matrix, block_diagonal(diagonal_blocks(matrix), matrix.comm))
         if stiffened is not None:
@@ -183,7 +216,7 @@ def body_solver(body: Any, stiffened: Stiffened | None = None) -> LinearSolver:
         grid = vertex_grid(body, springs)
         options = quadratic_options(mesh, grid[0].matrix)
         if stiffened is not None:
-            options = _smoothing_as_before(options, body.solver)
+            options = _smoothing_as_before(options, body.spectrum.largest)
         solver = linear_solver(matrix, grid, options, finest=finest)
         if has_slow_modes(solver):
             solver.solve_slow_modes(solver.pc.getMGCoarseSolve(), modes=modes)
@@ -236,7 +269,7 @@ def has_slow_modes(solver: LinearSolver) -> bool:
     return not requested and coarse != _FACTORISED_GRID["pc_type"]
 
 
-def _smoothing_as_before(options: Mapping[str, object], solver: PETSc.KSP) -> Mapping[str, object]:
+def _smoothing_as_before(options: Mapping[str, object], largest: float) -> Mapping[str, object]:
     """Return options that smooth K + S as those smooth K, without estimating eigenvalues anew.
 
     Preconditioned by blocks of its diagonal, the sum of two matrices has no larger eigenvalue than
@@ -246,9 +279,8 @@ def _smoothing_as_before(options: Mapping[str, object], solver: PETSc.KSP) -> Ma
 
     Args:
         options: Those of K.
-        solver: The solver of K.
+        largest: Largest eigenvalue of K, preconditioned like that; 0 where it is unknown.
     """
-    largest = largest_eigenvalue(solver.pc.getMGSmoother(1))
     if not largest:
         return options
     low, high = (float(part) for part in str(options[f"{_RANGE}esteig"]).split(",")[1::2])
@@ -306,11 +338,12 @@ def vertex_grid(body: Any, springs: PETSc.Mat | None = None) -> list[CoarserGrid
         Collective.
     """
     transfer, matrix = body.from_vertices, body.linear.stiffness
-    if springs is not None:
-        there = springs.ptap(transfer)
-        matrix = with_springs([matrix], there)
-        there.destroy()
-    return [CoarserGrid(transfer, matrix)]
+    if springs is None:
+        return [CoarserGrid(transfer, pointwise(matrix))]
+    there = springs.ptap(transfer)
+    grid = CoarserGrid(transfer, with_springs([matrix], there))
+    there.destroy()
+    return [grid]
 
 
 def vertex_transfer(space: Any, linear: Any, free: PETSc.Vec) -> PETSc.Mat:

@@ -118,7 +118,7 @@ def linear_solver(
     """
     solver: LinearSolver = LinearSolver().create(matrix.comm)
     solver.setOptionsPrefix(prefix)
-    made_of = _pointwise(whole or matrix) if coarser is None else matrix
+    made_of = pointwise(whole or matrix) if coarser is None else matrix
     solver.setOperators(matrix, made_of)
     if coarser is not None:
         solver.pc.setType("mg")
@@ -132,6 +132,9 @@ def linear_solver(
     usual = ALGEBRAIC_DEFAULTS if coarser is None else {**GEOMETRIC_DEFAULTS, **one_rank}
     with default_options(prefix, {**KRYLOV_DEFAULTS, **usual, **(preconditioner or {})}):
         solver.setFromOptions()
+        if made_of is not matrix and solver.pc.getType() == "hypre":
+            made_of = _hypres(made_of)  # else hypre's own copy would stand beside this one
+            solver.setOperators(matrix, made_of)
         set_up(solver)  # multigrid reads the options of its levels here
     if made_of is not matrix:
         solver.pc.setReusePreconditioner(True)
@@ -140,7 +143,7 @@ def linear_solver(
     return solver
 
 
-def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
+def pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
     """Return a matrix of type ``aij``, because few preconditioners take 3 × 3 blocks."""
     if not matrix.getType().endswith("baij"):
         return matrix
@@ -148,6 +151,15 @@ def _pointwise(matrix: PETSc.Mat) -> PETSc.Mat:
     copy.setOption(PETSc.Mat.Option.SPD, True)
     copy.setNearNullSpace(matrix.getNearNullSpace())
     return copy
+
+
+def _hypres(matrix: PETSc.Mat) -> PETSc.Mat:
+    """Return a matrix as one of hypre's, and destroy it."""
+    # converted in place, 3.18 keeps the entries twice
+    other, size = matrix.convert("hypre", PETSc.Mat()), matrix.getBlockSize()
+    matrix.destroy()
+    other.setBlockSize(size)  # of the components of a node
+    return other
 
 
 def solve_linear(
@@ -195,7 +207,7 @@ def solved_at_once(matrix: PETSc.Mat, right: NDArray[np.float64]) -> NDArray[np.
     Note:
         Collective.
     """
-    solver, factorised = PETSc.KSP().create(matrix.comm), _pointwise(matrix)
+    solver, factorised = PETSc.KSP().create(matrix.comm), pointwise(matrix)
     solver.setOperators(factorised)
     solver.setType("preonly")
     solver.pc.setType("cholesky")

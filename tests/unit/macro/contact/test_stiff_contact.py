@@ -1,14 +1,17 @@
 """Laws much stiffer than the elements under them take few linear iterations."""
 
+import weakref
+
 import numpy as np
 import pytest
-from helpers.body_meshes import box, standing
+from helpers.body_meshes import box, hanging, standing
 
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from geometry.shear_state import ShearControl
 from geometry.spring_bed import Friction
-from macro import LawContactProblem, Material
+from macro import FacePair, LawContactProblem, Material
+from macro.contact.loaded_face import displacements_under
 from macro.linear_solvers.options import has_hypre
 
 WHOLE = PatchGrid(grid=(1, 1), lengths=(1.0, 1.0))
@@ -48,6 +51,22 @@ def test_stiff_laws_take_few_iterations(cell, order):
     # 17.0 on linear ones. Laws of 1e5 take 6 to 8 a step, in steps that gain fewer digits.
     assert stiff <= (15.0 if order == 2 else 6.0 if has_hypre() else 20.0)
     assert state.reaction == pytest.approx(state.force, rel=1e-7)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("bodies", [1, 2])
+def test_laws_take_the_place_of_the_multigrid_of_bodies_alone(bodies, order):
+    face = standing(box((0, 0, -0.5), (1, 1, 0), (4, 4, 2), "tetrahedron"), SOFT, WHOLE, order)
+    if bodies == 2:
+        above = box((0, 0, 0), (1, 1, 0.5), (3, 3, 2))
+        face = FacePair(face, hanging(above, SOFT, WHOLE, order))
+    parts = [side.body for side in face.sides]
+    alone = [weakref.ref(each.solver) for each in (face.body, *parts)]
+    before = displacements_under(face, np.eye(1))
+    pressed = LawContactProblem(face, [Square(1e7)], "pointwise").solve(Control(approach=1e-3))
+    assert pressed.force > 0.0
+    assert [each() for each in alone] == [None] * len(alone)  # half of the memory
+    assert displacements_under(face, np.eye(1)) == pytest.approx(before, rel=1e-8)  # made again
 
 
 def test_the_answer_does_not_depend_on_the_preconditioner(monkeypatch):
