@@ -299,7 +299,7 @@ class OppositeHalfSpace:
             if not np.isfinite(found).all():
                 break
             rest = found - forces
-            change, share = self._newton_step(changes, moved, rest), 1.0
+            change, share = self._newton_step(changes, moved, rest, what), 1.0
             by_change = moved(change)
             start, cuts = float(np.vdot(rest, by_change)), _MOST_CUTS * (number // _TURN % 2 == 0)
             while True:
@@ -315,7 +315,11 @@ class OppositeHalfSpace:
         raise _failed(what, _MOST_STEPS)
 
     def _newton_step(
-        self, changes: Callable[[Array], Array], moved: Callable[[Array], Array], rest: Array
+        self,
+        changes: Callable[[Array], Array],
+        moved: Callable[[Array], Array],
+        rest: Array,
+        what: str,
     ) -> Array:
         """Solve (1 + S H) f = r with the stiffness S of the contact and the half-spaces H.
 
@@ -326,19 +330,23 @@ class OppositeHalfSpace:
             changes: S, see `_on_half_spaces`.
             moved: The compliance of the half-space.
             rest: r, on the grid [N].
+            what: What is looked for, for an error.
+
+        Raises:
+            NotConverged: When that many products do not find it.
         """
         forces, way, by_way = np.zeros_like(rest), rest, moved(rest)
         square = first = float(np.vdot(rest, by_way))
         for _ in range(_MOST_PRODUCTS):
             if not square > _STEP**2 * first:
-                break
+                return forces
             product = way + self.spread(changes(self._on_both(by_way)))
             share = square / float(np.vdot(by_way, product))
             forces, rest = forces + share * way, rest - share * product
             by_rest, last = moved(rest), square
             square = float(np.vdot(rest, by_rest))
             way, by_way = rest + square / last * way, by_rest + square / last * by_way
-        return forces
+        raise _failed(what, _MOST_PRODUCTS, "DIVERGED_LINEAR_SOLVE (DIVERGED_MAX_IT)")
 
     @cached_property
     def _spread(self) -> csr_matrix:
@@ -448,6 +456,6 @@ def _accelerated(
     return x, False
 
 
-def _failed(what: str, iterations: int) -> NotConverged:
+def _failed(what: str, iterations: int, reason: str = "DIVERGED_MAX_IT") -> NotConverged:
     remedy = "take smaller load steps (load.steps), or give the counter-body a mesh"
-    return NotConverged(what, reason="DIVERGED_MAX_IT", iterations=iterations, remedy=remedy)
+    return NotConverged(what, reason=reason, iterations=iterations, remedy=remedy)

@@ -10,6 +10,7 @@ from scipy.optimize import brentq, root
 from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from multiscale.law_solvers.condensed import equilibrium
+from multiscale.law_solvers.loaded_patches import LoadedPatches
 from support.errors import InputError, NotConverged
 
 
@@ -173,6 +174,17 @@ def test_plane_that_touches_nothing_carries_nothing():
     state = equilibrium(laws, compliance(), PATCHES, Control(approach=4e-3, tilt=None))
     assert not state.point.pressure.any()
     np.testing.assert_allclose(state.point.closure, 4e-3, rtol=1e-12)  # the iteration's residual
+
+
+@pytest.mark.parametrize("tilt", TILTS.values(), ids=TILTS)
+def test_a_plane_without_support_moves_on_to_the_next_touch(monkeypatch, tilt):
+    newton = partial(equilibrium, HertzLaws(touches()), compliance(), PATCHES)
+    above = newton(Control(approach=-5e-3, tilt=tilt or (0.0, 0.0)))
+    assert not above.point.pressure.any()
+    wanted = newton(Control(force=9.0, tilt=tilt))
+    monkeypatch.delattr(LoadedPatches, "initial_guess")  # it would hide a plane that went away
+    state = newton(Control(force=9.0, tilt=tilt), above)
+    np.testing.assert_allclose(state.plane, wanted.plane, atol=1e-13)  # residuals of 1e-14 mm
 
 
 def test_force_on_open_patches_is_refused():
