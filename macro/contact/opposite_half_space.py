@@ -288,7 +288,7 @@ class OppositeHalfSpace:
 
         Raises:
             NotConverged: When steps do not find it, as with friction on springs 10⁴ times as stiff
-                as the half-space under the face.
+                as the half-space under the face, or when products do not find a step.
         """
 
         def found_at(forces: Array) -> Array:

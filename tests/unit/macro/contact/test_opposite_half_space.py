@@ -13,6 +13,7 @@ from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
 from micro.friction.goodman import CrossCompliance
 from micro.friction.tangential_grid import cerruti_kernels
+from support.errors import NotConverged
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]
 NU = 0.3
@@ -96,6 +97,13 @@ def test_rigid_body_on_springs_against_a_dense_matrix(stiffness, allowed):
     assert again.approach == pytest.approx(
         APPROACH, rel=1e-6
     )  # displacements, 45 closures, are met to 1e-8
+
+
+def test_a_step_whose_conjugate_gradients_do_not_end_says_so(monkeypatch):
+    monkeypatch.setattr("macro.contact.opposite_half_space._MOST_PRODUCTS", 2)
+    with pytest.raises(NotConverged, match="DIVERGED_LINEAR_SOLVE") as error:
+        pressed(face_of(4), 5e4, Control(approach=APPROACH))
+    assert error.value.iterations == 2
 
 
 def test_a_stiff_half_space_is_a_rigid_plane_and_steps_follow_each_other():
