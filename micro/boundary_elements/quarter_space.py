@@ -37,7 +37,8 @@ Theory: docs/theory.md, section 5.
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -46,6 +47,10 @@ from support.arrays import Array
 
 _STEP = 0.08
 """Step of the tables, in the logarithm of distances times wave number."""
+
+Spline = tuple[Any, ...]
+"""Knots, coefficients and degrees of a bicubic spline, as `scipy.interpolate.bisplev` takes them;
+objects of splines check every call for longer than they evaluate some 30 × 30 places."""
 
 
 def side_compliance(poisson_ratio: float, x: Array, wave_number: float) -> Array:
@@ -86,31 +91,35 @@ def side_stresses(poisson_ratio: float, x: Array, wave_number: float) -> Array:
 
 
 @cache
-def _compliance_splines(nu: float) -> list[scipy.interpolate.RectBivariateSpline]:
+def _compliance_splines(nu: float) -> list[Spline]:
     logs = _logs(1e-8)
-    return [scipy.interpolate.RectBivariateSpline(logs, logs, _side_compliance(logs, nu))]
+    return [_spline(logs, _side_compliance(logs, nu))]
 
 
 @cache
-def _stress_splines(nu: float) -> list[scipy.interpolate.RectBivariateSpline]:
+def _stress_splines(nu: float) -> list[Spline]:
     """Return splines of the stresses times x + x': so they vary little where both are short."""
     logs = _logs(1e-11)
     apart = np.add.outer(np.exp(logs), np.exp(logs))
-    return [
-        scipy.interpolate.RectBivariateSpline(logs, logs, part)
-        for part in _side_stresses(logs, nu) * apart
-    ]
+    return [_spline(logs, part) for part in _side_stresses(logs, nu) * apart]
 
 
-def _values(splines: list[scipy.interpolate.RectBivariateSpline], distances: Array) -> Array:
+def _spline(logs: Array, values: Array) -> Spline:
+    """Return the spline through the values of a table."""
+    spline = scipy.interpolate.RectBivariateSpline(logs, logs, values)
+    return (*spline.get_knots(), spline.get_coeffs(), 3, 3)
+
+
+def _values(splines: list[Spline], distances: Array) -> Array:
     """Return functions at pairs of ascending distances, (functions, n, n); 0 beyond tables."""
-    first, *_, last = splines[0].get_knots()[0]
+    first, *_, last = splines[0][0]
     logs = np.log(distances)
     within = int(np.searchsorted(logs, last))
     places = np.maximum(logs[:within], first)
     values = np.zeros((len(splines), len(logs), len(logs)))
     for value, spline in zip(values, splines, strict=True):
-        value[:within, :within] = spline(places, places) if within else 0.0
+        if within:
+            value[:within, :within] = scipy.interpolate.bisplev(places, places, spline)
     return values
 
 
@@ -181,10 +190,9 @@ def side_traction(logs: Array, poisson_ratio: float) -> Array:
         logs: Logarithms of depths and distances, ascending, shape (n,).
         poisson_ratio: ν.
     """
-    x = np.exp(logs)
-    z, rho = x[:, None], np.hypot(x[:, None], x)
-    direct = z * x**2 * _k2(rho) / rho**2
-    return np.asarray(2.0 / np.pi * (direct - (1.0 - 2.0 * poisson_ratio) * _depth_integral(logs)))
+    x, of = np.exp(logs), _radial_functions(logs.tobytes())
+    direct = x[:, None] * x**2 * of.k2 / of.rho**2
+    return np.asarray(2.0 / np.pi * (direct - (1.0 - 2.0 * poisson_ratio) * of.below))
 
 
 def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
@@ -194,24 +202,38 @@ def side_pressure_stresses(logs: Array, poisson_ratio: float) -> Array:
         logs: Logarithms of distances on the top and of depths on the side, which come last, (n,).
         poisson_ratio: ν.
     """
-    x = np.exp(logs)[:, None]
-    rho = np.hypot(x, x.T)
-    k_0, k_1, k_2 = (function(rho) for function in (scipy.special.k0, scipy.special.k1, _k2))
-    below = (1.0 - 2.0 * poisson_ratio) * _depth_integral(logs)
-    xx = -(x**3) * k_2 / rho**2
-    yy = x * k_0 - 2.0 * poisson_ratio * x * k_1 / rho - below
-    return 2.0 / np.pi * np.stack([xx, yy, -(x**2) * k_1 / rho])
+    x, of = np.exp(logs)[:, None], _radial_functions(logs.tobytes())
+    xx = -(x**3) * of.k2 / of.rho**2
+    along = x * of.k0 - 2.0 * poisson_ratio * x * of.k1 / of.rho
+    yy = along - (1.0 - 2.0 * poisson_ratio) * of.below
+    return 2.0 / np.pi * np.stack([xx, yy, -(x**2) * of.k1 / of.rho])
 
 
-def _depth_integral(logs: Array) -> Array:
-    """Return ∫_z^∞ K₀(√(x² + s²)) ds at depths z and distances x of exp(logs), shape (n, n)."""
-    x = np.exp(logs)
-    below = scipy.interpolate.make_interp_spline(
-        logs, scipy.special.k0(np.hypot.outer(x, x)) * x[:, None]
-    ).antiderivative()
-    return np.asarray(below(logs[-1]) - below(logs))
+class _RadialFunctions(NamedTuple):
+    """Functions of ρ = √(x² + z²) at k = 1, at depths z and distances x of a table, (n, n) each.
+
+    Attributes:
+        rho: ρ.
+        k0: K₀(ρ).
+        k1: K₁(ρ).
+        k2: K₂(ρ).
+        below: ∫_z^∞ K₀(√(x² + s²)) ds.
+    """
+
+    rho: Array
+    k0: Array
+    k1: Array
+    k2: Array
+    below: Array
 
 
-def _k2(x: Array) -> Array:
-    """Return K₂(x), by K₀ and K₁."""
-    return np.asarray(scipy.special.k0(x) + 2.0 / x * scipy.special.k1(x))
+@lru_cache(maxsize=1)
+def _radial_functions(logs: bytes) -> _RadialFunctions:
+    """Return the functions at depths and distances exp(logs), of which the bytes are given."""
+    places = np.frombuffer(logs)
+    x = np.exp(places)
+    rho = np.hypot.outer(x, x)
+    k_0, k_1 = scipy.special.k0(rho), scipy.special.k1(rho)
+    below = scipy.interpolate.make_interp_spline(places, k_0 * x[:, None]).antiderivative()
+    integral = np.asarray(below(places[-1]) - below(places))
+    return _RadialFunctions(rho, k_0, k_1, k_0 + 2.0 / rho * k_1, integral)
