@@ -25,6 +25,8 @@ MOST_IMBALANCE = 1e-10
 _GOAL = 1e-12
 """Imbalance at which the iteration stops."""
 _MOST_ITERATIONS = 500
+_GROWTH = 2.0
+"""Growth of the imbalance over its least at which the iteration begins anew from where it is."""
 
 Inverse = Callable[[Array], Array]
 """Returns an approximate solution of a linear system for its right side."""
@@ -134,12 +136,16 @@ def _solved(
     if not len(nodes):  # all links join the terminals, as those of a ring one element wide
         return potential, flow, 0
     solve = preconditioner(_matrix(network, nodes))
-    change, direction, before = np.zeros(network.count + 2), None, 1.0
+    change, direction, before, least = np.zeros(network.count + 2), None, 1.0, np.inf
     for iteration in range(_MOST_ITERATIONS):
         out = network.divergence(flow)
         residual = -out[nodes]
-        if iteration and np.abs(residual).sum() <= _GOAL * abs(out[network.inlet]):
+        missed = float(np.abs(residual).sum())
+        if iteration and missed <= _GOAL * abs(out[network.inlet]):
             return potential, flow, iteration
+        if missed > _GROWTH * least:  # by rounding, directions are no longer conjugate
+            direction, least = None, missed
+        least = min(least, missed)
         step = solve(residual)
         now = float(residual @ step)
         direction = step if direction is None else step + now / before * direction
