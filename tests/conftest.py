@@ -2,6 +2,7 @@
 
 import gc
 import os
+import signal
 import subprocess
 import sys
 from contextlib import suppress
@@ -20,6 +21,9 @@ import numpy as np
 from helpers.mpi_environment import BESIDE_OTHERS
 from helpers.waiting_ranks import WaitingRanks
 
+# as in a terminal, also where the tests are started in the background or by nohup
+signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # nothing is left in the home of who runs the tests
 os.environ["PATCHLAW_CACHE"] = "off"
 SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")

@@ -120,7 +120,7 @@ def test_other_seeds_are_other_surfaces():
         for seed in (0, 1)
     )
     correlation = np.corrcoef(first.heights.ravel(), second.heights.ravel())[0, 1]
-    assert abs(correlation) < 0.6  # ~110 random waves: 0.1 expected, 1 if the seed were ignored
+    assert abs(correlation) < 0.3  # ~110 random waves: 0.1 expected, 1 if the seed were ignored
 
 
 @pytest.mark.parametrize("grid", [(12, 40), (40, 12)])

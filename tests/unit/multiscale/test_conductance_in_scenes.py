@@ -5,12 +5,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.resumed_runs import ran_past
 
 from geometry import Control
 from micro import HalfSpaceModel
 from micro.conductance import STEFAN_BOLTZMANN
 from multiscale import Run, Scene, make_setup, run
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+from multiscale.output.checkpoint import read_checkpoint
 from multiscale.output.results import write_results
 from multiscale.results.history import read_history
 from support.errors import InputError
@@ -141,12 +142,7 @@ def test_gas_of_laws_is_the_least_that_gaps_conduct():
 
 
 def test_columns_are_written_read_and_kept_over_a_resume(tmp_path):
-    done = Run(scene("consistent"))
-    for step in done.load_steps():
-        if step.step == 1:
-            write_checkpoint(
-                tmp_path / "checkpoint.state", checkpoint_of(done, done.coupling.state())
-            )
+    done = ran_past(scene("consistent"), 1, tmp_path / "checkpoint.state")
     kept = read_checkpoint(tmp_path / "checkpoint.state")
     np.testing.assert_array_equal(
         kept.steps[0].patches.stiffness_MPa_per_mm, done.steps[0].patches.stiffness_MPa_per_mm

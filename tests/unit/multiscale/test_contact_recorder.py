@@ -8,10 +8,10 @@ from html import unescape
 import h5py
 import numpy as np
 import pytest
+from helpers.resumed_runs import gone_on, ran_past
 
 from geometry import Control
 from multiscale import Run, Scene, run
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
 from multiscale.results.contact_record import SPOT_COLUMNS
 
@@ -151,15 +151,9 @@ def test_asperities_write_spots_without_maps(tmp_path):
 
 
 def test_contacts_survive_a_checkpoint(tmp_path):
-    whole = Run(scene("concurrent", contact="all"))
     path = tmp_path / "c.h5"
-    for step in whole.load_steps():
-        if step.step == 1:
-            write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
-    kept = read_checkpoint(path)
-    again = Run(whole.given)
-    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
-    list(again.load_steps())
+    whole = ran_past(scene("concurrent", contact="all"), 1, path)
+    again, _ = gone_on(whole.given, path)
     for one, other in zip(again.contacts, whole.contacts, strict=True):
         assert one.step == other.step
         np.testing.assert_array_equal(one.spots, other.spots)

@@ -71,8 +71,8 @@ def gaps(model, separation):
 
 @pytest.mark.parametrize(("edges", "axis"), [(("left", "right"), 0), (("back", "front"), 1)])
 def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_path):
-    leak = OIL | {"inlet": edges[0], "outlet": edges[1]}
-    done = begun(scene(box, leak), laws)
+    leak, drawn = OIL | {"inlet": edges[0], "outlet": edges[1]}, axis == 0
+    done = begun(scene(box, leak, output={"figures": drawn, "report": drawn}), laws)
     steps = list(done.load_steps())
     ((model,),) = done.coupling.periodic_models
     along, across = ((6.0, 4.0), (4.0, 6.0))[axis]
@@ -94,8 +94,10 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
         assert step.leak("x") is None
     assert steps[0].leak("face").rate > steps[1].leak("face").rate > 0.0
     write_results(tmp_path, done, options=[])
-    assert (tmp_path / "leak.png").stat().st_size > 5_000
-    assert "leak over the contact face" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    if drawn:
+        assert (tmp_path / "leak.png").stat().st_size > 5_000
+        report = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert "leak over the contact face" in report
     again = read_history(tmp_path)
     for name in ("leak_mm3_per_s", "leak_error_mm3_per_s"):
         np.testing.assert_array_equal(getattr(again, name), getattr(done.history(), name))

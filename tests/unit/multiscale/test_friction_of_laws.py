@@ -1,15 +1,13 @@
 """Scenes with friction of laws: columns, paths, restart, files, what is said and refused."""
 
-from functools import cache
-
 import h5py
 import numpy as np
 import pytest
+from helpers.resumed_runs import gone_on, ran_past
 
 from multiscale import Run, Scene, make_setup, run
 from multiscale.laws.law_file import read_laws, write_laws
 from multiscale.loading import stepper
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from support.errors import InputError, NotConverged
 
 MU, SHIFT = 0.3, 4e-4
@@ -39,16 +37,25 @@ def scene(kind="consistent", *, load=LOAD, friction=MU, **sections):
     return Scene.from_dict(data | {"block": CUBE} | patches | sections)
 
 
-@cache
-def ran(kind):
-    return run(scene(kind))
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    """Return what a coupling's run found, and its checkpoint after load step 4."""
+    known, folder = {}, tmp_path_factory.mktemp("runs")
+
+    def found(kind):
+        path = folder / f"{kind}.state"
+        if kind not in known:
+            known[kind] = ran_past(scene(kind), 4, path).history()
+        return known[kind], path
+
+    return found
 
 
 @pytest.mark.parametrize(
     "kind", ["consistent", "representative", pytest.param("isolated", marks=pytest.mark.long)]
 )
-def test_the_plane_presses_then_shifts_there_and_back(kind):
-    history = ran(kind)
+def test_the_plane_presses_then_shifts_there_and_back(ran, kind):
+    history, _ = ran(kind)
     assert len(history) == 1 + 3 * 2
     force = 42.0 if kind == "representative" else 2.1
     assert history.force_N == pytest.approx(force, rel=1e-9)
@@ -106,18 +113,9 @@ def test_a_shear_force_is_prescribed_under_a_free_plane():
 
 
 @pytest.mark.parametrize("kind", ["consistent", "representative"])
-def test_a_run_goes_on_with_its_sliders(kind, tmp_path):
-    whole, path = ran(kind), tmp_path / "run.state"
-    first = Run(scene(kind))
-    for step in first.load_steps():
-        if step.step == 4:
-            break
-    write_checkpoint(path, checkpoint_of(first, first.coupling.state()))
-    first.close()
-    stored, second = read_checkpoint(path), Run(scene(kind))
-    second.resume(stored.steps, stored.position, stored.state, stored.table, stored.contacts)
-    rest = list(second.load_steps())
-    second.close()
+def test_a_run_goes_on_with_its_sliders(ran, kind):
+    whole, path = ran(kind)
+    _, rest = gone_on(scene(kind), path)
     assert [step.step for step in rest] == [5, 6, 7]
     for name in ("shear_force_x_N", "shear_force_y_N", "dissipated_mJ", "force_N"):
         found = [getattr(step, name) for step in rest]
@@ -219,7 +217,7 @@ def test_friction_without_shear_holds_the_body():
 
 
 def test_a_force_that_slides_under_an_approach_ends_the_run(monkeypatch):
-    monkeypatch.setattr(stepper, "_SMALLEST", 0.25)  # halved often enough
+    monkeypatch.setattr(stepper, "_SMALLEST", 0.5)  # halved once
     whole = Run(scene(load={"approach": 2e-3, "steps": 1, "shear_force": [90.0, 0.0]}))
     with pytest.raises(NotConverged, match="SLIDES"):
         list(whole.load_steps())

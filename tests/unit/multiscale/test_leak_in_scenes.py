@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.resumed_runs import gone_on, ran_past
 
 from micro.flow.gap_flow import gap_flow
 from multiscale import Run, Scene, gap_flows, make_setup, run
 from multiscale.observers import leak as observer
 from multiscale.observers.leak import leak_text
-from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
 from multiscale.output.results import write_results
 from multiscale.results.history import read_history
 from support.errors import InputError
@@ -180,16 +180,10 @@ def test_patches_with_too_few_cells_are_refused():
 
 
 def test_columns_are_written_read_drawn_and_kept_over_a_resume(tmp_path):
-    done = Run(scene(output={"figures": True, "report": True}))
-    for step in done.load_steps():
-        if step.step == 2:
-            write_checkpoint(
-                tmp_path / "checkpoint.state", checkpoint_of(done, done.coupling.state())
-            )
-    kept = read_checkpoint(tmp_path / "checkpoint.state")
-    resumed = Run(scene(output={"figures": True, "report": True}))
-    resumed.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
-    assert len(list(resumed.load_steps())) == 2
+    asked = scene(output={"figures": True, "report": True})
+    done = ran_past(asked, 2, tmp_path / "checkpoint.state")
+    resumed, rest = gone_on(asked, tmp_path / "checkpoint.state")
+    assert len(rest) == 2
     write_results(tmp_path, done, options=[])
     assert (tmp_path / "leak.png").stat().st_size > 10_000
     report = (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -6,7 +6,6 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -37,25 +36,45 @@ def data(kind="analytic", model="half-space", grid=32, **sections):
     } | sections
 
 
-def loaded(tmp_path: Path, command: str, given: dict) -> set[str]:
-    """Return the modules that a command has loaded in a process of its own."""
-    lines = [f"{name} = {_toml(section)}" for name, section in given.items()]
-    scene = tmp_path / "scene.toml"
-    scene.write_text("\n".join(lines))
-    words = [command, str(scene), *(["--out", str(tmp_path / "out")] if command != "plan" else [])]
+CELLS = {"block": {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}}
+TETRAHEDRA, HEXAHEDRA = ({"block": CELLS["block"] | {"element": name}} for name in ("P1", "Q1"))
+COMMANDS = {
+    "run": ("run", data()),
+    "plan": ("plan", data()),
+    "accuracy": ("run", data() | {"accuracy": 0.1}),
+    "conductance": ("run", data(conductance={"conductivity": ["50 W/m/K"]})),
+    "concurrent": ("run", data("concurrent", **TETRAHEDRA)),
+    "hexahedra": ("run", data("isolated", **HEXAHEDRA)),
+    "tetrahedra": ("run", data("isolated", **TETRAHEDRA)),
+    "surface": ("surface", data()),
+}
+"""What one process is asked for in turn. Modules stay: what comes later may load more, not less."""
+
+
+@pytest.fixture(scope="module")
+def loaded(tmp_path_factory) -> dict[str, set[str]]:
+    """Return the modules that a process has loaded after each of its commands."""
+    folder, words = tmp_path_factory.mktemp("commands"), []
+    for name, (command, given) in COMMANDS.items():
+        scene = folder / f"{name}.toml"
+        lines = [f"{key} = {_toml(section)}" for key, section in given.items()]
+        scene.write_text("\n".join(lines))
+        out = ["--out", str(folder / name)] if command != "plan" else []
+        words.append([command, str(scene), *out])
     code = (
         "import json, sys\nfrom multiscale.cli.command_line import main\n"
-        f"code = main({words!r})\n"
-        "print(json.dumps([code, sorted(sys.modules)]))"
+        f"for words in {words!r}:\n"
+        "    code = main(words)\n"
+        "    print(json.dumps([code, sorted(sys.modules)]))"
     )
-    without = dict(os.environ)  # without what MPI has put into this process behind Python's back
-    words = [sys.executable, "-c", code]
+    # without what MPI has put into this process behind Python's back
+    environment = os.environ | {"PATCHLAW_CACHE": "off"}
     done = subprocess.run(
-        words, env=without, capture_output=True, text=True, check=True, timeout=120
-    )
-    code, names = json.loads(done.stdout.splitlines()[-1])
-    assert code == 0
-    return set(names)
+        [sys.executable, "-c", code],
+        env=environment, capture_output=True, text=True, check=True, timeout=240,
+    )  # fmt: skip
+    told = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("[0, [")]
+    return dict(zip(COMMANDS, (set(names) for _, names in told), strict=True))
 
 
 def _toml(value) -> str:
@@ -64,27 +83,21 @@ def _toml(value) -> str:
     return json.dumps(value)
 
 
-@pytest.mark.parametrize(("command", "accuracy"), [("run", {"accuracy": 0.1}), ("plan", {})])
-def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(tmp_path, command, accuracy):
-    names = loaded(tmp_path, command, data() | accuracy)
-    assert not names.intersection(FINITE_ELEMENTS + PICTURES)
+def test_a_half_space_scene_loads_neither_finite_elements_nor_pictures(loaded):
+    for name in ("plan", "run", "accuracy"):
+        assert not loaded[name].intersection(FINITE_ELEMENTS + PICTURES), name
 
 
-@pytest.mark.parametrize(
-    ("kind", "element", "few"),
-    [("concurrent", "P1", True), ("isolated", "Q1", True), ("isolated", "P1", False)],
-)
-def test_only_laws_on_tetrahedra_load_finite_elements(tmp_path, monkeypatch, kind, element, few):
-    monkeypatch.setenv("PATCHLAW_CACHE", "off")
-    block = data()["block"] | {"element": element, "cells": [4, 4, 3]}
-    names = loaded(tmp_path, "run", data(kind, block=block))
-    assert {"dolfinx", "petsc4py"}.isdisjoint(names) == few
-    assert "gmsh" not in names
+def test_only_laws_on_tetrahedra_load_finite_elements(loaded):
+    for name in ("concurrent", "hexahedra"):
+        assert not loaded[name].intersection(("dolfinx", "petsc4py", "gmsh")), name
+    assert {"dolfinx", "petsc4py"} <= loaded["tetrahedra"]
+    assert "gmsh" not in loaded["tetrahedra"]
 
 
-def test_figures_load_the_pictures_that_others_do_without(tmp_path):
-    """The witness of the test above can fail."""
-    assert "matplotlib" in loaded(tmp_path, "surface", data())
+def test_figures_load_the_pictures_that_others_do_without(loaded):
+    assert not loaded["tetrahedra"].intersection(PICTURES)
+    assert loaded["surface"].issuperset(PICTURES)
 
 
 def never(*given, **options):
@@ -199,15 +212,12 @@ def test_a_run_writes_what_it_took(tmp_path, capsys):
     assert "memory" in printed
 
 
-def test_hardness_and_conductance_cost_nothing_where_nobody_asks(tmp_path, monkeypatch):
+def test_hardness_and_conductance_cost_nothing_where_nobody_asks(loaded, monkeypatch):
     """No plastic depth, no second stiffness, and none of the modules that make them."""
-    path, asked = tmp_path / "asked", tmp_path / "not"
-    path.mkdir(), asked.mkdir()
     modules = {"multiscale.observers.conductance", "micro.conductance"}
-    heat = {"conductance": {"conductivity": ["50 W/m/K"]}}
-    assert modules <= loaded(path, "run", data(**heat))
     leak = {"multiscale.observers.leak", "micro.flow.gap_flow", "multiscale.figures.leak"}
-    assert not (modules | leak) & loaded(asked, "run", data())
+    assert not (modules | leak) & loaded["run"]
+    assert modules <= loaded["conductance"]
     monkeypatch.setattr(HalfSpaceModel, "interface_stiffness", None)
     products = [sum(step.newton_iterations for step in Run(one).load_steps()) for one in (
         Scene.from_dict(data()), Scene.from_dict(data(micro={"hardness": 1e9})),

@@ -1,8 +1,12 @@
 """Refinement by bisection: conforming, within bounds of size and shape, with tags inherited."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
+from geometry.meshes import bisection
 from geometry.meshes.bisection import (
     Tetrahedra,
     from_hexahedra,
@@ -138,3 +142,21 @@ def test_hollow_edges_are_where_stresses_are_singular():
     assert np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum() == pytest.approx(1.0)
     np.testing.assert_allclose(ends[..., [0, 2]], 0.5)
     assert not len(reentrant_edges(box()))
+
+
+def test_with_an_edge_the_longest_of_every_facet_and_cell_with_it_is_divided():
+    """Looked up one by one, on cells of every shape."""
+    random = np.random.default_rng(8)
+    points = random.random((60, 3))
+    cells = np.asarray(Delaunay(points).simplices, dtype=np.int64)
+    edges, of_cell = bisection._edges(cells)
+    lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
+    number = {tuple(edge): k for k, edge in enumerate(edges.tolist())}
+    asked = random.random(len(edges)) < 0.03
+    found = bisection._closed(asked, of_cell, bisection._order(lengths))
+    assert found[asked].all() and not found.all()
+    for cell in np.sort(cells).tolist():
+        for size in (3, 4):
+            for corners in combinations(cell, size):
+                these = [number[pair] for pair in combinations(corners, 2)]
+                assert found[max(these, key=lengths.__getitem__)] or not found[these].any()

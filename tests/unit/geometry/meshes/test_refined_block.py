@@ -61,6 +61,15 @@ def test_places_may_have_edges_of_their_own():
     assert np.median(near[1]) > 2.0 * np.median(near[0])
 
 
+def test_edges_at_a_hollow_are_a_fifth_of_those_around_and_grow_from_there():
+    hollow = np.array([[[0.83, 0.07, -0.41], [0.83, 0.71, -0.41]]])
+    points = hollow[0, 1] + [[0.0, 0.0, 0.0], [0.0, 0.03, 0.0]]  # its end, and beyond it
+    around = EdgeLengths(shape(coarse=0.05))(points[:1])
+    assert around == pytest.approx(1.75 * (0.05 + 0.25 * 0.41), rel=1e-12)
+    found = EdgeLengths(shape(coarse=0.05), hollow)(points)
+    assert found == pytest.approx(0.2 * around + [0.0, 1.75 * 0.25 * 0.03], rel=1e-12)
+
+
 def test_places_are_where_the_plane_can_come():
     x = (np.arange(32) + 0.5) / 32
     heights = -0.5 * ((x[:, None] - 0.5) ** 2 + (x - 0.25) ** 2)

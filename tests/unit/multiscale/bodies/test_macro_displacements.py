@@ -37,7 +37,10 @@ def test_laws_on_the_mesh_are_those_of_the_condensed_block():
         for newton in ("condensed", "full")
     )
     np.testing.assert_allclose(full, condensed, rtol=1e-6)
-    assert condensed[-1] == pytest.approx(3.0, rel=0.1)
+    words = ["surface.grid=[32, 32]", "micro.model=half-space", "coupling.kind=concurrent"]
+    cells = run(Scene.load(PAPER, [*words, *COARSE[1:]])).force_N
+    # laws are even over a patch, and their rows err by 2 % at most; 0.08 % measured
+    np.testing.assert_allclose(condensed, cells, rtol=5e-3)
 
 
 @pytest.mark.parametrize("element", ["P1", "Q1"])

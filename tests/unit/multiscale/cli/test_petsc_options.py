@@ -8,8 +8,8 @@ import sys
 import pytest
 
 SMALL = [
-    "surface.grid=[64, 64]", "block.cells=[8, 8, 4]", "load.steps=2", "output.figures=false",
-    "output.report=false",
+    "surface.grid=[32, 32]", "block.cells=[4, 4, 3]", "load.steps=2", "output.figures=false",
+    "output.report=false", "output.check=none",
 ]  # fmt: skip
 
 
@@ -106,7 +106,8 @@ def test_file_of_options_that_makes_no_sense_is_wrong_input(patchlaw, tmp_path):
 
 
 def test_failure_exits_3_and_names_step_and_remedy(patchlaw, tmp_path):
-    done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14")
+    deep = ["load.approach=20 um"]
+    done = patchlaw("-snes_max_it", "1", "-snes_rtol", "1e-14", settings=deep)
     assert done.returncode == 3
     assert "load step 1" in done.stderr
     assert "take more load steps (load.steps)" in done.stderr

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.resumed_runs import gone_on, ran_past
 
 from geometry import InputError
 from multiscale import Run, Scene, make_setup
@@ -41,8 +42,13 @@ def written(tmp_path, *more):
     """Run a scene; return it and its fields."""
     run = Run(scene(*more))
     list(run.load_steps())
-    run.observers.fields.write(tmp_path / "fields.xdmf", run.steps, finished=run.finished)
-    return run, fields(tmp_path / "fields.xdmf")
+    return run, fields_of(run, tmp_path / "fields.xdmf")
+
+
+def fields_of(run, path):
+    """Write what a run has kept; return it."""
+    run.observers.fields.write(path, run.steps, finished=run.finished)
+    return fields(path)
 
 
 @pytest.mark.parametrize(
@@ -103,23 +109,11 @@ def test_contacts_load_the_face_where_they_are(tmp_path):
     ],
 )  # fmt: skip
 def test_a_resumed_run_writes_the_fields_of_a_whole_one(tmp_path, name):
-    more = (*COUPLINGS[name], "output.fields=[1, 3]")
-    first = Run(scene(*more))
-    steps = first.load_steps()
-    next(steps)
-    next(steps)
-    again = Run(scene(*more))
-    again.resume(
-        first.steps, first.position, first.coupling.state(), first.coupling.table, first.contacts
-    )
-    list(again.load_steps())
+    asked, path = scene(*COUPLINGS[name], "output.fields=[1, 3]"), tmp_path / "checkpoint.state"
+    whole = fields_of(ran_past(asked, 2, path), tmp_path / "whole.xdmf")
+    again, _ = gone_on(asked, path)
     assert set(again.observers.fields.kept) == {3}
-    (tmp_path / "again").mkdir()
-    again.observers.fields.write(
-        tmp_path / "again" / "fields.xdmf", again.steps, finished=again.finished
-    )
-    _, whole = written(tmp_path, *more)
-    found = fields(tmp_path / "again" / "fields.xdmf")
+    found = fields_of(again, tmp_path / "again.xdmf")
     assert set(found) == set(whole)
     for key, values in whole.items():
         # equilibria are found to 1e-9 of the load

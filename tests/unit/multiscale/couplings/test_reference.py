@@ -117,8 +117,9 @@ def test_figures_show_the_error_bar_or_that_there_is_none(history):
 def test_augmented_lagrangian_finds_the_contact_too(history):
     """Points of the facets may not penetrate, where nodes alone may not: the plane holds more."""
     other = run(scene("reference.meshes=1", "reference.method=augmented-lagrangian"))
-    # less than an edge in the contact: alike, no more
-    np.testing.assert_allclose(other.force_N, history.force_N, rtol=0.6)
+    # less than an edge in the first contact: alike, no more
+    assert other.force_N[0] == pytest.approx(history.force_N[0], rel=0.5)
+    assert other.force_N[1] == pytest.approx(history.force_N[1], rel=0.1)
     assert max(abs(step.imbalance) for step in other) < 1e-8
 
 

@@ -53,3 +53,4 @@ def test_exaggeration_is_said(scale, said):
 def test_a_surface_without_contact_is_drawn():
     figure = block_figure(rough(), np.zeros((48, 40)), 0.3)
     figure.canvas.draw()
+    assert [axes.get_ylim() for axes in figure.axes[1:]] == [(0.0, 1.0)] * 2  # scales of nothing

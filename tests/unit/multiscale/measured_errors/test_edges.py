@@ -1,7 +1,9 @@
 """What laws of samples miss at the edges of their face."""
 
 from dataclasses import replace
+from functools import cache
 
+import numpy as np
 import pytest
 
 from geometry import Material, Spectrum, synthesise
@@ -38,8 +40,8 @@ def test_width_belongs_to_the_edge_and_not_to_the_face(monkeypatch):
     width = edge_width(sample(), PRESSURE, MATERIAL)
     monkeypatch.setattr(edge_errors, "_PERIODS", 3)
     monkeypatch.setattr(edge_errors, "_COARSE", 24)
-    # 0.78 to 0.85 of it on four surfaces, as corners soften the smaller face more
-    assert edge_width(sample(), PRESSURE, MATERIAL) == pytest.approx(width, rel=0.35)
+    # 0.78 to 0.85 on four surfaces, as corners soften the smaller face more
+    assert 0.7 < edge_width(sample(), PRESSURE, MATERIAL) / width < 0.9
 
 
 def test_width_is_known_where_nearly_all_yields():
@@ -48,29 +50,45 @@ def test_width_is_known_where_nearly_all_yields():
     assert 0.0 < edge_width(model, PRESSURE, MATERIAL) < 0.5 / SPECTRUM["waves"][0]
 
 
-def laws_on_block(**block):
+BLOCK = {"young_modulus": 4000.0, "poisson_ratio": 0.2, "height": 1.0}
+QUIET = {"figures": False, "report": False}
+
+
+@cache
+def laws_on_block(sides):
     """Return the load step of laws of a sample on a block of 3 × 3 of them."""
-    block = {"young_modulus": 4000.0, "poisson_ratio": 0.2, "height": 1.0} | block
-    block |= {"lengths": [TILES, TILES], "cells": [6, 6, 3]}
     surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0], "periodic": True}
-    return run(
-        Scene.from_dict(
-            {
-                "surface": surface,
-                "block": block,
-                "law": {"kind": "representative"},
-                "load": {"pressure": PRESSURE, "steps": 1},
-                "output": {"figures": False, "report": False, "check": "last"},
-            }
-        )
-    ).steps[-1]
+    data = {
+        "surface": surface,
+        "block": BLOCK | {"sides": sides, "lengths": [TILES, TILES], "cells": [6, 6, 3]},
+        "law": {"kind": "representative"},
+        "load": {"pressure": PRESSURE, "steps": 1},
+        "output": QUIET | {"check": "last"},
+    }
+    return run(Scene.from_dict(data)).steps[-1]
 
 
 def test_edges_are_an_error_of_free_sides_alone():
-    free, rollers = (dict(laws_on_block(sides=sides).errors) for sides in ("free", "roller"))
+    free, rollers = (dict(laws_on_block(sides).errors) for sides in ("free", "roller"))
     assert free["edges"] > 0.0
     assert rollers["edges"] == 0.0
-    width = edge_width(sample(), PRESSURE, MATERIAL)
-    whole = width * 4.0 * TILES * PRESSURE
-    # the plane presses more on the edges, and the body gives way to what they carry
-    assert 0.2 * whole < free["edges"] < 2.0 * whole
+
+
+def test_the_error_at_the_edges_is_what_cells_on_the_whole_face_tell(tmp_path):
+    """Nine samples beside each other, pressed in all their cells on the same block."""
+    laws, heights = laws_on_block("free"), tmp_path / "face.npy"
+    np.save(heights, np.tile(sample().surface.heights, (TILES, TILES)))
+    data = {
+        "surface": {"file": str(heights), "lengths": [float(TILES), float(TILES)]},
+        "block": BLOCK | {"sides": "free"},
+        "micro": {"finite_slopes": False},  # as in the laws
+        "coupling": {"kind": "concurrent"},
+        "load": {"force": laws.force_N, "steps": 1},
+        "output": QUIET | {"check": "none"},
+    }
+    cells = run(Scene.from_dict(data)).steps[-1]
+    errors = dict(laws.errors)
+    stiffness = sum(errors.values()) / laws.approach_error_mm
+    missed = stiffness * (cells.approach_mm - laws.approach_mm)
+    # 1.25 times as much: the body is displaced by what its edges carry
+    assert 0.8 * errors["edges"] < missed < 1.6 * errors["edges"]

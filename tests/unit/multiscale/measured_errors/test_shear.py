@@ -140,7 +140,7 @@ SLAB = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "lengths": [5.0, 4.0], "
 @cache
 def of_samples(*, by_force=False, approach=False, shear=True, law=(), check="last"):
     """A slab with the law of a sample on its face, sheared."""
-    surface = {"spectrum": SPECTRUM | {"waves": [2, 4]}, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    surface = {"spectrum": SPECTRUM | {"waves": [2, 4]}, "grid": [16, 16], "lengths": [1.0, 1.0]}
     loads = {"approach": 9e-3} if approach else {"force": 110.0}
     shears = {"shear_force": [[14.0, 6.0]]} if by_force else {"shear": [[1e-3, 2e-4]]}
     load = loads | {"steps": 1} | (shears | {"shear_steps": 1} if shear else {})
@@ -172,7 +172,7 @@ def test_laws_of_samples_state_errors_of_normal_force_and_shear(by_force, approa
 
 
 def test_several_samples_add_their_scatter_to_the_error_of_the_shear():
-    parts = dict(of_samples(law=(("seeds", (12, 5, 8)),), approach=True).steps[-1].shear_errors)
+    parts = dict(of_samples(law=(("seeds", (12, 5)),), approach=True).steps[-1].shear_errors)
     assert list(parts) == ["mesh", "quadrature", "laws", "samples", "grid", "slopes", "edges"]
     assert parts["samples"] > parts["slopes"] > 0.0
 
@@ -186,7 +186,7 @@ def test_laws_of_samples_without_shear_state_the_error_of_what_holds_the_face():
 
 def test_laws_without_shear_state_what_holds_their_face():
     """Friction holds the face under the plane, and its shear force has an error."""
-    surface = {"spectrum": SPECTRUM, "grid": [24, 24], "lengths": [1.0, 1.0]}
+    surface = {"spectrum": SPECTRUM, "grid": [16, 16], "lengths": [1.0, 1.0]}
     block = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
     sections = LAWS | {"surface": surface, "block": block}
     quiet = {"figures": False, "report": False, "check": "last"}

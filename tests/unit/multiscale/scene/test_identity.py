@@ -9,7 +9,14 @@ from multiscale.scene import scene as module
 from multiscale.scene.bodies import BodySection, CounterBodySection
 from multiscale.scene.keys import scene_keys
 from multiscale.scene.reader import described
-from multiscale.scene.scene import Scene, changes, content_digest, identity, names_a_file
+from multiscale.scene.scene import (
+    Scene,
+    changes,
+    content_digest,
+    identity,
+    names_a_file,
+    told,
+)
 from multiscale.scene.surface import CounterSurfaceSection, RegionSection, SurfaceSection
 
 SURFACE = {"file": "scan.npy", "lengths": [1.0, 1.0]}
@@ -96,3 +103,10 @@ def test_no_key_that_names_a_file_is_forgotten():
             ("body", "mesh"), ("counter_body", "mesh"),
         ]
     }  # fmt: skip
+
+
+def test_three_changes_are_told_and_more_are_counted():
+    differing = [(f"key {k}", 2.0 * k, 1.0 * k) for k in range(5)]
+    assert told(differing[1:2]) == "key 1 was 1.0"
+    assert told(differing[:3]).endswith(", key 2 was 2.0")
+    assert told(differing).endswith(", key 2 was 2.0 and 2 more")

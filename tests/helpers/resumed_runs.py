@@ -1,0 +1,20 @@
+"""Runs that leave a checkpoint on their way, and runs that go on from it."""
+
+from multiscale import Run
+from multiscale.output.checkpoint import checkpoint_of, read_checkpoint, write_checkpoint
+
+
+def ran_past(scene, step, path):
+    """Return the whole run of a scene, which wrote a checkpoint after one of its load steps."""
+    whole = Run(scene)
+    for each in whole.load_steps():
+        if each.step == step:
+            write_checkpoint(path, checkpoint_of(whole, whole.coupling.state()))
+    return whole
+
+
+def gone_on(scene, path):
+    """Return the run of a scene from a checkpoint to its end, and the load steps of its own."""
+    kept, again = read_checkpoint(path), Run(scene)
+    again.resume(kept.steps, kept.position, kept.state, kept.table, kept.contacts)
+    return again, list(again.load_steps())
