@@ -13,14 +13,16 @@ import numpy as np
 from dolfinx import fem
 
 from geometry.meshes.block import BlockShape
-from macro.bodies import Block
+from macro import compat
+from macro.bodies import Block, MeshedBody
 from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_pair import FacePair
 from macro.contact.law_problem import LawContactProblem
 from macro.contact.loaded_face import ContactFace, LoadedFace, Outline
 from macro.elastic_body import ElasticBody
 from macro.mesh.block import block_mesh
-from macro.mesh.contact_face import top_facets
+from macro.mesh.contact_face import contact_facets, top_facets
+from macro.mesh.refinement import refined
 from support.arrays import Array
 
 ChooseBody = Callable[[ElasticBody], ElasticBody]
@@ -93,6 +95,52 @@ def face_on_half(face: ContactFace) -> LoadedFace | None:
     half = Block(mesh, block.material, block.sides)
     coarse = LoadedFace.of_regions(half, (top_facets(mesh),), patches.lengths)
     return replace(coarse, degree=face.quadrature_degree)
+
+
+def refined_face(face: ContactFace) -> ContactFace | None:
+    """Return the face on quadratic elements, every cell cut into eight; None where it is not cut.
+
+    Args:
+        face: The contact face; None comes back for blocks, and where a body has curved cells.
+
+    Note:
+        Collective.
+    """
+    if not all(_can_be_refined(one) for one in face.sides):
+        return None
+    first, *second = (_one_refined(one) for one in face.sides)
+    return FacePair(first, *second) if second else first
+
+
+def _can_be_refined(face: LoadedFace) -> bool:
+    body, patches = face.body, face.patches
+    on_mesh = isinstance(body, MeshedBody) and isinstance(patches, Outline)
+    return on_mesh and compat.geometry_degree(body.mesh.mesh) == 1
+
+
+def _one_refined(face: LoadedFace) -> LoadedFace:
+    facets, mesh = face.facets, refined(face.body.mesh)
+    opposed = facets.directions[1] @ facets.frame.axes[0] < 0.0
+    parts = [
+        contact_facets(mesh.mesh, mesh.facet_tags.find(tag), facets.frame, opposed=opposed)
+        for tag in _region_tags(face)
+    ]
+    body = replace(face.body, mesh=mesh, order=2)
+    return LoadedFace.of_regions(body, parts, face.patches.lengths)
+
+
+def _region_tags(face: LoadedFace) -> list[int]:
+    """Return the marker of every region of a face on a mesh; collective."""
+    mesh, facets, patches = face.body.mesh, face.facets, face.patches
+    assert isinstance(patches, Outline)
+    tags, topology = mesh.facet_tags, mesh.mesh.topology
+    topology.create_connectivity(3, 2)
+    _, shapes = compat.reference_facets(topology.cell_name())
+    of_cells = topology.connectivity(3, 2).array.reshape(-1, len(shapes))
+    place = np.searchsorted(tags.indices, of_cells[facets.cell, facets.side])
+    own = dict(zip(patches.region.tolist(), tags.values[place].tolist(), strict=True))
+    known = {region: tag for part in face.comm.allgather(own) for region, tag in part.items()}
+    return [known[region] for region in range(patches.count)]
 
 
 def start_from_elements(

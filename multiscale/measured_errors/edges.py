@@ -25,8 +25,8 @@ from support.errors import NotConverged
 _PERIODS, _COARSE, _MOST_CELLS = 2, 16, 64
 """Periods along the face, cells along it that the law is solved on, and cells along a period that
 its contacts are solved on at most."""
-_LOADS = 0.125 * 2.0 ** np.arange(7)
-"""Pressures that the law is known at, over the mean one."""
+_LEAST, _MOST, _ROWS = 0.125, 8.0, 7
+"""Least and largest pressure that the law is known at, over the mean one, and their number."""
 _STEPS, _TOLERANCE = 60, 1e-9
 
 
@@ -76,9 +76,10 @@ def _by_law(period: HalfSpaceModel, face: HalfSpaceModel, pressure: float) -> tu
         pressure: Mean pressure on the face [MPa].
     """
     area = float(np.prod(period.surface.lengths))
-    loads = np.concatenate([[0.0], pressure * _LOADS])
+    most = _MOST * pressure
     if period.hardness is not None:
-        loads = loads[loads < 0.95 * period.hardness]
+        most = min(most, 0.95 * period.hardness)
+    loads = np.concatenate([[0.0], np.geomspace(_LEAST * pressure, most, _ROWS)])
     closures = [period.first_touch]
     closures += [period.press(Control(force=load * area)).plane.approach for load in loads[1:]]
     law = scipy.interpolate.PchipInterpolator(closures, loads)

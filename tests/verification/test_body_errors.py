@@ -19,6 +19,18 @@ def test_the_true_error_is_within_one_and_a_half_times_the_stated(seed):
     assert found.mesh < 6.0 * true
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_creases_of_a_faceted_side_are_errors_that_no_degree_resolves(order):
+    """A ring of tetrahedra one cell wide under a level plane has a nearly uniform stress.
+
+    Linear elements, which have a uniform one exactly, tell 3 % of the error of either.
+    """
+    found = stated_and_true(replace(drawn(8), order=order), MPI.COMM_SELF)
+    true = abs(found.forces[2] - found.forces[0])
+    assert 5e-4 * found.load < true < 1.5 * (found.mesh + found.quadrature)
+    assert found.mesh < 6.0 * true
+
+
 def test_quadrature_matters_where_a_plane_touches_a_part_of_the_face():
     body = drawn(3)  # held in a tilt
     face, problem_of = problem_on(body, mesh_of(body, MPI.COMM_SELF))

@@ -1,23 +1,44 @@
-"""The edges that bound a contact face."""
+"""The free edges of a contact face."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
+from helpers.random_bodies import drawn, mesh_of, problem_on
 from mpi4py import MPI
 
 from macro.mesh.contact_face import top_facets
-from macro.mesh.face_edges import FaceEdges, nearest_samples, outer_edges
+from macro.mesh.face_edges import FaceEdges, free_edges, nearest_samples
 
 
 @pytest.mark.parametrize("kind", ["Q1", "P1"])
 def test_edges_of_a_rectangle_are_its_sides(kind):
     block = block_of(interface=(3.0, 2.0), cells=(3, 4, 1), element=kind)
-    edges = outer_edges(top_facets(block.mesh), MPI.COMM_SELF)
+    edges = free_edges(block, top_facets(block.mesh))
     assert len(edges.length) == 14
     assert edges.length.sum() == pytest.approx(10.0, rel=1e-12)
     x, y = edges.middle.T
     on_side = np.isclose(x % 3.0, 0.0) | np.isclose(y % 2.0, 0.0)
     assert on_side.all()
+
+
+@pytest.mark.parametrize("seed", [8, 23])  # tetrahedra, hexahedra
+def test_planes_of_symmetry_have_no_edges(seed):
+    """A quarter of a ring between two of them, and the same one with its ends held in shear."""
+    ring = drawn(seed)
+    face, _ = problem_on(ring, mesh_of(ring, MPI.COMM_SELF))
+    edges = free_edges(face.body, face.facets)
+    inner = ring.length * (1.0 - 0.6 * ring.ratios[0])
+    radius = np.hypot(*edges.middle.T)
+    assert np.all((radius < inner) | (radius > 0.9 * ring.length))
+    arcs = 0.5 * np.pi * (inner + ring.length)
+    assert edges.length.sum() == pytest.approx(arcs, rel=0.02)  # chords of arcs are shorter
+    floor, *ends = face.body.supports
+    held = [replace(end, displacement=(0.0, 0.0, None)) for end in ends]
+    whole = free_edges(replace(face.body, supports=[floor, *held]), face.facets)
+    added = 2.0 * (ring.length - inner)
+    assert whole.length.sum() - edges.length.sum() == pytest.approx(added, rel=1e-9)
 
 
 def test_samples_that_are_as_near_share_an_edge():

@@ -50,6 +50,15 @@ def test_width_is_known_where_nearly_all_yields():
     assert 0.0 < edge_width(model, PRESSURE, MATERIAL) < 0.5 / SPECTRUM["waves"][0]
 
 
+def test_width_does_not_jump_near_the_hardness():
+    """Where twice the pressure, and the pressure itself, pass the last row of the law."""
+    model = replace(sample(12), hardness=PRESSURE / 0.95)
+    for power in (2, 3):
+        at = PRESSURE / 8.0 * 2.0**power
+        below, above = (edge_width(model, at * (1.0 + step), MATERIAL) for step in (-1e-6, 1e-6))
+        assert above == pytest.approx(below, rel=1e-3)  # 1 to 4e-4 by the step itself
+
+
 BLOCK = {"young_modulus": 4000.0, "poisson_ratio": 0.2, "height": 1.0}
 QUIET = {"figures": False, "report": False}
 
