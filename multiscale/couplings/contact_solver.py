@@ -53,7 +53,8 @@ class ContactSolver(StepSolver):
         self._turns = False
         self._shear: ShearState | None = None
         self._last: Control | None = None  # without its shear
-        self._stiffness: tuple[Array | None, Stiffness] | None = None  # under which pressures
+        self._before: Start | None = None  # what the latest normal contact started from
+        self._stiffness: Stiffness | None = None  # at the latest load step, once it is known
         self.latest: ContactState | None = None
 
     def press(self, control: Control) -> LoadStep:
@@ -86,19 +87,26 @@ class ContactSolver(StepSolver):
     def _pressed(self, control: Control) -> tuple[ContactState, ShearState | None]:
         """Solve the contact and its shear; the normal contact anew unless shear alone changes."""
         friction, shear = self._friction, self._shear
-        options: dict[str, Any] = {
-            "patches": self._patches,
-            "mean_heights": self._mean_heights,
-            "start": self._start,
-        }
         if friction is None or control.shear is None:
-            return self._model.press(control, **options), shear
-        if friction.coupled and isinstance(self._model, HalfSpaceModel):
-            return press_coupled(self._model, friction, control, shear, **options)
+            self._stiffness = None
+            return self._press(control, self._start), shear
+        if self._coupled:
+            assert isinstance(self._model, HalfSpaceModel)
+            self._stiffness = None
+            return press_coupled(
+                self._model,
+                friction,
+                control,
+                shear,
+                patches=self._patches,
+                mean_heights=self._mean_heights,
+                start=self._start,
+            )
         if self.latest is not None and self._last == replace(control, shear=None):
             state = replace(self.latest, iterations=0)
         else:
-            state = self._model.press(control, **options)
+            self._stiffness, self._before = None, self._start
+            state = self._press(control, self._start)
         return state, friction.advance(shear, state.pressures, control.shear)
 
     def _of_cells(self) -> dict[str, Any]:
@@ -135,12 +143,13 @@ class ContactSolver(StepSolver):
 
         Under a hardness, and with friction, the next load step depends on it.
         """
-        return self._start, self.latest, self._shear
+        return self._start, self.latest, self._shear, self._last, self._before
 
     @past.setter
     def past(self, value: Any) -> None:
-        self._start, self.latest, self._shear = value or (None, None, None)
-        self._last = None
+        before = value or (None, None, None, None, None)
+        self._start, self.latest, self._shear, self._last, self._before = before
+        self._stiffness = None
 
     def field_state(self, step: LoadStep, parts: PatchGrid) -> Array:
         """Return the mean pressures of parts of the contact face at the latest load step.
@@ -172,12 +181,10 @@ class ContactSolver(StepSolver):
         """Return dF/dδ at the latest load step."""
 
         def stiffness() -> Stiffness:
-            state = self._solved()
-            if self._stiffness is None or self._stiffness[0] is not state.pressure:
-                found = self._model.stiffness(state, turns=self._turns)
-                self._stiffness = state.pressure, found
-                return found
-            return self._stiffness[1]._replace(iterations=0)  # shear alone has changed
+            if self._stiffness is not None:  # shear alone has changed
+                return self._stiffness._replace(iterations=0)
+            self._stiffness = self._model.stiffness(self._solved(), turns=self._turns)
+            return self._stiffness
 
         return on_root_alone(self._comm, stiffness)
 
@@ -211,15 +218,36 @@ class ContactSolver(StepSolver):
         return on_root_alone(self._comm, lambda: latest)
 
     def state(self) -> Any:
-        """Return the latest solution; it is whole on rank 0 alone."""
-        return self._start if self._friction is None else [self._start, self._shear]
+        """Return the latest solution; it is whole on rank 0 alone.
+
+        Where shear alone may change, what the normal contact was found from belongs to it: the
+        contact is then the same to the last digit, and cells that have yielded tell from which side
+        the plane came.
+        """
+        if self._friction is None:
+            return self._start
+        return [self._start, self._shear, self._before, self._last]
 
     def restore(self, state: Any) -> None:
         """Start from a solution."""
         if self._friction is None:
             self._start = state
         elif state is not None:
-            self._start, self._shear = state
+            self._start, self._shear, self._before, self._last = state
+            if self._last is not None and not self._coupled:
+                self.latest = self._press(self._last, self._before)
+
+    @property
+    def _coupled(self) -> bool:
+        """Whether pressures and tractions see each other."""
+        friction = self._friction
+        return friction is not None and friction.coupled and isinstance(self._model, HalfSpaceModel)
+
+    def _press(self, control: Control, start: Start | None) -> ContactState:
+        """Solve the normal contact."""
+        return self._model.press(
+            control, patches=self._patches, mean_heights=self._mean_heights, start=start
+        )
 
 
 def _of_shear(shear: ShearState, contact_area_fraction: float) -> dict[str, float]:

@@ -15,6 +15,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from geometry.rigid_plane import Control
 from geometry.shear_state import ShearState
 from geometry.sliders import SliderRecord
 from micro import RigidPlane, Start
@@ -77,6 +78,7 @@ class Checkpoint:
 
 _KINDS = (
     Checkpoint,
+    Control,
     Mark,
     LoadPosition,
     ContactRecord,

@@ -110,6 +110,15 @@ def test_stiffness_of_laws_is_the_derivative_of_their_force(kind, tilt):
     assert step.stiffness_N_per_mm == pytest.approx((ahead - back) / (2.0 * near), rel=1e-5)
 
 
+@pytest.mark.parametrize("model", ["half-space", "elliptic", "circular-independent"])
+def test_stiffness_of_every_load_step_is_that_of_its_contact(model):
+    history = run(scene(model=model, load={"approach": 0.008, "steps": 4}))
+    for step in history:
+        (alone,) = run(scene(model=model, load={"approach": step.approach_mm, "steps": 1}))
+        # contacts are solved to 1e-10 from another start
+        assert step.stiffness_N_per_mm == pytest.approx(alone.stiffness_N_per_mm, rel=1e-7)
+
+
 def test_files_hold_the_contacts(tmp_path):
     whole = Run(scene(contact="all"))
     list(whole.load_steps())
