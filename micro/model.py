@@ -81,11 +81,12 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def quick_up_to(self, control: Control) -> Self | None:
+    def quick_up_to(self, control: Control, error: float = 0.0) -> Self | None:
         """Return the model for many loads, each solved in milliseconds from one nearby.
 
         Args:
             control: The largest of these loads.
+            error: Error of the force that does no harm, over the force.
 
         Returns:
             The model, or one that remembers more; None where a solution may take long.
@@ -157,14 +158,11 @@ def press_along(
 
 
 def _nearby(approach: float, starts: Mapping[float, Start]) -> Start | None:
-    """Return what to start from at an approach, by the solutions on both sides or the next two."""
-    above = heapq.nsmallest(2, (each for each in starts if each > approach))
-    below = heapq.nlargest(2, (each for each in starts if each < approach))
-    if not above and not below:
-        return None
-    first, second, *_ = [*above[:1], *below[:1], *above[1:], *below[1:], *above, *below]
-    if second == first:
-        return starts[first]
+    """Return what to start from at an approach, by the two solutions nearest to it."""
+    near = heapq.nsmallest(2, starts, key=lambda each: abs(each - approach))
+    if len(near) < 2:
+        return starts[near[0]] if near else None
+    first, second = near
     return starts[first].towards(starts[second], (approach - first) / (second - first))
 
 

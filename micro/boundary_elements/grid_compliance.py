@@ -198,6 +198,7 @@ class Compliance:
             grids has to take them into account (`micro.complementarity.slope_iteration`).
         few: Flat indices of the few cells that are loaded mostly, those first that touch first,
             shape (n,). Finite slopes then remember what they do with pressures on these cells.
+        rest: Rest of such pressures, over them, that they leave out in part.
     """
 
     periodic: bool
@@ -205,6 +206,7 @@ class Compliance:
     terms: Sequence[BodyTerm] = ()
     slopes: tuple[FiniteSlopes, ...] = ()
     few: Indices | None = None
+    rest: float = 1e-6
     _last: tuple[Array, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -300,7 +302,7 @@ class Compliance:
         """The finite slopes, with a memory; none where the loaded cells are not known to be few."""
         if self.few is None:
             return ()
-        return tuple(RememberedSlopes(each, self.few) for each in self.slopes)
+        return tuple(RememberedSlopes(each, self.few, self.rest) for each in self.slopes)
 
     def slopes_on_few(self, pressure: Array) -> Array:
         """Return what finite slopes add to the displacements of few cells, shape (k, 1) [mm].

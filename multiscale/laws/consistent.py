@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from geometry import Control, PatchGrid
 from micro import ContactState, MicroModel, Start, influence_matrix, press_along, stacked
+from multiscale.laws.interpolation import LawCurves
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.refinement import MOST_ROWS, refined
+from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
 from multiscale.laws.rows import PlanePath, SolvedRows
 from multiscale.readable import Observer
 from support.collective import on_root_alone, shared
@@ -53,7 +54,7 @@ def consistent_laws(
     largest: Control,
     displacements: Displacements | None = None,
     pointwise: bool = False,
-    tolerance: float = 1e-3,
+    tolerance: float = 3e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
     observe: Observer | None = None,
@@ -101,12 +102,12 @@ def consistent_laws(
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
-    quick = model.quick_up_to(Control(approach=end, tilt=largest.tilt))
+    quick = model.quick_up_to(Control(approach=end, tilt=largest.tilt), ROW_ERROR * tolerance)
     if quick is not None:
         whole = replace(whole, model=quick, quick=True)
-    laws, error = refined(
+    made = refined(
         whole.rows,
-        whole.laws,
+        curves_from_touch,
         first,
         end,
         compliance=compliance,
@@ -115,7 +116,7 @@ def consistent_laws(
     )
     return LawTable(
         patches=patches,
-        laws=tuple(laws),
+        laws=tuple(whole.laws(made)),
         made_by={
             "coupling": "consistent",
             "model": model.name,
@@ -123,9 +124,15 @@ def consistent_laws(
             "tolerance": f"{tolerance:g}",
             "tilt": "free" if largest.tilt is None else f"{tilt[0]:g}, {tilt[1]:g}",
         },
-        force_error=error,
+        force_error=made.force,
         path=whole.path if largest.tilt is None else None,
     )
+
+
+def curves_from_touch(rows: SolvedRows) -> LawCurves:
+    """Return the laws of K patches through rows of the whole surface, columns of shape (m, K)."""
+    used, counts = rows.from_first_touch()
+    return LawCurves.through(used, counts, np.zeros(len(counts)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -209,15 +216,22 @@ class WholeSurface:
             outside_range=in_all_patches(stacked(solved, "warning") != ""),
         )
 
-    def laws(self, rows: SolvedRows) -> list[PatchLaw]:
-        """Return the laws of all patches through rows of increasing approaches, columns (m, N)."""
-        laws, touched, open_rows = [], rows.pressure.any(axis=0), rows[:0, 0]
-        for index, height in enumerate(self.mean_heights):
-            # most patches stay open
-            touching = rows[:, index].from_first_touch() if touched[index] else open_rows
-            touch = touching.closure[0] if len(touching) else rows.closure[:, index].max()
-            laws.append(PatchLaw.of(touching, touch, self.model.reference_height - height))
-        return laws
+    def laws(self, made: Refined) -> list[PatchLaw]:
+        """Return the laws of all patches through rows of increasing approaches."""
+        rows, counts = made.rows.from_first_touch()
+        touch, starts = made.rows.closure.max(axis=0), np.cumsum(counts) - counts
+        touch[counts > 0] = rows.closure[starts[counts > 0]]
+        separation = self.model.reference_height - self.mean_heights
+        is_open = SolvedRows.none()  # most patches
+        return [
+            PatchLaw.of(
+                rows[start : start + count] if count else is_open,
+                touch[index],
+                separation[index],
+                **made.of_law(index),
+            )
+            for index, (start, count) in enumerate(zip(starts, counts, strict=True))
+        ]
 
     @property
     def path(self) -> PlanePath:

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import scipy
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from multiscale.laws.rows import LawRows
 
@@ -77,35 +76,50 @@ class LawCurves:
     coefficients: Array
 
     @classmethod
-    def through(cls, rows: LawRows, initial_separation: float) -> LawCurves:
-        """Interpolate the rows of one law monotonically (PCHIP).
+    def through(cls, rows: LawRows, counts: ArrayLike, initial_separation: ArrayLike) -> LawCurves:
+        """Interpolate the rows of N laws monotonically (PCHIP).
 
         Args:
-            rows: The rows; none for an open law.
-            initial_separation: Mean separation at zero approach [mm].
+            rows: The rows of all laws, one law after another.
+            counts: Number of rows of each, shape (N,); none of an open law.
+            initial_separation: Mean separations at zero approach, shape (N,) [mm].
 
         Source:
             Fritsch & Butland 1984, doi 10.1137/0905021.
         """
-        pieces = np.zeros((len(rows) + 1, 4, 5))
-        pieces[0, 2, 0] = 1.0  # before first touch the closure grows as the approach
-        if len(rows):
-            power = rows.pressure ** (2 / 3)
-            smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
-            values = np.column_stack(smooth).astype(np.float64)
-            cubic = scipy.interpolate.PchipInterpolator(rows.approach, values)
-            pieces[0, 3, :4] = values[0]
-            pieces[1:-1, :, :4] = np.moveaxis(cubic.c, 0, 1)
-            pieces[-1, 2:, :4] = cubic(rows.approach[-1], 1), values[-1]
-            pieces[1:, 3, 4] = rows.contacts
+        counts = np.asarray(counts)
+        laws, number = np.arange(len(counts)), len(rows)
+        law = np.repeat(laws, counts)
+        end = np.cumsum(counts)
+        place = np.arange(number) + law + 1
+        before, some = end - counts + laws, counts > 0
+        pieces = np.zeros((number + len(counts), 4, 5))
+        pieces[before, 2, 0] = 1.0  # before first touch the closure grows as the approach
+        power = rows.pressure ** (2 / 3)
+        smooth = rows.closure, power, rows.contact_area_fraction, rows.unresolved_displacement
+        values = np.column_stack(smooth).astype(np.float64)
+        inner = np.flatnonzero(law[1:] == law[:-1])  # rows with another one behind them
+        width = np.diff(rows.approach)[inner, None]
+        secant = np.zeros_like(values)
+        secant[inner] = np.diff(values, axis=0)[inner] / width
+        slope = _pchip_slopes(rows.approach, secant, end[some] - counts[some], end[some] - 1)
+        pieces[place, 3, :4], pieces[place, 2, :4] = values, slope
+        bend = (slope[inner] + slope[inner + 1] - 2.0 * secant[inner]) / width
+        pieces[place[inner], 0, :4] = bend / width
+        pieces[place[inner], 1, :4] = (secant[inner] - slope[inner]) / width - bend
+        pieces[before[some], 3, :4] = values[(end - counts)[some]]
+        pieces[place, 3, 4] = rows.contacts
         pieces[..., 3] -= pieces[..., 0]  # from the unresolved displacement to the separation
-        pieces[:, 3, 3] += initial_separation
-        widths = np.zeros(len(pieces))
-        widths[1:-1] = np.diff(rows.approach)
+        of_piece = np.repeat(np.asarray(initial_separation, dtype=float), counts + 1)
+        pieces[:, 3, 3] += of_piece
+        starts, widths = np.full(len(pieces), -np.inf), np.zeros(len(pieces))
+        starts[place], widths[place[inner]] = rows.approach, width[:, 0]
+        origins = np.maximum(starts, 0.0)
+        origins[place], origins[before[some]] = rows.approach, rows.approach[(end - counts)[some]]
         return cls(
-            first=np.array([0, len(pieces)]),
-            starts=np.append(-np.inf, rows.approach),
-            origins=np.append(rows.approach[:1] if len(rows) else 0.0, rows.approach),
+            first=np.append(before, len(pieces)),
+            starts=starts,
+            origins=origins,
             widths=widths,
             coefficients=pieces,
         )
@@ -241,6 +255,50 @@ class Tangent:
         result = right - self.columns @ found
         result[self.loaded] = found
         return np.asarray(result)
+
+
+def rising_curves(rows: LawRows) -> LawCurves:
+    """Return the laws of K patches alone through their rows, columns of shape (m, K)."""
+    each = [rows[:, law].rising()[0] for law in range(rows.pressure.shape[1])]
+    counts = [len(one) for one in each]
+    return LawCurves.through(each[0].joined(*each[1:]), counts, np.zeros(len(each)))
+
+
+def _pchip_slopes(approach: Array, secant: Array, first: Indices, last: Indices) -> Array:
+    """Return the slopes of monotone interpolants at the rows of all laws, shape (n, 4).
+
+    Args:
+        approach: Approaches, shape (n,).
+        secant: Slopes of the secants to the next row of the law, shape (n, 4).
+        first: Indices of the first rows of the laws.
+        last: Indices of their last ones.
+    """
+    width = np.append(np.diff(approach), 1.0)[:, None]
+    slope = np.zeros_like(secant)
+    within = np.ones(len(approach), bool)
+    within[first] = within[last] = False
+    here = np.flatnonzero(within)
+    behind, ahead = secant[here - 1], secant[here]
+    near, far = 2.0 * width[here] + width[here - 1], width[here] + 2.0 * width[here - 1]
+    monotone = behind * ahead > 0.0
+    mean = np.divide(near, behind, out=np.ones_like(behind), where=monotone)
+    mean += np.divide(far, ahead, out=np.zeros_like(ahead), where=monotone)
+    slope[here] = np.where(monotone, (near + far) / mean, 0.0)
+    two = first[last == first + 1]
+    slope[two] = slope[two + 1] = secant[two]
+    many = last > first + 1
+    head, tail = first[many], last[many]
+    for at, one, other in ((head, head, head + 1), (tail, tail - 1, tail - 2)):
+        slope[at] = _end_slopes(width[one], width[other], secant[one], secant[other])
+    return slope
+
+
+def _end_slopes(width: Array, next_width: Array, secant: Array, next_secant: Array) -> Array:
+    """Return slopes at the ends of interpolants from three rows each, without overshoot."""
+    slope = ((2.0 * width + next_width) * secant - width * next_secant) / (width + next_width)
+    slope = np.where(slope * secant > 0.0, slope, 0.0)
+    steep = (secant * next_secant < 0.0) & (np.abs(slope) > 3.0 * np.abs(secant))
+    return np.asarray(np.where(steep, 3.0 * secant, slope))
 
 
 def _horner(powers: Iterable[Array], t: Array) -> tuple[Array, Array]:

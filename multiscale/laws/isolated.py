@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from geometry import PatchGrid
 from micro import MicroModel, press_along, stacked
 from micro.closed_forms.love import love_centre, love_mean
+from multiscale.laws.interpolation import rising_curves
 from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
@@ -100,20 +101,17 @@ class IsolatedPatch:
         if touch >= closure_end:
             return PatchLaw.of(SolvedRows.none(), touch, separation)
 
-        def make(rows: SolvedRows) -> list[PatchLaw]:
-            rising, change = rows[:, 0].rising()
-            return [replace(PatchLaw.of(rising, touch, separation), repaired=change)]
-
-        (law,), _ = refined(
+        made = refined(
             lambda approaches: self.rows(approaches)[:, None],
-            make,
+            rising_curves,
             touch,
             self._approach_at(closure_end),
             compliance=np.array([[self.compliance]]),
             tolerance=tolerance,
             most_rows=most_rows,
         )
-        return law
+        rising, change = made.rows[:, 0].rising()
+        return PatchLaw.of(rising, touch, separation, **made.of_law(0), repaired=change)
 
     def _displacement(self, love: str) -> float:
         return float(_LOVE[love](*self.patch.half_sizes) / (np.pi * self.model.contact_modulus))

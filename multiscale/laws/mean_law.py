@@ -7,13 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from multiscale.laws.interpolation import rising_curves
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample, SampleRow
 from multiscale.laws.refinement import refined
@@ -102,8 +103,7 @@ class PeriodicSamples:
         touch = max(self.reference - self.first_touch, 0.0)
         area = sum(sample.area for sample in self.samples)
         if limit.closure <= touch:
-            open_law = PatchLaw.of(SolvedRows.none(), touch, self.reference)
-            return replace(open_law, sample_area=area)
+            return PatchLaw.of(SolvedRows.none(), touch, self.reference, sample_area=area)
         end, start, kept = self.end(limit), 0.0, SolvedRows.none()
         if before is not None and not before.is_open:
             kept = self._without_full_contact(before)
@@ -113,26 +113,25 @@ class PeriodicSamples:
             last = self.rows(np.array([end]), 0.0)[:, 0]
             compliance = float((last.closure[0] - touch) / last.pressure[0])
 
-        def make(rows: SolvedRows) -> list[PatchLaw]:
-            new = rows[:, 0]
-            rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
-            if max(start, end) == 1.0 and not any(sample.yields for sample in self.samples):
-                rising = self._in_full_contact(rising, limit, compliance)
-            return [replace(PatchLaw.of(rising, touch, self.reference), repaired=change)]
-
-        (law,), _ = refined(
+        made = refined(
             lambda parameters: self.rows(parameters, compliance),
-            make,
+            rising_curves,
             start,
             end,
             compliance=np.array([[compliance]]),
             tolerance=tolerance,
             most_rows=most_rows,
         )
+        new = made.rows[:, 0]
+        rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
+        if max(start, end) == 1.0 and not any(sample.yields for sample in self.samples):
+            rising = self._in_full_contact(rising, limit, compliance)
+        more = made.of_law(0) | {"repaired": change, "sample_area": area}
         if before is not None:
-            error = max(law.interpolation_error, before.interpolation_error)
-            law = replace(law, interpolation_error=error)
-        return replace(law, sample_area=area)
+            more["interpolation_error"] = max(
+                more["interpolation_error"], before.interpolation_error
+            )
+        return PatchLaw.of(rising, touch, self.reference, **more)
 
     def _without_full_contact(self, law: PatchLaw) -> SolvedRows:
         """Return the rows of a law of these samples that were solved, on their own reference."""
@@ -155,11 +154,12 @@ class PeriodicSamples:
         under = shared(self.comm, len(samples), lambda k: samples[k].separation_under(pressure))
         low, high = self._parameter(max(under)), self._parameter(min(under))
 
+        @cache
         def excess(parameter: float) -> float:
             return float(self.rows(np.array([parameter]), 0.0).pressure[0, 0]) - pressure
 
         if high - low > _CLOSE * high and excess(low) < 0.0 < excess(high):
-            found = float(scipy.optimize.bisect(excess, low, high, xtol=1e-9 * high, rtol=_CLOSE))
+            found = float(scipy.optimize.brentq(excess, low, high, xtol=1e-9 * high, rtol=_CLOSE))
             high = min(high, (1.0 + _CLOSE) * found)
         return min(by_closure, high)
 

@@ -76,19 +76,23 @@ class PatchLaw(Displayed):
     transmissivity: Transmissivity | None = None
 
     @classmethod
-    def of(cls, rows: SolvedRows, first_touch: float, initial_separation: float) -> PatchLaw:
+    def of(
+        cls, rows: SolvedRows, first_touch: float, initial_separation: float, **more: Any
+    ) -> PatchLaw:
         """Return the law through rows as a micro model gave them, from first touch on.
 
         Args:
             rows: The rows; none of a patch that stays open.
             first_touch: Closure at first touch [mm].
             initial_separation: Mean separation at zero approach [mm].
+            more: Other attributes, such as the errors.
         """
         return cls(
             rows=rows,
             first_touch=float(first_touch),
             initial_separation=float(initial_separation),
             warning_pressure=rows.warning_pressure,
+            **more,
         )
 
     def __post_init__(self) -> None:
@@ -148,7 +152,7 @@ class PatchLaw(Displayed):
     @cached_property
     def curves(self) -> LawCurves:
         """The interpolants of the law over the local approach."""
-        return LawCurves.through(self.rows, self.initial_separation)
+        return LawCurves.through(self.rows, [len(self.rows)], [self.initial_separation])
 
     def along(self, approach: ArrayLike) -> LawPoint:
         """Return what the law gives at local rigid approaches of any shape.

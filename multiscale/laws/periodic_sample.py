@@ -5,7 +5,7 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -42,15 +42,21 @@ class PeriodicSample:
 
     Args:
         model: Its periodic model.
+        error: Error of the pressures of rows that does no harm, over them.
     """
 
     model: HalfSpaceModel
+    error: float = 0.0
     _starts: dict[float, Start] = field(default_factory=dict, init=False)
 
     @property
     def quick(self) -> bool:
         """Whether its rows take so little that one rank solves them all."""
         return self.model.quick_up_to(Control(approach=self.reference)) is not None
+
+    @property
+    def _rough_model(self) -> HalfSpaceModel:
+        return replace(self.model, tolerance=max(self.model.tolerance, self.error))
 
     @property
     def area(self) -> float:
@@ -97,9 +103,11 @@ class PeriodicSample:
         """
         if self.model.hardness is not None and pressure >= self.model.hardness:
             return 0.0
-        state = self.model.press(Control(force=pressure * self.area))
+        state = self._rough_model.press(Control(force=pressure * self.area))
         if not self.yields and state.pressures.min() > 0.0:  # what is left is rounding
             return 0.0
+        if self.quick:
+            self._starts[state.approach] = state.guess
         return max(self.reference - state.approach, 0.0)
 
     def rows(self, separations: Array, full: float) -> list[SampleRow]:
@@ -114,7 +122,7 @@ class PeriodicSample:
             for separation in separations.tolist()
             if separation < self.first_touch and (separation > 0.0 or self.yields)
         }
-        states = press_along(self.model, list(approaches.values()), known=self._starts)
+        states = press_along(self._rough_model, list(approaches.values()), known=self._starts)
         if self.quick:
             self._starts.update((state.approach, state.guess) for state in states)
         found = {

@@ -18,7 +18,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.laws.mean_law import Limit, PeriodicSamples
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import PeriodicSample
-from multiscale.laws.refinement import MOST_ROWS
+from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR
 from multiscale.readable import Observer
 from support.checks import of_kind
 from support.errors import InputError
@@ -33,7 +33,7 @@ def representative_law(
     *,
     largest_pressure: float | None = None,
     largest_closure: float | None = None,
-    tolerance: float = 1e-3,
+    tolerance: float = 3e-3,
     most_rows: int = MOST_ROWS,
     make_model: MakeModel | None = None,
     before: PatchLaw | None = None,
@@ -99,7 +99,7 @@ def representative_law(
         lambda sample: HalfSpaceModel(sample, contact_modulus=contact_modulus, periodic=True)
     )
     face = PeriodicSamples(
-        samples=tuple(_checked(sample, make) for sample in samples),
+        samples=tuple(_checked(sample, make, ROW_ERROR * tolerance) for sample in samples),
         comm=comm,
         observe=(lambda rows: observe("rows of laws", rows, most_rows)) if observe else None,
     )
@@ -168,7 +168,7 @@ def representative_laws(
     )
 
 
-def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
+def _checked(sample: Surface, make: MakeModel, error: float) -> PeriodicSample:
     allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
     of_kind(sample, Surface, "is no surface", allowed=allowed)
     if np.ptp(sample.heights) == 0.0:
@@ -176,4 +176,4 @@ def _checked(sample: Surface, make: MakeModel) -> PeriodicSample:
     model = make(sample)
     if not model.periodic:
         raise InputError("a representative law needs periodic models", value=model.name)
-    return PeriodicSample(model)
+    return PeriodicSample(model, error)

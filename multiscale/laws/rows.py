@@ -84,14 +84,15 @@ class LawRows:
         """
         return type(self)(**{name: function(column) for name, column in self.columns()})
 
-    def joined(self, later: Self) -> Self:
+    def joined(self, *later: Self) -> Self:
         """Return these rows followed by others.
 
         Args:
-            later: Rows of the same laws.
+            later: Other rows, with as many laws beside each other.
         """
-        columns = zip(self.columns(), later.columns(), strict=True)
-        return type(self)(**{name: np.concatenate((a, b)) for (name, a), (_, b) in columns})
+        every = (self, *later)
+        names = (one.name for one in fields(self))
+        return type(self)(**{n: np.concatenate([getattr(one, n) for one in every]) for n in names})
 
     def with_rising_pressure(self) -> tuple[Self, float]:
         """Return rows of a patch alone whose pressure rises with the approach.
@@ -159,8 +160,8 @@ class SolvedRows(LawRows):
         """Pressure of the first row of one law outside the range [MPa]; infinite without any."""
         return float(np.append(self.pressure[self.outside_range], np.inf)[0])
 
-    def from_first_touch(self) -> Self:
-        """Return the rows of one law from first touch on; none of a patch that stays open.
+    def from_first_touch(self) -> tuple[Self, NDArray[np.intp]]:
+        """Return the rows of N laws from first touch on, one law after another.
 
         First touch lies between the last open row and the first one in contact, at the approach
         where the straight line of p^(2/3) through the first two rows in contact vanishes (Hertz'
@@ -169,26 +170,40 @@ class SolvedRows(LawRows):
 
         Where contacts join, the displacement of a block may grow so fast that the local approach
         of a patch decreases while the plane comes nearer: such rows are left out.
+
+        Returns:
+            The rows, and how many each law has, shape (N,); none of a patch that stays open.
         """
-        largest_before = np.maximum.accumulate(self.approach)[:-1]
-        rows = self[np.append(True, self.approach[1:] > largest_before)]
+        largest = np.maximum.accumulate(self.approach, axis=0)
+        kept = np.ones(largest.shape, bool)
+        kept[1:] = self.approach[1:] > largest[:-1]
+        kept &= self.pressure.any(axis=0)  # most patches stay open
+        rows, end = self.mapped(lambda column: column.T[kept.T]), np.cumsum(kept.sum(axis=0))
+        law = np.repeat(np.arange(len(end)), kept.sum(axis=0))
         loaded = np.flatnonzero(rows.pressure > 0.0)
-        if not loaded.size:
-            return rows[:0]
-        first = max(int(loaded[0]), 1)
-        before, contact = rows[first - 1 : first], rows[first : first + 2]
-        share = 0.0
-        if len(contact) == 2 and contact.pressure[1] > contact.pressure[0]:
-            power, later = contact.pressure ** (2 / 3)
-            back = power / (later - power) * np.diff(contact.approach)[0]
-            step = contact.approach[0] - before.approach[0]
-            share = float(np.clip(1.0 - back / step, 0.0, 0.99))
-        start = before.mapped(np.zeros_like)
-        columns: dict[str, Any] = {"outside_range": before.outside_range}
-        for name in ("approach", "closure", "unresolved_displacement"):
-            column = getattr(before, name)
-            columns[name] = column + share * (getattr(contact, name)[:1] - column)
-        return replace(start, **columns).joined(rows[first:])
+        touched, first = np.unique(law[loaded], return_index=True)
+        contact = np.maximum(loaded[first], end[touched] - kept.sum(axis=0)[touched] + 1)
+        before, later = contact - 1, np.minimum(contact + 1, end[touched] - 1)
+        power = rows.pressure ** (2 / 3)
+        rise = power[later] - power[contact]
+        back = power[contact] * (rows.approach[later] - rows.approach[contact])
+        step = (rows.approach[contact] - rows.approach[before]) * rise
+        share = 1.0 - np.divide(back, step, out=np.ones_like(back), where=rise > 0.0)
+        share = np.clip(share, 0.0, 0.99)
+
+        def started(name: str, column: NDArray[Any]) -> NDArray[Any]:
+            if name in ("approach", "closure", "unresolved_displacement"):
+                start = column[before] + share * (column[contact] - column[before])
+            else:
+                start = column[before] if name == "outside_range" else 0
+            column[before] = start
+            return column
+
+        rows = type(self)(**{name: started(name, column) for name, column in rows.columns()})
+        start = np.full(len(end), len(rows))
+        start[touched] = before
+        used = np.arange(len(rows)) >= start[law]
+        return rows[used], np.bincount(law[used], minlength=len(end))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -27,8 +27,8 @@ class Counted:
     def __getattr__(self, name):
         return getattr(self.model, name)
 
-    def quick_up_to(self, control):
-        quick = self.model.quick_up_to(control)
+    def quick_up_to(self, control, error):
+        quick = self.model.quick_up_to(control, error)
         if quick is None:
             return None
         self.model = quick

@@ -41,7 +41,7 @@ def model_with(slopes, **options):
 def test_new_pressures_and_their_combinations_are_exact(slopes):
     cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
     one, other = np.random.default_rng(1).random((2, len(cells)))
-    remembering = RememberedSlopes(slopes, cells)
+    remembering = RememberedSlopes(slopes, cells, 1e-6)
     for few in (one, other, one + 3.0 * other, np.zeros_like(one)):
         everywhere = np.zeros(SURFACE.grid)
         everywhere.ravel()[cells] = few
@@ -55,7 +55,7 @@ def test_new_pressures_and_their_combinations_are_exact(slopes):
 def test_a_combination_is_not_worked_out_anew(slopes, monkeypatch):
     cells = np.arange(100, 140)
     one, other = np.random.default_rng(2).random((2, len(cells)))
-    remembering = RememberedSlopes(slopes, cells)
+    remembering = RememberedSlopes(slopes, cells, 1e-6)
     remembering.on_cells(one)
     remembering.on_cells(other)
     monkeypatch.setattr(FiniteSlopes, "orders", lambda *_: pytest.fail("worked out anew"))
@@ -63,7 +63,7 @@ def test_a_combination_is_not_worked_out_anew(slopes, monkeypatch):
 
 
 def test_pressures_on_other_cells_are_taken_as_they_are(slopes):
-    remembering = RememberedSlopes(slopes, np.arange(10))
+    remembering = RememberedSlopes(slopes, np.arange(10), 1e-6)
     pressure = np.random.default_rng(3).random(SURFACE.grid)
     np.testing.assert_array_equal(remembering.displacement(pressure), slopes.displacement(pressure))
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from multiscale import Run, Scene
-from multiscale.laws.patch_law import PatchLaw, PatchLaws
+from multiscale.laws.interpolation import LawCurves
+from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import Errors, refined
 from multiscale.laws.rows import SolvedRows
 
@@ -44,18 +45,19 @@ class Solver:
 
 
 def laws(rows):
-    return [
-        PatchLaw(rows=rows[:, index], first_touch=0.0, initial_separation=0.02)
-        for index in range(2)
-    ]
+    return [PatchLaw.of(rows[:, index], 0.0, 0.02) for index in range(2)]
+
+
+def curves(rows):
+    each = [rows[:, column] for column in range(rows.pressure.shape[1])]
+    return LawCurves.through(each[0].joined(*each[1:]), list(map(len, each)), np.zeros(len(each)))
 
 
 def made(tolerance, **given):
     solver = Solver()
-    made, error = refined(
-        solver, laws, 0.0, 9e-3, compliance=COMPLIANCE, tolerance=tolerance, **given
-    )
-    return made, error, np.array(solver.asked)
+    made = refined(solver, curves, 0.0, 9e-3, compliance=COMPLIANCE, tolerance=tolerance, **given)
+    some = [PatchLaw.of(made.rows[:, law], 0.0, 0.02, **made.of_law(law)) for law in range(2)]
+    return some, made.force, np.array(solver.asked)
 
 
 def found(some, approach):
@@ -87,33 +89,29 @@ def test_stated_errors_are_those_of_the_laws():
     assert force_error <= 1e-4
     approach = np.linspace(1e-4, 9e-3, 300)
     wrong, true = found(some, approach), pressures(approach)
-    load = np.maximum(true.mean(axis=1), 0.01 * true[-1].mean())
-    # measured half-way between rows; elsewhere it may be a little more
-    assert np.max(np.abs(wrong.mean(axis=1)) / load) < 2 * force_error
+    load = np.maximum(true.mean(axis=1), 0.03 * true[-1].mean())
+    largest = np.max(np.abs(wrong.mean(axis=1)) / load)
+    # a bound where the kink is, and a few times as much where all is smooth
+    assert largest < force_error < 5 * largest
     for law, error in zip(some, (np.abs(wrong) / np.maximum(true, load[:, None])).T, strict=True):
-        assert error.max() < 2 * law.interpolation_error <= 2e-3
+        assert error.max() < law.interpolation_error <= 2e-3
         assert law.interpolation_error < 10 * error.max()  # nor much less than stated
 
 
 def test_errors_are_what_the_half_space_makes_of_them():
     rows = Solver()(9e-3 * np.linspace(0.0, 1.0, 9))
     new = Solver()(np.array([3.3e-3, 5.6e-3]))
-    before = laws(rows)
-    every = rows.joined(new)
-    after = laws(every[np.argsort(every.approach[:, 0])])
-    errors = [
-        Errors.of(PatchLaws(before), PatchLaws(after), new[row], COMPLIANCE, 0.0) for row in (0, 1)
-    ]
-    wrong, true = found(before, new.approach[:, 0]), new.pressure
+    guess = curves(rows).at(np.arange(2), new.approach)
+    errors = Errors.of(guess, np.ones((2, 2)), new, COMPLIANCE, 0.0)
+    wrong, true = found(laws(rows), new.approach[:, 0]), new.pressure
     # first order against Newton's method: errors of 1 % leave 1 % of them
-    expected = 0.5 * np.abs(wrong.mean(axis=1)) / true.mean(axis=1)
-    np.testing.assert_allclose([each.force for each in errors], expected, rtol=0.02)
-    expected = 0.5 * np.abs(wrong) / np.maximum(true, true.mean(axis=1)[:, None])
-    pressure = [each.pressure for each in errors]
-    np.testing.assert_allclose(pressure, expected, rtol=0.02, atol=1e-9)
+    expected = np.abs(wrong.mean(axis=1)) / true.mean(axis=1)
+    np.testing.assert_allclose(errors.force, expected, rtol=0.02)
+    expected = np.abs(wrong) / np.maximum(true, true.mean(axis=1)[:, None])
+    np.testing.assert_allclose(errors.pressure, expected, rtol=0.02, atol=1e-9)
 
 
-@pytest.mark.parametrize("most", [33, 50, 90])
+@pytest.mark.parametrize("most", [17, 50, 90])
 def test_budget_is_kept_and_the_error_stated(most):
     some, error, asked = made(1e-9, most_rows=most)
     assert len(asked) == most
@@ -122,19 +120,16 @@ def test_budget_is_kept_and_the_error_stated(most):
 
 
 def test_nothing_to_refine_without_contact():
-    def open_law(rows):
-        return PatchLaw(rows=rows[:0, 0], first_touch=1.0, initial_separation=0.0)
-
-    some, error = refined(
+    made = refined(
         lambda approach: rows_of(approach, np.zeros((len(approach), 2))),
-        lambda rows: [open_law(rows)] * 2,
+        curves,
         0.0,
         1e-3,
         compliance=COMPLIANCE,
         tolerance=1e-3,
     )
-    assert error == 0.0
-    assert all(law.is_open and law.interpolation_error == 0.0 for law in some)
+    assert made.force == 0.0
+    assert not made.rows.pressure.any() and not made.pressure.any()
 
 
 @pytest.mark.parametrize(("tolerance", "missed"), [(1e-9, True), (1e-2, False)])
