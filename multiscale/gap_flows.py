@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from micro.flow.gap_flow import GapFlow, gap_flow
 from support.arrays import Array
-from support.network_flow import Preconditioner, factorised
+from support.network import Preconditioner, factorised
 
 MOST_FACTORISED = 512**2
 """Cells of a map up to which a factorisation is used. On 512² cells a flow took 0.9 to 2.6 s with

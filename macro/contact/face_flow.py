@@ -17,8 +17,7 @@ from scipy.spatial import cKDTree
 
 from support.arrays import Array, Flags, Indices
 from support.errors import InputError, NotConverged
-from support.network import Network
-from support.network_flow import NetworkFlow, network_flow
+from support.network import Network, NetworkFlow, network_flow
 
 _SAME = 1e-6
 """Distance of places that count as one, over the mean side of the triangles."""

@@ -8,5 +8,5 @@
 
 `grid_compliance` sums them on grids for the contact problem. `free_sides` rests on `quarter_space`,
 and `finite_slopes` on `waves`. `traction_modes` are modes of tractions along the face too;
-`mode_matrices` has the algebra of all compliances in modes.
+`face_modes` has what both kinds of modes have in common.
 """

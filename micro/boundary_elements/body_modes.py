@@ -16,53 +16,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import PatchGrid
-from geometry.legendre_modes import mode_means, mode_values, modes_within
+from geometry.legendre_modes import mode_means, mode_values
+from micro.boundary_elements.face_modes import FaceModes
 from micro.boundary_elements.grid_compliance import CellGrid
-from micro.boundary_elements.mode_matrices import first_modes, in_other_modes, modes_along, sum_of
 from support.arrays import Array, Indices
-from support.checks import positive_lengths
 from support.errors import InputError
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class BodyModes:
-    """Compliance of the top of a body in its Legendre modes.
-
-    Args:
-        lengths: Sides (Lx, Ly) of the top [mm].
-        matrix: D, symmetric; mode k K + l varies as mode k along x and l along y, shape (K², K²)
-            [mm/N].
-        origin: Corner of the top, where the contact face does not start with it [mm].
-        rough: D from a coarser discretisation, which shows the error; None where there is none.
-
-    Raises:
-        InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
-            not symmetric.
-    """
+class BodyModes(FaceModes):
+    """Compliance D of the top of a body under pressures, in its Legendre modes; see `FaceModes`."""
 
     lifts: ClassVar[bool] = True
-
-    lengths: tuple[float, float]
-    matrix: Array
-    origin: tuple[float, float] = (0.0, 0.0)
-    rough: Array | None = None
-
-    def __post_init__(self) -> None:
-        matrix = np.asarray(self.matrix, float)
-        object.__setattr__(self, "matrix", matrix)
-        positive_lengths(self.lengths, "the top")
-        if matrix.ndim != 2 or not len(matrix) or matrix.shape != 2 * (self.count**2,):
-            problem = "the compliance is not one of K × K modes"
-            raise InputError(problem, value=matrix.shape, allowed="(K², K²), K ≥ 1")
-        apart = float(np.abs(matrix - matrix.T).max())
-        if not apart <= 1e-9 * float(np.abs(matrix).max()):
-            problem = "the compliance is not finite and symmetric"
-            raise InputError(problem, value=apart, allowed="D = Dᵀ")
-
-    @property
-    def count(self) -> int:
-        """Modes K along a side."""
-        return modes_along(self.matrix)
 
     def on(
         self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float = 1.0
@@ -74,12 +39,8 @@ class BodyModes:
             borders_y: Borders along y, shape (ny + 1,) [mm].
             modulus: Unit of the pressures [MPa].
         """
-        x, y = self._placed(borders_x, borders_y)
-        means_x, means_y = (
-            mode_means(at, length, self.count)
-            for at, length in zip((x, y), self.lengths, strict=True)
-        )
-        return ModesOnCells(self.matrix, means_x, means_y, modulus * np.diff(x), np.diff(y))
+        x, y = self.placed(borders_x, borders_y)
+        return ModesOnCells(self.matrix, *self.means(x, y), modulus * np.diff(x), np.diff(y))
 
     def on_cells(self, cells: CellGrid, modulus: float) -> ModesOnCells:
         """Return the compliance of equal cells of pressure, see `on`."""
@@ -95,48 +56,9 @@ class BodyModes:
         modes = np.kron(cells.means_x, cells.means_y)
         return np.asarray(modes.T @ self.matrix @ modes * patches.areas)
 
-    def fewer(self, count: int) -> BodyModes:
-        """Return the compliance of the first modes alone, which shows how well K modes resolve it.
-
-        Args:
-            count: Modes along a side, at most K.
-        """
-        if not 1 <= count <= self.count:
-            allowed = f"1 … {self.count}"
-            raise InputError("so many modes are not there", value=count, allowed=allowed)
-        return BodyModes(self.lengths, first_modes(self.matrix, count), self.origin)
-
-    def within(self, lengths: tuple[float, float]) -> BodyModes:
-        """Return the compliance of a rectangle of the top, in modes of its own.
-
-        Args:
-            lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
-        """
-        if lengths == self.lengths and self.origin == (0.0, 0.0):
-            return self
-        change = modes_within(lengths, self.lengths, self.origin, self.count)
-        rough = None if self.rough is None else in_other_modes(self.rough, change)
-        return BodyModes(lengths, in_other_modes(self.matrix, change), rough=rough)
-
-    def plus(self, other: BodyModes) -> BodyModes:
-        """Return the compliance of this body and of another one on the same rectangle.
-
-        Args:
-            other: That of the other body, whose modes may be more or fewer.
-        """
-        rough = None
-        if self.rough is not None or other.rough is not None:
-            parts = (one.matrix if one.rough is None else one.rough for one in (self, other))
-            rough = sum_of(*parts)
-        return BodyModes(self.lengths, sum_of(self.matrix, other.matrix), self.origin, rough)
-
     def coarser(self) -> BodyModes | None:
         """Return the compliance from a coarser discretisation; None where there is none."""
         return None if self.rough is None else BodyModes(self.lengths, self.rough, self.origin)
-
-    def _placed(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
-        """Return places counted from the corner of the top."""
-        return np.asarray(x, float) - self.origin[0], np.asarray(y, float) - self.origin[1]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

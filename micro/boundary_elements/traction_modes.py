@@ -9,21 +9,14 @@ Theory: docs/theory.md, sections 6 and 15.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from geometry.legendre_modes import mode_means, modes_within
-from micro.boundary_elements.mode_matrices import (
-    first_modes,
-    in_other_modes,
-    modes_along,
-    sum_of,
-    transposed,
-)
+from micro.boundary_elements.face_modes import FaceModes
 from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from support.arrays import Array, Indices
-from support.errors import InputError
 
 
 def half_space_traction_modes(
@@ -60,64 +53,13 @@ def half_space_traction_modes(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TractionModes:
-    """Compliance of the top of a body under tractions, in its Legendre modes.
+class TractionModes(FaceModes):
+    """Compliance of the top of a body under tractions, in its Legendre modes; see `FaceModes`.
 
-    Args:
-        lengths: Sides (Lx, Ly) of the top [mm].
-        matrix: Displacements along x, y and into the body by moments of tractions likewise,
-            symmetric, shape (3, 3, K², K²) [mm/N].
-        origin: Corner of the top, where the contact face does not start with it [mm].
-
-    Raises:
-        InputError: When the matrix is not one of K² modes, not finite or not symmetric.
+    Its matrix has displacements along x, y and into the body by moments of tractions likewise.
     """
 
-    lengths: tuple[float, float]
-    matrix: Array
-    origin: tuple[float, float] = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        matrix, allowed = self.matrix, "finite, symmetric, (3, 3, K², K²), K ≥ 1"
-        if matrix.shape != (3, 3, self.count**2, self.count**2):
-            problem = "the compliance is not one of K × K modes"
-            raise InputError(problem, value=matrix.shape, allowed=allowed)
-        apart = float(np.abs(matrix - transposed(matrix)).max())
-        if not apart <= 1e-9 * float(np.abs(matrix).max()):
-            problem = "the compliance is not finite and symmetric"
-            raise InputError(problem, value=apart, allowed=allowed)
-
-    @property
-    def count(self) -> int:
-        """Modes K along a side."""
-        return modes_along(self.matrix)
-
-    def fewer(self, count: int) -> TractionModes:
-        """Return the compliance of the first modes alone, which shows how well K modes resolve it.
-
-        Args:
-            count: Modes along a side, at most K.
-        """
-        return TractionModes(self.lengths, first_modes(self.matrix, count), self.origin)
-
-    def within(self, lengths: tuple[float, float]) -> TractionModes:
-        """Return the compliance of a rectangle of the top, in modes of its own.
-
-        Args:
-            lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
-        """
-        if lengths == self.lengths and self.origin == (0.0, 0.0):
-            return self
-        change = modes_within(lengths, self.lengths, self.origin, self.count)
-        return TractionModes(lengths, in_other_modes(self.matrix, change))
-
-    def plus(self, other: TractionModes) -> TractionModes:
-        """Return the compliance of this body and of another one on the same rectangle.
-
-        Args:
-            other: That of the other body, whose modes may be more or fewer.
-        """
-        return TractionModes(self.lengths, sum_of(self.matrix, other.matrix), self.origin)
+    directions: ClassVar[tuple[int, ...]] = (3, 3)
 
     def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
         """Return the compliance of cells of uniform tractions, by means over the cells.
@@ -127,16 +69,9 @@ class TractionModes:
             borders_y: Borders along y, shape (ny + 1,) [mm].
             modulus: Unit of the tractions [MPa].
         """
-        x, y = (
-            np.asarray(borders, float) - start
-            for borders, start in zip((borders_x, borders_y), self.origin, strict=True)
-        )
-        means = (
-            mode_means(at, length, self.count)
-            for at, length in zip((x, y), self.lengths, strict=True)
-        )
+        x, y = self.placed(borders_x, borders_y)
         force = modulus * (x[1] - x[0]) * (y[1] - y[0])
-        return TractionsOnCells(self.matrix * force, *means)
+        return TractionsOnCells(self.matrix * force, *self.means(x, y))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

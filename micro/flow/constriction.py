@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from support.arrays import Array
-from support.network import Network
-from support.network_flow import NetworkFlow
+from support.network import Network, NetworkFlow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -20,8 +20,7 @@ import numpy as np
 from micro.flow.constriction import Constriction, critical_constriction
 from support.arrays import Array
 from support.errors import InputError
-from support.network import Network
-from support.network_flow import NetworkFlow, Preconditioner, factorised, network_flow
+from support.network import Network, NetworkFlow, Preconditioner, factorised, network_flow
 
 _LEAST_GAP = 1e-7
 """Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller

@@ -270,15 +270,10 @@ class LoadHistory(ShearPath):
         state = self._state(leg, done / leg.steps)
         pull_before = self._pull(2.0 * leg.stage)
         now = origin[0] if leg.quantity == "approach" else origin[1] - pull_before
-
-        def reached(start: float, end: float) -> float:
-            return end if done == leg.steps else start + done * ((end - start) / leg.steps)
-
-        value = reached(*(now if end is None else end for end in (leg.start, leg.end)))
+        value, pair = leg.reached(done, now)
         shear = None
         if self.shear_key:
-            x, y = (reached(*ends) for ends in zip(*leg.shear, strict=True))
-            shear = ShearControl(shift=(x, y)) if self.by_shift else ShearControl(force=(x, y))
+            shear = ShearControl(shift=pair) if self.by_shift else ShearControl(force=pair)
         if leg.quantity == "approach":
             return Control(approach=value, tilt=self.slopes, body_state=state, shear=shear)
         force = max(value + self._pull(state), 0.0)  # rounding, of what is checked beforehand
@@ -318,15 +313,7 @@ class LoadHistory(ShearPath):
         force = self.force
         if self.pressure is not None:
             force = tuple(pressure * area for pressure in self.pressure)
-        stages = tuple(
-            replace(
-                one,
-                approach=None if one.approach is None else one.approach + depth,
-                force=one.force if one.pressure is None else one.pressure * area,
-                pressure=None,
-            )
-            for one in self.stage
-        )
+        stages = tuple(one.on_face(depth, area) for one in self.stage)
         found = replace(
             self,
             approach=lowered(self.approach, depth),

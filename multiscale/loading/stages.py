@@ -172,6 +172,17 @@ class Stage:
         """Whether it changes loads of the bodies."""
         return any(one not in (None, BodyLoads()) for one in (self.body, self.counter_body))
 
+    def on_face(self, depth: float, area: float) -> Stage:
+        """Return the stage on a contact face: its approach from first touch, no pressure but force.
+
+        Args:
+            depth: How far the zero lies below first touch [mm].
+            area: Nominal area of the face [mm²].
+        """
+        approach = None if self.approach is None else self.approach + depth
+        force = self.force if self.pressure is None else self.pressure * area
+        return replace(self, approach=approach, force=force, pressure=None)
+
 
 def stated_shears(load: Any) -> list[str]:
     """Return which of ``shear`` and ``shear_force`` a stage, or a load history, states.
@@ -203,6 +214,21 @@ class Leg(NamedTuple):
     steps: int
     shear: tuple[Pair, Pair]
     there: bool = True
+
+    def reached(self, done: float, now: float) -> tuple[float, Pair]:
+        """Return what is prescribed of the plane and of the shear after some load steps.
+
+        Args:
+            done: The load steps, which need not be whole.
+            now: What the plane had when the stage began.
+        """
+
+        def between(start: float, end: float) -> float:
+            return end if done == self.steps else start + done * ((end - start) / self.steps)
+
+        start, end = (now if value is None else value for value in (self.start, self.end))
+        x, y = map(between, *self.shear)
+        return between(start, end), (x, y)
 
 
 def legs_of(stages: Sequence[Stage], steps: int) -> Iterator[Leg]:

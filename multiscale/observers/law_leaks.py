@@ -31,7 +31,7 @@ from multiscale.observers.leak import LeakObserver
 from support.arrays import Array
 from support.collective import on_root_alone
 from support.errors import InputError
-from support.network_flow import network_flow
+from support.network import network_flow
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro.contact.face_leak import LeakingFace

@@ -22,7 +22,7 @@ FLOORS = {
     "support": [
         "arrays cores displayed errors small_caches",
         "checks collective fields network packages quantities whole_files",
-        "checked_store network_flow",
+        "checked_store",
     ],
     "geometry": [
         "interpolant legendre_modes materials",

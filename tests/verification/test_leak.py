@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from geometry.spectrum import Spectrum, synthesise
 from micro import HalfSpaceModel
 from micro.flow.gap_flow import cell_network, gap_flow
-from support.network_flow import network_flow
+from support.network import network_flow
 
 MODULUS = 1000.0
 

@@ -8,8 +8,7 @@ import pytest
 from scipy import sparse
 
 from support.errors import NotConverged
-from support.network import Network
-from support.network_flow import MOST_IMBALANCE, factorised, network_flow
+from support.network import MOST_IMBALANCE, Network, factorised, network_flow
 
 IN, OUT = -2, -1
 

@@ -5,7 +5,7 @@ import pytest
 
 from macro.contact.face_flow import TriangleFace
 from support.errors import InputError
-from support.network_flow import MOST_IMBALANCE
+from support.network import MOST_IMBALANCE
 
 INNER, OUTER = 22.0, 24.5
 
