@@ -12,7 +12,7 @@ import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -30,8 +30,8 @@ from multiscale.inputs.cost import FACE_CYCLES, SET_UP_CYCLES, SOLUTIONS_OF_LAWS
 from multiscale.inputs.scene_parts import Source
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
-from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe, checked
-from multiscale.measured_errors.shear import behind_laws, shear_errors, with_shear_errors
+from multiscale.measured_errors.contact import MOST_CHECKED_CELLS, ErrorProbe
+from multiscale.measured_errors.shear import checked
 from multiscale.readable import times
 from support.arrays import Array
 from support.collective import on_root_alone
@@ -172,20 +172,7 @@ class MicroCoupling(PressedSurface):
         known = None if self.has_laws else self.solver.latest
         start = None if known is None else known.guess
         probe, friction, history = self.error_probe(), self.friction_model, self.load_history
-
-        def measured() -> LoadStep:
-            force = shear = None
-            if friction is not None and self.has_laws:
-                contact, shear = behind_laws(probe, friction, [*past, step], history)
-                force = contact.force
-            found = step
-            if normal:
-                found = checked(step, probe, history, start=start, behind=force)
-            if friction is None:
-                return found
-            parts = shear_errors(probe, friction, [*past, found], history, shear)
-            return with_shear_errors(found, parts, by_shift=history.by_shift)
-
+        measured = partial(checked, step, past, probe, history, friction, start, normal=normal)
         return on_root_alone(self.comm, measured)
 
     def coarser_gap(self, step: LoadStep) -> Array | None:

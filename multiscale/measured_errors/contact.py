@@ -24,7 +24,7 @@ Theory: docs/theory.md, section 13.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -269,7 +269,7 @@ def _on_grid(pressures: Array, grid: tuple[int, int]) -> Array | None:
     return None
 
 
-def checked(
+def checked_force(
     step: LoadStep,
     probe: ErrorProbe,
     load_history: LoadHistory,
@@ -277,7 +277,7 @@ def checked(
     start: Start | None = None,
     behind: float | None = None,
 ) -> LoadStep:
-    """Return a load step with its errors measured.
+    """Return a load step with the errors of its normal force measured.
 
     Args:
         step: The load step.
@@ -321,6 +321,19 @@ def with_errors(step: LoadStep, found: MeasuredErrors, *, by_force: bool) -> Loa
     )
 
 
+def causes_text(errors: Iterable[tuple[str, float]], unit: str) -> str:
+    """Return errors by cause in words.
+
+    Args:
+        errors: Causes and errors.
+        unit: Unit of the errors.
+    """
+    return ", ".join(
+        f"{cause} {quantity(error, unit, 2) if math.isfinite(error) else 'not measured'}"
+        for cause, error in errors
+    )
+
+
 def error_notes(steps: list[LoadStep]) -> Iterator[str]:
     """Yield the errors of the last load step that was measured.
 
@@ -333,10 +346,7 @@ def error_notes(steps: list[LoadStep]) -> Iterator[str]:
     step = measured[-1]
     whole = sum(error for _, error in step.errors)
     share = f" ({percent(whole / step.force_N)})" if step.force_N else ""
-    causes = ", ".join(
-        f"{cause} {quantity(error, 'N', 2) if math.isfinite(error) else 'not measured'}"
-        for cause, error in step.errors
-    )
+    causes = causes_text(step.errors, "N")
     largest = max(step.errors, key=lambda each: each[1])[0]
     if whole == math.inf:
         yield Caution(

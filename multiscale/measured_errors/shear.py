@@ -23,14 +23,14 @@ from dataclasses import replace
 import numpy as np
 
 from geometry import Control
-from geometry.contact_state import ContactState
+from geometry.contact_state import ContactState, Start
 from geometry.shear_state import ShearControl, ShearState
 from micro import HalfSpaceModel
 from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel
 from multiscale.loading.load_history import LoadHistory
 from multiscale.loading.load_step import LoadStep
-from multiscale.measured_errors.contact import ZERO, ErrorProbe
+from multiscale.measured_errors.contact import ZERO, ErrorProbe, causes_text, checked_force
 from multiscale.readable import percent, quantity
 from support.arrays import Array
 from support.errors import NotConverged
@@ -46,6 +46,42 @@ FEWEST_CELLS = 16
 """Cells along a side below which half as many show no error."""
 _NORMAL = ("body", "slopes", ZERO)
 """Causes of the error of the normal force besides the grid."""
+
+
+def checked(
+    step: LoadStep,
+    past: Sequence[LoadStep],
+    probe: ErrorProbe,
+    history: LoadHistory,
+    friction: FrictionModel | None,
+    start: Start | None = None,
+    *,
+    normal: bool = True,
+) -> LoadStep:
+    """Return a load step of contacts on cells with its errors measured.
+
+    Args:
+        step: The load step.
+        past: All load steps before it.
+        probe: Measures the errors of the normal force.
+        history: The loads.
+        friction: Friction on the cells of the run; None without.
+        start: The solution of the load step, where the run has it.
+        normal: Whether the errors of the normal force are measured, too.
+
+    Raises:
+        NotConverged: When a contact problem cannot be solved.
+    """
+    force = shear = None
+    if friction is not None and probe.by_laws:
+        contact, shear = behind_laws(probe, friction, [*past, step], history)
+        force = contact.force
+    if normal:
+        step = checked_force(step, probe, history, start=start, behind=force)
+    if friction is None:
+        return step
+    parts = shear_errors(probe, friction, [*past, step], history, shear)
+    return with_shear_errors(step, parts, by_shift=history.by_shift)
 
 
 def shear_errors(
@@ -288,10 +324,6 @@ def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[
     if not measured:
         return
     step, unit = measured[-1], "N" if by_shift else "mm"
-    causes = ", ".join(
-        f"{cause} {quantity(error, unit, 2) if math.isfinite(error) else 'not measured'}"
-        for cause, error in step.shear_errors
-    )
     whole = sum(error for _, error in step.shear_errors)
     size = float(np.hypot(*_response(step, by_shift=by_shift)))
     known = math.isfinite(whole) and size > 0.0
@@ -299,5 +331,5 @@ def shear_error_notes(steps: Sequence[LoadStep], *, by_shift: bool) -> Iterator[
     names = "at its shift the shear force", "under its shear force the shift"
     yield (
         f"measured at load step {step.step}: {names[not by_shift]} "
-        f"{within or 'has no stated error'}: {causes}"
+        f"{within or 'has no stated error'}: {causes_text(step.shear_errors, unit)}"
     )
