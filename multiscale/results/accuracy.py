@@ -44,11 +44,9 @@ class AccuracyVerdict:
         found = percent(self.error)
         if self.kept:
             return f"{asked} kept: measured at load step {self.step}, the force is within {found}"
-        largest = max(self.causes, key=lambda cause: self.causes[cause], default="")
-        most = f", most of it by {largest}" * bool(largest)
         return Caution(
             f"the {asked} is not kept: measured at load step {self.step}, the force may be off by "
-            f"{found}{most}"
+            f"{found}{_most_of_it(self.causes)}"
         )
 
 
@@ -159,8 +157,25 @@ class Decision:
             )
         return (
             f"an accuracy of {100 * self.accuracy:.3g} % is not kept: measured at the largest "
-            f"load, the force may be off by {100 * self.error:.2g} %, most of it by {largest}"
+            f"load, the force may be off by {100 * self.error:.2g} %{_most_of_it(self.errors)}"
         )
+
+
+_REMEDIES = {
+    "edges": "which no refinement lessens: take cells of the whole face, by a map that covers it "
+    "and coupling.kind = 'concurrent', or a sample that is smaller than the face",
+    "samples": "which more samples lessen (law.seeds, or further maps in law.samples)",
+}
+"""What lessens errors that finer cells and meshes do not."""
+
+
+def _most_of_it(causes: Mapping[str, float]) -> str:
+    """Return which cause errs most, and what lessens it where refinement does not."""
+    if not causes:
+        return ""
+    largest = max(causes, key=lambda cause: causes[cause])
+    remedy = _REMEDIES.get(largest)
+    return f", most of it by {largest}" + (f", {remedy}" if remedy else "")
 
 
 def _listed(errors: Mapping[str, float]) -> str:

@@ -11,6 +11,7 @@ from micro import HalfSpaceModel
 from multiscale import Scene, run
 from multiscale.measured_errors import edges as edge_errors
 from multiscale.measured_errors.edges import edge_width
+from multiscale.results.accuracy import AccuracyVerdict, Decision
 
 MATERIAL = Material(young_modulus=4000.0, poisson_ratio=0.2)
 SPECTRUM = {"hurst": 0.8, "waves": [1, 3], "rms_slope": 0.1, "seed": 11}
@@ -81,6 +82,14 @@ def test_edges_are_an_error_of_free_sides_alone():
     free, rollers = (dict(laws_on_block(sides).errors) for sides in ("free", "roller"))
     assert free["edges"] > 0.0
     assert rollers["edges"] == 0.0
+
+
+def test_an_accuracy_that_edges_forbid_says_what_to_do():
+    causes, told = {"mesh": 0.0, "edges": 0.1}, "by edges, which no refinement lessens: take cells"
+    measured = AccuracyVerdict(requested=1e-3, error=0.1, step=1, causes=causes).sentence
+    before = Decision(accuracy=1e-3, taken="", errors=causes).warning
+    assert told in measured
+    assert told in before
 
 
 def test_the_error_at_the_edges_is_what_cells_on_the_whole_face_tell(tmp_path):
