@@ -186,6 +186,15 @@ def test_stiffness_has_an_error_where_cells_yield_anew():
     assert 0.0 < abs(back.stiffness_N_per_mm[0] - found) < error < 0.5 * found
 
 
+def test_the_work_of_the_way_back_is_the_elastic_energy_that_it_gives_back():
+    load = {"approach": [0.0083, 0.0021], "steps": 4}
+    history = run(scene(load=load, micro={"hardness": HARDNESS, "finite_slopes": False}))
+    stored = history.elastic_energy_mJ + history.plastic_work_mJ
+    assert history.plastic_work_mJ[3] > 0.0
+    # by force and stiffness at both ends of a step; 2 % where contacts part
+    np.testing.assert_allclose(np.diff(history.work_mJ)[3:], np.diff(stored)[3:], rtol=0.03)
+
+
 def test_notes_say_what_yielded_and_what_would_bear_elastic_contacts():
     (hard,) = (note for note in ran("analytic").notes if note.startswith("hardness 300 MPa"))
     assert "after load step 4 a plastic volume of" in hard

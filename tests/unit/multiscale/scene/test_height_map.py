@@ -24,7 +24,7 @@ def scene(heights, **surface):
     )
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def heights():
     x, y = np.meshgrid(np.arange(24) + 0.5, np.arange(12) + 0.5, indexing="ij")
     return 0.01 * np.sin(0.7 * x) * np.cos(0.5 * y) + 2e-3 * np.sin(0.2 * x + 0.4)
