@@ -29,7 +29,7 @@ Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, scipy.sparse.csr_array otherwise
 
 _LINES = 2**20
-"""Numbers that the waves between rows of cells hold at most at a time."""
+"""Numbers that the lines between rows of cells hold at most: all that are cached, or at a time."""
 _MANY = 2**16
 """Cells that gain by threads."""
 _BLOCK = 2**17
@@ -124,19 +124,25 @@ class _SidePair:
 
     def between(self, row: Indices, cell: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
+        apart = np.abs(cell[:, None] - cell)
+        if len(self.means) ** 2 * len(self.kernels) <= _LINES:
+            return np.asarray(_all_lines(self)[apart, row[:, None], row])
         used, row = np.unique(row, return_inverse=True)
-        means = np.asarray(_full(self.means)[used])
-        low, high = np.split(means, 2, axis=1)
-        matrix = np.empty((len(row), len(row)))
+        matrix = np.empty(apart.shape)
         step = max(1, _LINES // (len(used) * len(self.kernels)))
         for first in range(0, len(used), step):  # some rows at a time, for the memory
-            here = slice(first, first + step)
-            waves = sum(one[here] @ self.kernels @ one.T for one in (low, high))
-            lines = fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)
             some = np.flatnonzero((row >= first) & (row < first + step))
-            apart = np.abs(cell[some][:, None] - cell)
-            matrix[some] = lines[apart, row[some][:, None] - first, row]
+            lines = self.lines_between(used[first : first + step], used)
+            matrix[some] = lines[apart[some], row[some][:, None] - first, row]
         return matrix
+
+    def lines_between(self, rows: Indices, others: Indices) -> Array:
+        """Return displacements along rows by a unit pressure in others, (cells, r, o)."""
+        means = _full(self.means)
+        pairs = zip(np.split(means[rows], 2, axis=1), np.split(means[others], 2, axis=1),
+                    strict=True)  # fmt: skip
+        waves = sum(one @ self.kernels @ other.T for one, other in pairs)
+        return fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)[: self.place[-1] + 1]
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
@@ -158,6 +164,13 @@ class _SidePair:
         for each, one in zip(made, three.transpose(1, 0, 2, 3), strict=True):
             each[:] = _multiplied(kernels, np.ascontiguousarray(one))
         return self.on_cells(made.transpose(1, 0, 2, 3).reshape(len(kernels), -1, 2), count)
+
+
+@lru_cache(maxsize=16)
+def _all_lines(pair: _SidePair) -> Array:
+    """Return the lines between all rows, cached for other cells of them and other surfaces."""
+    rows = np.arange(len(pair.means))
+    return pair.lines_between(rows, rows)
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
@@ -288,7 +301,9 @@ class SideTerm:
         last = rows[-1], columns[-1]
         if cells.coarse and not (many(cells.counts) and self._filled(cells.spacing, last)):
             return None
-        return side_cells(self.sides, cells.spacing).among(rows, columns)
+        every = side_cells(self.sides, cells.spacing)
+        whole = len(rows) == len(every.across_x.means) and len(columns) == len(every.across_y.means)
+        return every if whole else every.among(rows, columns)
 
     def _filled(self, spacing: tuple[float, float], last: tuple[int, int]) -> bool:
         """Return whether cells fill the rectangle, of which one by its indices is to be part."""
