@@ -9,11 +9,13 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 
 from micro.boundary_elements.half_space_grid import Cells
-from support.arrays import Array
+from support.arrays import Array, Indices
 
 
 class ComplianceMatrix:
@@ -21,13 +23,14 @@ class ComplianceMatrix:
 
     Args:
         matrix: Displacements of the cells by unit pressures / E* on them, shape (n, n) [mm].
+        added: Matrices that are added to it, with factors.
 
     Attributes:
         products: Products with pressures so far.
     """
 
-    def __init__(self, matrix: Array) -> None:
-        self._matrix = matrix
+    def __init__(self, matrix: Array, added: Sequence[tuple[float, Array]] = ()) -> None:
+        self._matrix, self._added = matrix, added
         self._last: tuple[Cells, Array, tuple[Array, bool]] | None = None
         self.products = 0
 
@@ -36,9 +39,9 @@ class ComplianceMatrix:
         """Size of the matrix [B]."""
         return self._matrix.nbytes
 
-    def first(self, count: int) -> ComplianceMatrix:
-        """Return the compliance of the first of these cells, by the same memory."""
-        return ComplianceMatrix(self._matrix[:count, :count])
+    def with_added(self, added: Sequence[tuple[float, Array]]) -> ComplianceMatrix:
+        """Return the compliance with matrices that are added, with factors."""
+        return ComplianceMatrix(self._matrix, [*self._added, *added])
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
@@ -48,7 +51,21 @@ class ComplianceMatrix:
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
-        return np.matmul(self._matrix, pressure, out=out)
+        moved = np.matmul(self._matrix, pressure, out=out)
+        for factor, matrix in self._added:
+            moved += factor * (matrix @ pressure)
+        return moved
+
+    def of(self, rows: Indices | slice) -> Array:
+        """Return the matrix of some of the cells, by their indices: shape (m, m)."""
+        one = self.among(rows)
+        return sum((factor * matrix for factor, matrix in one._added), one._matrix)
+
+    def among(self, rows: Indices | slice) -> ComplianceMatrix:
+        """Return the compliance of some of the cells, by their indices."""
+        square = (rows, rows) if isinstance(rows, slice) else np.ix_(rows, rows)
+        added = [(factor, matrix[square]) for factor, matrix in self._added]
+        return ComplianceMatrix(self._matrix[square], added)
 
     def apply_compliance(self, cells: Cells, pressure: Array) -> Array:
         """Return the displacements of some cells by pressures on them, shape (m,) [mm]."""
@@ -62,7 +79,7 @@ class ComplianceMatrix:
     def _among(self, cells: Cells) -> tuple[Array, tuple[Array, bool]]:
         """Return the matrix of some cells, and its factors."""
         if self._last is None or self._last[0] is not cells:
-            part = self._matrix[np.ix_(cells.flat, cells.flat)]
+            part = self.of(cells.flat)
             try:
                 factors = scipy.linalg.cho_factor(part, lower=True, check_finite=False)
             except np.linalg.LinAlgError:  # to rounding, or terms that err: CG then iterates

@@ -175,7 +175,7 @@ class FiniteSlopes:
         return self._waves.coarsened(field)
 
     def refined(self, field: Array) -> Array:
-        """Return a field on the cells that the term works on, (cx, cy), on all cells, (nx, ny)."""
+        """Return fields on the cells that the term works on, (…, cx, cy), on all, (…, nx, ny)."""
         return self._waves.refined(field)
 
     def orders(self, loaded: Array) -> tuple[Array, Array, Array]:

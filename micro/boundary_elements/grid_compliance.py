@@ -11,13 +11,14 @@ Theory: docs/theory.md, section 3.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache, partial
 from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
+from micro.boundary_elements.few_cells import FewCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
@@ -41,6 +42,8 @@ _MOST_GRIDS = 24
 _half_space = cached_where_small(
     lambda grid, spacing, *, periodic: grid[0] * grid[1] <= 2**14, most=_MOST_GRIDS + 8
 )(HalfSpaceGrid)
+_CACHES = "half_space", "_terms_on", "_matrices"
+"""What is cached of a body without its finite slopes."""
 _MOST_BYTES = 1e8
 """Size of the matrices of few cells that are cached [B]."""
 
@@ -197,8 +200,8 @@ class Compliance:
         slopes: What finite slopes add, for each body whose slopes count. Whoever solves on the
             grids has to take them into account (`micro.complementarity.slope_iteration`).
         few: Flat indices of the few cells that are loaded mostly, those first that touch first,
-            shape (n,). Finite slopes then remember what they do with pressures on these cells.
-        rest: Rest of such pressures, over them, that they leave out in part.
+            shape (n,). Finite slopes remember what they do with pressures on these cells.
+        rest: Rest of such pressures, over them, that they leave out in part; see `FewCells`.
     """
 
     periodic: bool
@@ -206,13 +209,20 @@ class Compliance:
     terms: Sequence[BodyTerm] = ()
     slopes: tuple[FiniteSlopes, ...] = ()
     few: Indices | None = None
-    rest: float = 1e-6
+    rest: float = 1e-7
     _last: tuple[Array, Array] | None = field(default=None, init=False)
+    _few_cells: FewCells | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
-        caches = {"half_space", "_terms_on", "_matrices", "_last", "_remembering"}
-        return {name: value for name, value in vars(self).items() if name not in caches}
+        own = {name: value for name, value in vars(self).items() if name not in _CACHES}
+        return own | {"_last": None, "_few_cells": None}
+
+    def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Compliance:
+        """Return the same body with other finite slopes; both have what is cached of it."""
+        other = replace(self, slopes=slopes)
+        vars(other).update({name: getattr(self, name) for name in _CACHES})
+        return other
 
     def on_grid(
         self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0), *, coarse: bool = False
@@ -250,14 +260,10 @@ class Compliance:
         """Return the compliance of few cells of the surface as a matrix; the last few are cached.
 
         Args:
-            cells: Their flat indices, shape (n,); ascending, or the first of ``few``.
+            cells: Their flat indices, shape (n,).
             grid: Numbers of cells of the surface.
             spacing: Sides of a cell [mm].
         """
-        count = len(cells)
-        if self.few is not None and count < len(self.few):
-            if np.array_equal(cells, self.few[:count]):
-                return self.matrix_on(self.few, grid, spacing).first(count)
         key = cells.tobytes()
         found = self._matrices.pop(key, None) or self.on_grid(grid, spacing).matrix(cells, grid[1])
         self._matrices[key] = found
@@ -297,21 +303,18 @@ class Compliance:
             self._last = pressure, self._by_slopes(pressure)
         return self._last[1]
 
-    @cached_property
-    def _remembering(self) -> tuple[RememberedSlopes, ...]:
-        """The finite slopes, with a memory; none where the loaded cells are not known to be few."""
-        if self.few is None:
-            return ()
-        return tuple(RememberedSlopes(each, self.few, self.rest) for each in self.slopes)
-
-    def slopes_on_few(self, pressure: Array) -> Array:
-        """Return what finite slopes add to the displacements of few cells, shape (k, 1) [mm].
+    def few_cells(self, grid: Grid, spacing: Pair) -> FewCells | None:
+        """Return the compliance of ``few``, which is cached; None where they are not known.
 
         Args:
-            pressure: Pressures / E* on the first k of these cells, which alone are loaded, (k, 1).
+            grid: Numbers of cells of the surface.
+            spacing: Sides of a cell [mm].
         """
-        loaded = pressure.ravel() * self.modulus
-        return np.sum([each.on_cells(loaded) for each in self._remembering], axis=0)[:, None]
+        if self._few_cells is None and self.few is not None:
+            matrix = self.matrix_on(self.few, grid, spacing)
+            slopes = [RememberedSlopes(each, self.few) for each in self.slopes]
+            self._few_cells = FewCells(self.few, matrix, slopes, self.modulus, self.rest)
+        return self._few_cells
 
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
         """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).
@@ -332,5 +335,5 @@ class Compliance:
 
     def _by_slopes(self, pressure: Array) -> Array:
         """Return the sum of what the slopes of all bodies add, by pressures / E*."""
-        slopes = self._remembering or self.slopes
-        return np.asarray(sum(each.displacement(pressure * self.modulus) for each in slopes))
+        loaded = pressure * self.modulus
+        return np.asarray(sum(each.displacement(loaded) for each in self.slopes))

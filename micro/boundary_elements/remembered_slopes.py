@@ -9,7 +9,8 @@ of what it does with the rest:
 
 What is left out, (1 − Π) L (1 − Π) p, changes a force by the product of two rests: that of the
 pressures and that of their derivative by the approach. Where the rest of the pressures is larger
-than a bound, L is worked out for it, too.
+than a bound, L is worked out for it, too. On few cells the right-hand side is a symmetric matrix,
+which grows by a product of two columns and its transpose with every direction that is worked out.
 
 Theory: docs/theory.md, section 7.
 """
@@ -21,8 +22,9 @@ import numpy as np
 from micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from support.arrays import Array, Indices
 
-_MOST = 192
-"""Pressures that are remembered at most: 40 MB on 64² coarse cells."""
+_FIRST, _MOST = 24, 128
+"""Pressures that there is room for at first, and that are remembered at most: 80 MB on 64² coarse
+cells that are mirrored around."""
 
 
 class RememberedSlopes:
@@ -30,90 +32,144 @@ class RememberedSlopes:
 
     Args:
         slopes: The finite slopes.
-        cells: Flat indices of the cells that may be loaded, shape (n,).
-        rest: Rest of the pressures, over them, that is left out in part. With 1e-6 forces of rows
-            changed by 6e-10, with 1e-4 by up to 6e-8, and of 51 evaluations 35 were left.
+        cells: Flat indices of the n cells that may be loaded, shape (n,).
+
+    Attributes:
+        learnt: Pressures on these cells that they were worked out for, in order, (n,) each.
     """
 
-    def __init__(self, slopes: FiniteSlopes, cells: Indices, rest: float) -> None:
-        self._cells, self._slopes, self._rest = cells, slopes, rest
+    def __init__(self, slopes: FiniteSlopes, cells: Indices) -> None:
+        self._cells, self._slopes = cells, slopes
         coarse = slopes.grid[0] * slopes.grid[1]
         self._per_coarse = slopes.surface.heights.size / coarse
-        # m directions of pressures, orthonormal, and displacements by them in both orders: on the
-        # coarse cells, and on the few ones
-        self._known = 0
-        self._coarse = np.empty((3, _MOST, coarse))
-        self._few = np.empty((3, _MOST, len(cells)))
+        self._forget()
+
+    def _forget(self) -> None:
+        slopes, count = self._slopes, len(self._cells)
+        self._known, self.learnt = 0, list[Array]()
+        # directions of pressures, orthonormal, and displacements by them in both orders: on the
+        # coarse cells, and on the few ones; pressures and stresses by them
+        self._coarse = np.empty((3, 0, slopes.grid[0] * slopes.grid[1]))
+        self._few = np.empty((3, 0, count))
+        self._fields = np.empty((1, 0, 0))
         # displacements in both orders along directions, and the form of first order from the top
         self._forms = np.zeros((3, _MOST, _MOST))
+        self._orders = np.zeros((2, count, count))
 
-    def on_cells(self, pressure: Array) -> Array:
-        """Return what is added to the displacements of the first k cells, shape (k,) [mm].
+    def relearn(self, learnt: list[Array]) -> None:
+        """Work out the orders for pressures as another memory did, see `learnt`; bit for bit."""
+        self._forget()
+        for pressure in learnt:
+            self._remember(pressure)
+
+    def learn(self, pressure: Array, rest: float) -> bool:
+        """Work out the orders for pressures that are not known.
 
         Args:
-            pressure: Pressures on them; the others have none, shape (k,) [MPa].
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+            rest: Part of the pressures that need not be known, by its norm over theirs.
+
+        Returns:
+            Whether they were not known.
         """
-        return self._combined(self._few[:, :, : len(pressure)], pressure)
+        loaded = self._loaded(pressure)
+        size, parts = float(np.linalg.norm(loaded)), self._along(0, pressure)
+        if size**2 - float(parts @ parts) <= (rest * size) ** 2:
+            return False
+        if self._known == _MOST:
+            self._forget()
+        self._remember(pressure)
+        return True
+
+    def matrices(self, pressure: Array) -> list[tuple[float, Array]]:
+        """Return the matrices that finite slopes add on the few cells, with factors.
+
+        Args:
+            pressure: Pressures on these cells that set the share of the second order, (n,) [MPa].
+
+        Returns:
+            Factors and symmetric matrices of displacements by unit pressures, (n, n) [mm/MPa].
+        """
+        return [(1.0, self._orders[0]), (self._share(pressure)[0], self._orders[1])]
+
+    def share_rate(self, pressure: Array) -> tuple[Array, Array]:
+        """Return columns a, b: along q the displacements change by a (b · q) as the share does.
+
+        Args:
+            pressure: Pressures on the few cells, shape (n,) [MPa].
+        """
+        return self._orders[1] @ pressure, self._share(pressure)[1]
 
     def displacement(self, pressure: Array) -> Array:
         """Return what is added to the displacements of all cells, shape (nx, ny) [mm].
 
         Args:
-            pressure: Pressures on all cells, shape (nx, ny) [MPa].
+            pressure: Pressures on the few cells, shape (n,) [MPa]; the others have none.
         """
-        few = pressure.ravel()[self._cells]
-        if np.count_nonzero(few) < np.count_nonzero(pressure):
-            return self._slopes.displacement(pressure)
-        moved = self._combined(self._coarse, few)
+        count, parts = self._known, self._along(0, pressure)
+        moved = np.zeros(self._coarse.shape[2])
+        for order, share in ((1, 1.0), (2, self._share(pressure)[0])):
+            across = self._along(order, pressure) - self._forms[order - 1, :count, :count] @ parts
+            moved += (share * parts) @ self._coarse[order, :count]
+            moved += (share * across) @ self._coarse[0, :count]
         return self._slopes.refined(moved.reshape(self._slopes.grid))
 
-    def _combined(self, known: Array, pressure: Array) -> Array:
-        """Return displacements where directions and displacements by them are known, (3, m, k)."""
-        loaded = self._loaded(pressure)
-        size, parts = float(np.linalg.norm(loaded)), self._along(0, pressure)
-        rest = size**2 - float(parts @ parts)
-        if rest > (self._rest * size) ** 2:
-            if self._known == _MOST:
-                self._known = 0  # forget all
-            self._remember(loaded)
-            parts = self._along(0, pressure)
-        count = self._known
-        forms = self._forms[:, :count, :count]
-        first, second = (float(parts @ forms[k] @ parts) for k in (2, 1))
-        combined = np.zeros(known.shape[2])
-        for order, share in ((1, 1.0), (2, second_share(first, second))):
-            across = self._along(order, pressure) - forms[order - 1] @ parts
-            combined += (share * parts) @ known[order, :count]
-            combined += (share * across) @ known[0, :count]
-        return combined
+    def _share(self, pressure: Array) -> tuple[float, Array]:
+        """Return the share of the second order and its derivative by the pressures, (n,)."""
+        parts, count = self._along(0, pressure), self._known
+        by_parts = self._forms[1:, :count, :count] @ parts
+        second, first = (float(parts @ one) for one in by_parts)
+        share = second_share(first, second)
+        if abs(second) >= abs(first):
+            return share, np.zeros_like(pressure)
+        ratio = second / first
+        rate = -4.0 * ratio * share**2 / first * (by_parts[0] - ratio * by_parts[1])
+        return share, rate @ self._few[0, :count] / self._per_coarse
 
     def _loaded(self, pressure: Array) -> Array:
         """Return pressures on the coarse cells by those on the few, flat."""
         everywhere = np.zeros(self._slopes.surface.grid)
-        everywhere.ravel()[self._cells[: len(pressure)]] = pressure
+        everywhere.ravel()[self._cells] = pressure
         return self._slopes.coarsened(everywhere).ravel()
 
     def _along(self, what: int, pressure: Array) -> Array:
         """Return products of pressures with directions or displacements by them, shape (m,)."""
-        known = self._few[what, : self._known, : len(pressure)]
-        return np.asarray(known @ pressure / self._per_coarse)
+        return np.asarray(self._few[what, : self._known] @ pressure / self._per_coarse)
 
-    def _remember(self, loaded: Array) -> None:
-        """Work out the orders for the direction that pressures on the coarse cells add."""
+    def _remember(self, pressure: Array) -> None:
+        """Work out the orders for the direction that pressures on the few cells add."""
         slopes, last, end = self._slopes, self._known, self._known + 1
-        directions = self._coarse[0]
+        self.learnt.append(pressure.copy())
+        if last == self._few.shape[1]:
+            self._coarse, self._few = _lengthened(self._coarse), _lengthened(self._few)
+        directions, loaded = self._coarse[0], self._loaded(pressure)
         for _ in range(2):  # orthogonal to rounding
             loaded = loaded - (directions[:last] @ loaded) @ directions[:last]
         directions[last] = loaded / np.linalg.norm(loaded)
         moved, fields, works = slopes.orders(directions[last].reshape(slopes.grid))
         self._coarse[1:, last] = moved.reshape(2, -1)
-        for few, coarse in zip(self._few, self._coarse, strict=True):
-            few[last] = slopes.refined(coarse[last].reshape(slopes.grid)).ravel()[self._cells]
-        if not last:  # fields only weigh the second order: single precision is enough
-            self._fields = np.empty((_MOST, fields.size), np.float32)
-        self._fields[last] = fields.ravel()
+        everywhere = slopes.refined(self._coarse[:, last].reshape(3, *slopes.grid))
+        self._few[:, last] = everywhere.reshape(3, -1)[:, self._cells]
+        if not last:
+            self._fields = np.empty((1, 0, fields.size))
+        if last == self._fields.shape[1]:
+            self._fields = _lengthened(self._fields)
+        self._fields[0, last] = fields.ravel()
         rows = [directions[:end] @ self._coarse[order, last] for order in (1, 2)]
-        rows.append(self._fields[:end] @ works.ravel().astype(np.float32))
+        rows.append(self._fields[0, :end] @ works.ravel())
         for form, row in zip(self._forms, rows, strict=True):
             form[last, :end] = form[:end, last] = row
-        self._known = end
+        self._known, added = end, self._few[0, last]
+        for matrix, few, row in zip(self._orders, self._few[1:], rows, strict=False):
+            row = np.append(row[:-1], 0.5 * row[-1])
+            column = (few[last] - row @ self._few[0, :end]) / self._per_coarse
+            matrix += np.outer(added, column)
+            matrix += np.outer(column, added)
+
+
+def _lengthened(fields: Array) -> Array:
+    """Return fields with room for more of them along the second axis."""
+    kinds, count, size = fields.shape
+    longer = np.empty((kinds, min(max(2 * count, _FIRST), _MOST), size))
+    longer[:, :count] = fields
+    return longer

@@ -93,14 +93,14 @@ class Waves:
         return np.asarray(fft.idctn(cosines * (self._filter * self._scale), norm="ortho"))
 
     def refined(self, field: Array) -> Array:
-        """Return a field on the cells of the rectangle by one on the coarse cells, (cx, cy).
+        """Return fields on the cells of the rectangle by those on the coarse cells, (…, cx, cy).
 
         It is the transpose of `coarsened`, times the number of cells per coarse cell.
         """
         (nx, ny), everywhere = self.grid, self._threads
-        cosines = fft.dctn(field, norm="ortho") * (self._filter / self._scale)
-        columns = fft.idct(cosines, n=nx, axis=0, norm="ortho", workers=everywhere)
-        return np.asarray(fft.idct(columns, n=ny, axis=1, norm="ortho", workers=everywhere))
+        cosines = fft.dctn(field, axes=(-2, -1), norm="ortho") * (self._filter / self._scale)
+        columns = fft.idct(cosines, n=nx, axis=-2, norm="ortho", workers=everywhere)
+        return np.asarray(fft.idct(columns, n=ny, axis=-1, norm="ortho", workers=everywhere))
 
     @property
     def _threads(self) -> int:

@@ -55,18 +55,6 @@ class ContactPressures(NamedTuple):
     by_slopes: Array | None = None
     nearby: tuple[tuple[Array, Array], ...] = ()
 
-    def among(self, cells: tuple[Indices, Indices]) -> ContactPressures:
-        """Return the same on some cells alone.
-
-        Args:
-            cells: Their rows and columns, equal in shape, which fields then have.
-        """
-        return self._replace(
-            pressure=self.pressure[cells],
-            by_slopes=None if self.by_slopes is None else self.by_slopes[cells],
-            nearby=tuple((one[cells], other[cells]) for one, other in self.nearby),
-        )
-
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CellProblem:
@@ -122,6 +110,14 @@ class CellProblem:
         """Return which pressures / E*, within the bounds, are the hardness."""
         return self.bound.reached(pressure)
 
+    def lowered_by(self, displaced: Array) -> CellProblem:
+        """Return the problem without finite slopes, with what they displace the surface by.
+
+        Args:
+            displaced: This displacement into the body, shape (nx, ny) [mm].
+        """
+        return replace(self, interference=self.interference - displaced, lowered=displaced)
+
     def on(self, box: Box) -> CellProblem:
         """Return the problem of a box of these cells, those of a surface, which carries all loads.
 
@@ -138,18 +134,21 @@ class CellProblem:
             corner=(x, y),
         )
 
-    def among(self, cells: Indices) -> CellProblem:
+    def among(self, cells: Indices, matrix: ComplianceMatrix | None = None) -> CellProblem:
         """Return the problem of a few of these cells, those of a surface, which carry all loads.
 
         Args:
-            cells: Their flat indices, ascending, shape (n,).
+            cells: Their flat indices, shape (n,).
+            matrix: Their compliance; that without finite slopes when not given.
         """
+        if matrix is None:
+            matrix = self.compliance.matrix_on(cells, self.interference.shape, self.spacing)
         return replace(
             self,
             interference=self.interference.ravel()[cells][:, None],
             motions=self.motions.among(cells),
             bound=self.bound.among(cells),
-            matrix=self.compliance.matrix_on(cells, self.interference.shape, self.spacing),
+            matrix=matrix,
         )
 
     def coarsened(self, factors: Sequence[int], tolerance: float) -> CellProblem:

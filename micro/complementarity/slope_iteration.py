@@ -10,19 +10,14 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
-from micro.complementarity.solver import (
-    Place,
-    on_place,
-    penetrates_outside,
-    solve_few,
-    solve_on_surface,
-)
+from micro.complementarity.few_contacts import solved_on_few
+from micro.complementarity.solver import penetrates_outside, solve_on_surface
 from support.arrays import Array, Flags
 from support.errors import NotConverged
 
@@ -120,49 +115,18 @@ def solve_contact(
             finite slopes do not agree with the pressures.
     """
     compliance = problem.compliance
+    if same_slopes and start is not None and start.by_slopes is not None:
+        solution = solve_on_surface(problem.lowered_by(start.by_slopes), start)
+        return solution._replace(by_slopes=start.by_slopes)
+    found = solved_on_few(problem, start)
+    if found is not None:
+        lowered = problem if found.by_slopes is None else problem.lowered_by(found.by_slopes)
+        if not penetrates_outside(lowered, found):
+            return found
+        start = found
     if not compliance.slopes:
         return solve_on_surface(problem, start)
-    if same_slopes and start is not None and start.by_slopes is not None:
-        solution = solve_on_surface(_lowered(problem, start.by_slopes), start)
-        return solution._replace(by_slopes=start.by_slopes)
-    found = _solved_on_few(problem, start)
-    if found is not None and not penetrates_outside(*found):
-        return found[2]
-    start = start if found is None else found[2]
-    return _solved(_SlopeIteration(problem, start, solve_on_surface, compliance.slope_displacement))
-
-
-def _lowered(problem: CellProblem, displaced: Array) -> CellProblem:
-    """Return a problem without finite slopes, the surface lowered by what they displace it."""
-    interference = problem.interference - displaced
-    return replace(problem, interference=interference, lowered=displaced)
-
-
-def _solved_on_few(
-    problem: CellProblem, start: ContactPressures | None
-) -> tuple[CellProblem, Place, ContactPressures] | None:
-    """Solve on few cells, where finite slopes remember what they add to the displacements of these.
-
-    Returns:
-        The problem of all cells without finite slopes, the few cells, and the solution; None where
-        none can touch, or others, or finite slopes do not remember.
-    """
-    compliance, shape = problem.compliance, problem.interference.shape
-    if problem.motions.count or compliance.few is None:
-        return None
-    touchable = problem.interference > 0.0
-    cells = compliance.few[: np.count_nonzero(touchable)]
-    if not len(cells) or not touchable.ravel()[cells].all() or len(cells) < touchable.sum():
-        return None
-    row, column = np.unravel_index(cells, shape)
-    place = row[:, None], column[:, None]
-    few, start = on_place(problem, place), None if start is None else start.among(place)
-    found = _solved(_SlopeIteration(few, start, solve_few, compliance.slopes_on_few))
-    pressure = np.zeros(shape)
-    pressure[place] = found.pressure
-    displaced = compliance.slope_displacement(pressure)
-    found = found._replace(pressure=pressure, by_slopes=displaced)
-    return _lowered(problem, displaced), place, found
+    return _solved(_SlopeIteration(problem, start))
 
 
 def _solved(iteration: _SlopeIteration) -> ContactPressures:
@@ -189,30 +153,22 @@ class _SlopeIteration:
     Args:
         problem: The contact problem.
         start: What the first solution starts from.
-        solve: Solves a problem without finite slopes, from a solution nearby.
-        by_slopes: Returns what finite slopes add by pressures / E* on the cells.
 
     Attributes:
         displaced: What finite slopes add at the next solution, shape (nx, ny) [mm].
         change: Last change of it over the largest interference; infinite where it is not known.
     """
 
-    def __init__(
-        self,
-        problem: CellProblem,
-        start: ContactPressures | None,
-        solve: Callable[[CellProblem, ContactPressures | None], ContactPressures],
-        by_slopes: Callable[[Array], Array],
-    ) -> None:
+    def __init__(self, problem: CellProblem, start: ContactPressures | None) -> None:
         self._problem, self._start = problem, start
-        self._solve, self._by_slopes = solve, by_slopes
+        self._by_slopes = problem.compliance.slope_displacement
         self._begin_without()
         self.change, first = np.inf, _FIRST
         if start is not None and not problem.motions.count:
             self._mixing = AndersonMixing(start.nearby)
         if start is not None and start.pressure.any():
             known, first = start.by_slopes, _FIRST**2
-            self.displaced = by_slopes(start.pressure) if known is None else known
+            self.displaced = self._by_slopes(start.pressure) if known is None else known
         self._accuracy = max(problem.tolerance, first)
 
     def _begin_without(self) -> None:
@@ -223,7 +179,7 @@ class _SlopeIteration:
     def next_solution(self) -> ContactPressures:
         """Solve the contact with the displacements by slopes as they are, from the last one."""
         problem = replace(self._problem, tolerance=self._accuracy)
-        self._start = self._solve(_lowered(problem, self.displaced), self._start)
+        self._start = solve_on_surface(problem.lowered_by(self.displaced), self._start)
         return self._start
 
     def judged(self, solution: ContactPressures) -> float | None:

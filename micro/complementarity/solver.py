@@ -110,17 +110,6 @@ def touches_few_cells(problem: CellProblem) -> bool:
     return not touchable.any() or _are_few(np.count_nonzero(touchable), touchable)
 
 
-def solve_few(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
-    """Solve one contact of few cells with a matrix, without finite slopes.
-
-    Args:
-        problem: The contact problem, of a column of cells.
-        start: A solution nearby.
-    """
-    known = None if start is None else start.pressure.copy()  # the search overwrites it
-    return solve(problem, _even_pressure(problem) if known is None or not known.any() else known)
-
-
 def place_of(problem: CellProblem, touchable: Flags) -> Place:
     """Return where to solve: the rows and columns of few cells, or a box around many.
 
@@ -177,14 +166,14 @@ def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> C
     return solution
 
 
-def penetrates_outside(problem: CellProblem, place: Place, solution: ContactPressures) -> bool:
-    """Return whether cells outside a place penetrate the rigid body.
+def penetrates_outside(problem: CellProblem, solution: ContactPressures) -> bool:
+    """Return whether cells without pressure penetrate the rigid body, of those it does not overlap.
 
     Args:
         problem: The contact problem of all cells of a surface, without free motions.
-        place: Where it was solved on.
-        solution: The solution.
+        solution: The solution, which has pressures where the body overlaps the surface alone.
     """
+    place = np.nonzero(problem.undeformed > 0.0)
     return bool(_lifted(problem, place, problem.interference, solution.pressure).any())
 
 

@@ -43,6 +43,9 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
     moving = pressure > 0.0
     if not moving.any():
         return 0.0, 0
+    few = problem.compliance.few_cells(pressure.shape, problem.spacing)
+    if few is not None and not problem.motions.count and few.hold(pressure):
+        return float(few.rate(pressure.ravel()[few.cells]).sum()), 1
     place = place_of(problem, moving | (problem.interference > 0.0))
     part, flat = on_place(problem, place), np.flatnonzero(moving[place])
     shape, used = part.interference.shape, part.grid.products

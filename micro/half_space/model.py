@@ -17,6 +17,7 @@ from geometry.contact_state import ContactState, Start
 from geometry.plausibility import check_slopes
 from geometry.rigid_plane import RigidPlane, motion_units
 from micro.boundary_elements.body_modes import BodyModes
+from micro.boundary_elements.few_cells import FewCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
@@ -34,9 +35,9 @@ from support.checks import of_kind
 from support.cores import blas_threads
 from support.errors import InputError
 
-_REST, _LEAST_REST = 500.0, 1e-6
+_REST, _LEAST_REST = 500.0, 1e-7
 """Rest of pressures that finite slopes leave out in part, over the tolerance, and at least; see
-`RememberedSlopes`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6. A rest of 1e-8
+`FewCells`. With a tolerance of 5e-7 and a rest of 3e-3 forces erred by 5e-6. A rest of 1e-8
 is rounding."""
 _QUICK_CELLS = 2**14
 """Cells of a period on which a solution from one nearby takes milliseconds."""
@@ -138,7 +139,13 @@ class HalfSpaceModel:
         little smaller than those. The patch has a half-space of its own.
         """
         piece = self.surface.piece(*patches.bounds(index))
-        alone: dict[str, Any] = {"periodic": False, "sides": None, "body": None, "slopes": ()}
+        alone: dict[str, Any] = {
+            "periodic": False,
+            "sides": None,
+            "body": None,
+            "slopes": (),
+            "few": None,
+        }
         model = replace(self, surface=piece, highest=self.reference_height, **alone)
         return model, PatchGrid(grid=(1, 1), lengths=piece.lengths)
 
@@ -152,7 +159,7 @@ class HalfSpaceModel:
             grid: Cells in x and y.
         """
         surface = self.surface.on_grid(grid)
-        return replace(self, surface=surface, highest=self.reference_height, slopes=())
+        return replace(self, surface=surface, highest=self.reference_height, slopes=(), few=None)
 
     def solve(
         self,
@@ -265,6 +272,21 @@ class HalfSpaceModel:
         rough = replace(self, tolerance=max(self.tolerance, error))
         return replace(rough, few=np.argsort(-interference, axis=None, kind="stable")[:count])
 
+    @property
+    def learnt(self) -> list[list[Array]]:
+        """What finite slopes of few cells remember; a model that is set to it does the same."""
+        few = self._few_cells
+        return [] if few is None else few.learnt
+
+    def relearn(self, learnt: list[list[Array]]) -> None:
+        """Remember what the finite slopes of an equal model did, see `learnt`."""
+        if (few := self._few_cells) is not None:
+            few.relearn(learnt)
+
+    @property
+    def _few_cells(self) -> FewCells | None:
+        return self.compliance.few_cells(self.surface.grid, self.surface.spacing)
+
     def interference(self, plane: RigidPlane, depth: Array | None = None) -> Array:
         """Return the interference δ(x, y) − (z_M − z) of the plane and the surface without load.
 
@@ -293,7 +315,7 @@ class HalfSpaceModel:
         Args:
             state: A solution of this model.
         """
-        alone = replace(self, sides=None, body=None, slopes=())
+        alone = replace(self, sides=None, body=None, slopes=(), few=None)
         return elastic_stiffness(alone, state, turns=False)[0]
 
     @cached_property
@@ -309,6 +331,16 @@ class HalfSpaceModel:
             few=self.few,
             rest=max(_REST * self.tolerance, _LEAST_REST),
         )
+
+    def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Self:
+        """Return the model with other finite slopes, on the same elastic body.
+
+        Args:
+            slopes: What finite slopes add.
+        """
+        model = replace(self, slopes=slopes)
+        vars(model)["compliance"] = self.compliance.with_slopes(slopes)
+        return model
 
     def pressures_under(
         self,

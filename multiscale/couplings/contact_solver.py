@@ -218,21 +218,26 @@ class ContactSolver(StepSolver):
         return on_root_alone(self._comm, lambda: latest)
 
     def state(self) -> Any:
-        """Return the latest solution; it is whole on rank 0 alone.
+        """Return what later load steps depend on; it is whole on rank 0 alone.
 
-        Where shear alone may change, what the normal contact was found from belongs to it: the
+        It is the latest solution, and what finite slopes remember of all solutions. Where shear alone may change, what the normal contact was found from belongs to it: the
         contact is then the same to the last digit, and cells that have yielded tell from which side
         the plane came.
         """
         if self._friction is None:
-            return self._start
+            learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
+            return [self._start, learnt]
         return [self._start, self._shear, self._before, self._last]
 
     def restore(self, state: Any) -> None:
-        """Start from a solution."""
+        """Go on from a state."""
+        if state is None:
+            return
         if self._friction is None:
-            self._start = state
-        elif state is not None:
+            self._start, learnt = state
+            if learnt and isinstance(self._model, HalfSpaceModel):
+                self._model.relearn(learnt)
+        else:
             self._start, self._shear, self._before, self._last = state
             if self._last is not None and not self._coupled:
                 self.latest = self._press(self._last, self._before)

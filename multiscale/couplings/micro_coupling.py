@@ -39,6 +39,9 @@ from support.errors import InputError
 
 _TRACTIONS = 12.0
 """Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
+_FEW_CELLS = 1000
+"""Cells that can touch, at most, for load steps by one matrix with the finite slopes: three times
+8 MB."""
 _CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
 """Contact problems on the cells of the run, by processor time, that a point of the path is worth
 in measuring the errors of the shear. On 64² and 96² cells with two points: 1.4 on a half-space,
@@ -132,6 +135,12 @@ class MicroCoupling(PressedSurface):
     def contact_solver(self, model: MicroModel) -> ContactSolver:
         """Return what solves the contact problem of a model of the surface."""
         friction = None if self.has_laws else self.friction_model
+        largest = self.load_history.largest_controls
+        # with friction a run that goes on presses again, which a memory of later loads would change
+        if isinstance(model, HalfSpaceModel) and friction is None and len(largest) == 1:
+            quick = model.quick_up_to(largest[0])
+            if quick is not None and quick.few is not None and len(quick.few) <= _FEW_CELLS:
+                model = quick
         return ContactSolver(model, self.patches, self.mean_heights, self.comm, friction)
 
     @cached_property

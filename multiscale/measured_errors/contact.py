@@ -143,6 +143,7 @@ class _Problems:
         self._grid = nx, ny = probe.model.surface.grid
         self._half, self._quarter = ((max(nx // n, 4), max(ny // n, 4)) for n in (2, 4))
         self._states: dict[tuple[tuple[int, int], int], ContactState] = {}
+        self._models: dict[tuple[tuple[int, int], int], HalfSpaceModel] = {}
         # under small loads coarse cells may not touch, and would show no error
         self._others = self._half if self._force(self._half, 0) > 0.0 else self._grid
 
@@ -193,12 +194,12 @@ class _Problems:
         if not self._probe.order:
             return error + abs(known.force - self._force(self._others, 0))
         if model.periodic:  # whether the body under a sample can widen is not known
-            held = replace(flat, slopes=tuple(each.on_held_body() for each in model.slopes))
+            held = flat.with_slopes(tuple(each.on_held_body() for each in model.slopes))
             found = held.press(self._control, start=known.guess)
             return error + abs(known.force - found.force)
         if model.body is None:
             return error
-        alone = replace(flat, slopes=tuple(each.on_half_space() for each in model.slopes))
+        alone = flat.with_slopes(tuple(each.on_half_space() for each in model.slopes))
         found = alone.press(self._control, start=known.guess)
         # free sides cut contacts
         return error + 0.1 * abs(known.force - found.force)
@@ -255,8 +256,11 @@ class _Problems:
         return replace(known, values=values, by_slopes=None)
 
     def _model(self, grid: tuple[int, int], order: int) -> HalfSpaceModel:
-        model = self._probe.model.resampled(grid)
-        return replace(self._probe.on_body(model, order), tolerance=1e-6)  # forces right to 1e-5
+        """Return the model on a grid with finite slopes up to an order."""
+        if (grid, order) not in self._models:
+            model = self._probe.on_body(self._probe.model.resampled(grid), order)
+            self._models[grid, order] = replace(model, tolerance=1e-6)  # forces right to 1e-5
+        return self._models[grid, order]
 
 
 def _on_grid(pressures: Array, grid: tuple[int, int]) -> Array | None:

@@ -38,34 +38,55 @@ def model_with(slopes, **options):
     )
 
 
+def scattered(cells, values):
+    everywhere = np.zeros(SURFACE.grid)
+    everywhere.ravel()[cells] = values
+    return everywhere
+
+
 def test_new_pressures_and_their_combinations_are_exact(slopes):
     cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
     one, other = np.random.default_rng(1).random((2, len(cells)))
-    remembering = RememberedSlopes(slopes, cells, 1e-6)
+    remembering = RememberedSlopes(slopes, cells)
     for few in (one, other, one + 3.0 * other, np.zeros_like(one)):
-        everywhere = np.zeros(SURFACE.grid)
-        everywhere.ravel()[cells] = few
-        exact = slopes.displacement(everywhere)
-        # the share of the second order is known to single precision
-        slack = 1e-6 * np.abs(exact).max()
-        assert remembering.displacement(everywhere) == pytest.approx(exact, abs=slack)
-        assert remembering.on_cells(few) == pytest.approx(exact.ravel()[cells], abs=slack)
+        exact = slopes.displacement(scattered(cells, few))
+        remembering.learn(few, 1e-6)
+        slack = 1e-12 * np.abs(exact).max()  # rounding of sums over 3072 cells
+        assert remembering.displacement(few) == pytest.approx(exact, abs=slack)
+        matrices = remembering.matrices(few)
+        on_cells = sum(factor * (matrix @ few) for factor, matrix in matrices)
+        assert on_cells == pytest.approx(exact.ravel()[cells], abs=slack)
+        for _, matrix in matrices:
+            np.testing.assert_allclose(matrix, matrix.T, rtol=0, atol=1e-13 * np.abs(matrix).max())
 
 
-def test_a_combination_is_not_worked_out_anew(slopes, monkeypatch):
+def test_a_combination_is_not_worked_out_anew(slopes):
     cells = np.arange(100, 140)
     one, other = np.random.default_rng(2).random((2, len(cells)))
-    remembering = RememberedSlopes(slopes, cells, 1e-6)
-    remembering.on_cells(one)
-    remembering.on_cells(other)
-    monkeypatch.setattr(FiniteSlopes, "orders", lambda *_: pytest.fail("worked out anew"))
-    assert np.any(remembering.on_cells(2.0 * one + other))
+    remembering = RememberedSlopes(slopes, cells)
+    assert remembering.learn(one, 1e-6)
+    assert remembering.learn(other, 1e-6)
+    assert not remembering.learn(2.0 * one + other, 1e-6)
+    assert np.any(remembering.displacement(2.0 * one + other))
 
 
-def test_pressures_on_other_cells_are_taken_as_they_are(slopes):
-    remembering = RememberedSlopes(slopes, np.arange(10), 1e-6)
-    pressure = np.random.default_rng(3).random(SURFACE.grid)
-    np.testing.assert_array_equal(remembering.displacement(pressure), slopes.displacement(pressure))
+def test_the_share_of_the_second_order_changes_as_its_rate_says(slopes):
+    cells = np.flatnonzero(SURFACE.heights > np.quantile(SURFACE.heights, 0.97))
+    pressure, change = np.random.default_rng(4).random((2, len(cells)))
+    remembering, step = RememberedSlopes(slopes, cells), 1e-4
+    for few in (pressure, change):
+        remembering.learn(few, 1e-6)
+
+    def moved(few):
+        return slopes.displacement(scattered(cells, few)).ravel()[cells]
+
+    by_share, along = remembering.share_rate(pressure)
+    linear = sum(factor * (matrix @ change) for factor, matrix in remembering.matrices(pressure))
+    rate = linear + by_share * (along @ change)
+    expected = (moved(pressure + step * change) - moved(pressure - step * change)) / (2.0 * step)
+    # the square of the step, and rounding over it
+    assert rate == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
+    assert np.abs(rate - linear).max() > 1e-4 * np.abs(expected).max()
 
 
 @pytest.mark.parametrize("hardness", [None, 200.0], ids=["elastic", "yielding"])
@@ -121,6 +142,18 @@ def test_loads_on_a_path_take_few_evaluations(slopes, monkeypatch):
     before = count
     quick.press(replace(LARGEST, approach=0.77 * LARGEST.approach), start=start)
     assert count - before <= 3
+
+
+def test_the_stiffness_is_that_of_slopes_without_memory(slopes):
+    model = model_with(slopes)
+    quick, start = model.quick_up_to(LARGEST), None
+    for part in (0.6, 1.0):
+        control = replace(LARGEST, approach=part * LARGEST.approach)
+        state = quick.press(control, start=start)
+        start = state.guess
+        exact = model.stiffness(model.press(control), turns=False).value
+        # both iterations end where the square of what is left is below 1e-7
+        assert quick.stiffness(state, turns=False).value == pytest.approx(exact, rel=2e-7)
 
 
 def test_few_cells_are_searched_apart(slopes, monkeypatch):

@@ -1,0 +1,78 @@
+"""Contact of the few cells that a rigid body can touch, by one matrix with the finite slopes.
+
+The matrix holds what finite slopes do with the pressures that they have been worked out for, all
+loads before included. Each solution adds its own pressures where they are new. What is left out
+falls to a hundredth with every solution.
+
+Theory: docs/theory.md, section 7.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from micro.complementarity.active_set import solve
+from micro.complementarity.cell_problem import CellProblem, ContactPressures
+from support.errors import NotConverged
+
+_MOST_SOLUTIONS = 30
+_FIRST = 1e-4
+"""Residual of the first solution."""
+_PART = 1e-2
+"""Residual of a solution over the last change of the displacements by finite slopes."""
+_CONVERGED = 3e-9
+"""Change of these displacements at which the iteration ends, over the largest interference."""
+
+
+def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> ContactPressures | None:
+    """Solve the contact of few cells, finite slopes included.
+
+    Args:
+        problem: The contact problem of all cells of a surface.
+        start: A solution nearby.
+
+    Returns:
+        The solution; None where it is not known which few cells can touch, where others can,
+        motions are free, or the iteration does not converge.
+    """
+    few = problem.compliance.few_cells(problem.interference.shape, problem.spacing)
+    touchable = problem.interference.ravel() > 0.0
+    if few is None or problem.motions.count or not touchable.any():
+        return None
+    inside = np.flatnonzero(touchable[few.cells])
+    if len(inside) < np.count_nonzero(touchable):
+        return None
+    some = slice(0, len(inside)) if inside[-1] == len(inside) - 1 else inside
+    tolerance, largest = problem.tolerance, float(problem.interference.max())
+    pressure, used = np.zeros(len(few.cells)), 0
+    if start is not None:
+        pressure[some] = start.pressure.ravel()[few.cells[some]]
+        few.learn(pressure)
+    accuracy = max(tolerance, _FIRST)
+    for _ in range(_MOST_SOLUTIONS):
+        compliance = few.compliance(pressure)
+        part = problem.among(few.cells[some], compliance.among(some))
+        try:
+            found = solve(replace(part, tolerance=accuracy), pressure[some][:, None])
+        except NotConverged:  # slopes too steep for the theory; the search for all cells tells
+            return None
+        used += found.iterations
+        pressure = np.zeros(len(few.cells))
+        pressure[some] = found.pressure.ravel()
+        known = compliance.displacement(pressure)
+        few.learn(pressure)
+        change = few.compliance(pressure).displacement(pressure) - known
+        changed = float(np.abs(change[pressure > 0.0]).max(initial=0.0)) / largest
+        if accuracy <= tolerance and changed <= max(_CONVERGED, 10.0 * tolerance):
+            everywhere = np.zeros(problem.interference.shape)
+            everywhere.ravel()[few.cells] = pressure
+            return found._replace(
+                pressure=everywhere,
+                iterations=used,
+                by_slopes=few.slope_displacement(pressure),
+                residual=max(found.residual, changed),
+            )
+        accuracy = max(tolerance, min(_FIRST, _PART * changed))
+    return None
