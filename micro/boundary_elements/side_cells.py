@@ -88,6 +88,8 @@ class _SidePair:
         """Return the sides across y of a square from those across x: waves do the same there."""
         rows = len(self.place)
         means = _means(sides, 1, rows, _nodes(sides.lengths[1], rows, stress=stress))
+        if np.array_equal(_full(means), _full(self.means)):
+            return self
         return _SidePair(means, _transposed(means), self.kernels, self.place)
 
     def among(self, rows: Indices, cells: Indices) -> _SidePair:
@@ -96,37 +98,49 @@ class _SidePair:
         return _SidePair(means, _transposed(means), self.kernels, place - place[0])
 
     def loaded(self, fields: Array) -> Waves:
-        """Return the waves of loads at the nodes by f fields on cells, shape (waves, f a, 2)."""
-        count, rows, cells = fields.shape
-        return self.waves_of(self.loads @ fields.transpose(1, 0, 2).reshape(rows, count * cells))
+        """Return the waves of loads at the nodes by fields, (b, f, rows, cells); see `waves_of`."""
+        count, parts, rows, cells = fields.shape
+        lines = self.loads @ fields.transpose(2, 0, 1, 3).reshape(rows, count * parts * cells)
+        return self.waves_of(lines, parts)
 
-    def waves_of(self, lines: Array) -> Waves:
-        """Return the waves of lines of loads at the nodes by f fields, shape (2 a, f cells)."""
+    def waves_of(self, lines: Array, parts: int = 1) -> Waves:
+        """Return waves of lines of loads at the nodes, shape (2 a, b f cells).
+
+        Args:
+            lines: The lines of b times f fields.
+            parts: Number f of fields that kernels take together.
+
+        Returns:
+            Shape (waves, f a, 2 b).
+        """
         cells = len(self.place)
-        count = lines.shape[1] // cells
-        placed = np.zeros((len(lines) * count, self.place[-1] + 1))
+        count = lines.shape[1] // (parts * cells)
+        placed = np.zeros((len(lines) * count * parts, self.place[-1] + 1))
         placed[:, self.place] = lines.reshape(-1, cells)
         waves = fft.rfft(placed, 2 * len(self.kernels) - 2, axis=1)
-        parts = waves.reshape(2, -1, count, len(self.kernels)).transpose(3, 2, 1, 0)
-        return np.ascontiguousarray(parts.reshape(len(self.kernels), -1, 2))
+        by_side = waves.reshape(2, -1, count, parts, len(self.kernels)).transpose(4, 3, 1, 2, 0)
+        return np.ascontiguousarray(by_side).reshape(len(self.kernels), -1, 2 * count)
 
-    def on_cells(self, waves: Waves, count: int) -> Array:
-        """Return f fields of means over the cells by values' waves, shape (f, rows, cells)."""
-        means = self.means @ self.lines_of(waves, count)
-        return np.ascontiguousarray(means.reshape(len(means), count, -1).transpose(1, 0, 2))
+    def on_cells(self, waves: Waves, parts: int = 1) -> Array:
+        """Return means over the cells by values' waves, (waves, f a, 2 b): (b, f, rows, cells)."""
+        means, count = self.means @ self.lines_of(waves, parts), waves.shape[2] // 2
+        by_field = means.reshape(len(means), count, parts, -1).transpose(1, 2, 0, 3)
+        return np.ascontiguousarray(by_field)
 
-    def lines_of(self, waves: Waves, count: int) -> Array:
-        """Return lines of values at the nodes by f fields' waves, shape (2 a, f cells)."""
-        parts = waves.reshape(len(self.kernels), count, -1, 2).transpose(3, 2, 1, 0)
-        by_side = parts.reshape(-1, len(self.kernels))
+    def lines_of(self, waves: Waves, parts: int = 1) -> Array:
+        """Return lines of values at the nodes by waves, (waves, f a, 2 b): (2 a, b f cells)."""
+        count = waves.shape[2] // 2
+        by_part = waves.reshape(len(self.kernels), parts, -1, count, 2).transpose(4, 2, 3, 1, 0)
+        by_side = by_part.reshape(-1, len(self.kernels))
         lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
         return lines.reshape(self.means.shape[1], -1)
 
     def between(self, row: Indices, cell: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
         apart = np.abs(cell[:, None] - cell)
-        if len(self.means) ** 2 * len(self.kernels) <= _LINES:
-            return np.asarray(_all_lines(self)[apart, row[:, None], row])
+        if self.means.shape[0] ** 2 * len(self.kernels) <= _LINES:
+            lines = _all_lines(self)
+            return lines.take(apart + lines.shape[2] * (row[:, None] * len(lines) + row))
         used, row = np.unique(row, return_inverse=True)
         matrix = np.empty(apart.shape)
         step = max(1, _LINES // (len(used) * len(self.kernels)))
@@ -146,31 +160,30 @@ class _SidePair:
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
-        return self.lines_of(_multiplied(self.kernels, self.waves_of(lines)), 1)
+        return self.lines_of(_multiplied(self.kernels, self.waves_of(lines)))
 
-    def stresses(self, pressure: Array) -> Array:
-        """Return stresses normal to the sides, along them and in shear, (3, rows, cells)."""
-        waves = _multiplied(self.kernels, self.loaded(pressure[None]))
-        waves[:, -(waves.shape[1] // 3) :] *= _SHEAR
+    def stresses(self, pressures: Array) -> Array:
+        """Return stresses by b fields of pressures, shape (b, rows, cells).
+
+        Returns:
+            Those normal to the sides, along them and in shear, shape (b, 3, rows, cells).
+        """
+        waves = _multiplied(self.kernels, self.loaded(pressures[:, None]))
+        _sheared(waves, _SHEAR)
         return self.on_cells(waves, 3)
 
     def adjoint(self, fields: Array) -> Array:
         """Apply the transpose of `stresses` to b × 3 fields of cells, shape (b, rows, cells)."""
-        count, kernels = len(fields), self.kernels.transpose(0, 2, 1)
-        waves = self.loaded(fields.reshape(-1, *fields.shape[2:]))
-        three = waves.reshape(len(kernels), count, -1, 2)
-        three[:, :, -(three.shape[2] // 3) :] *= _SHEAR.conj()
-        made = np.empty((count, *kernels.shape[:2], 2), complex)
-        for each, one in zip(made, three.transpose(1, 0, 2, 3), strict=True):
-            each[:] = _multiplied(kernels, np.ascontiguousarray(one))
-        return self.on_cells(made.transpose(1, 0, 2, 3).reshape(len(kernels), -1, 2), count)
+        waves = self.loaded(fields)
+        _sheared(waves, _SHEAR.conj())
+        return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves))[:, 0]
 
 
 @lru_cache(maxsize=16)
 def _all_lines(pair: _SidePair) -> Array:
-    """Return the lines between all rows, cached for other cells of them and other surfaces."""
-    rows = np.arange(len(pair.means))
-    return pair.lines_between(rows, rows)
+    """Return the lines between all rows, (rows, rows, cells); cached for other surfaces, too."""
+    rows = np.arange(pair.means.shape[0])
+    return np.ascontiguousarray(pair.lines_between(rows, rows).transpose(1, 2, 0))
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
@@ -200,18 +213,14 @@ def _transposed(means: Means) -> Means:
 
 
 def _multiplied(kernels: Array, waves: Waves) -> Waves:
-    """Multiply waves by real matrices, shapes (waves, b, a) and (waves, a, 2), contiguous."""
+    """Multiply waves by real matrices, shapes (waves, m, n) and (waves, n, 2 b), contiguous."""
     return np.matmul(kernels, waves.view(np.float64)).view(np.complex128)
 
 
-def _of_both(
-    across_x: Callable[[], Array], across_y: Callable[[], Array], cells: int
-) -> tuple[Array, Array]:
-    """Return what the sides across x and those across y do, of many cells at the same time."""
-    if cells < _MANY:  # which gain nothing by a thread of their own
-        return across_x(), across_y()
-    one, other = in_threads(lambda work: work(), [across_x, across_y])
-    return one, other
+def _sheared(waves: Waves, factors: NDArray[np.complex128]) -> None:
+    """Multiply the last of three parts of waves, shape (waves, 3 a, 2 b), by a factor a side."""
+    last = waves[:, -(waves.shape[1] // 3) :]
+    last *= np.tile(factors, waves.shape[2] // 2)
 
 
 def _pairs(
@@ -236,6 +245,11 @@ class SideCells:
 
     across_x: _SidePair
     across_y: _SidePair
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        """Numbers of rows and columns."""
+        return self.across_x.means.shape[0], self.across_y.means.shape[0]
 
     def displacement(self, pressure: Array) -> Array:
         """Return the displacements of these cells by pressures on them, shape (r, c) [mm]."""
@@ -302,7 +316,7 @@ class SideTerm:
         if cells.coarse and not (many(cells.counts) and self._filled(cells.spacing, last)):
             return None
         every = side_cells(self.sides, cells.spacing)
-        whole = len(rows) == len(every.across_x.means) and len(columns) == len(every.across_y.means)
+        whole = cells.counts == every.counts
         return every if whole else every.among(rows, columns)
 
     def _filled(self, spacing: tuple[float, float], last: tuple[int, int]) -> bool:
@@ -329,14 +343,8 @@ class SideStresses:
         Args:
             pressure: On all cells of the grid, shape (nx, ny) [MPa].
         """
-        across_x, across_y = self._pairs
-        total, other = _of_both(
-            lambda: across_x.stresses(pressure),
-            lambda: across_y.stresses(pressure.T),
-            pressure.size,
-        )
-        total += other[_SWAPPED].transpose(0, 2, 1)
-        return total
+        x, y = self._of_both(_SidePair.stresses, pressure[None], pressure.T[None])
+        return np.asarray(x[0] + y[0, _SWAPPED].transpose(0, 2, 1))
 
     def adjoint(self, fields: Array) -> Array:
         """Apply the transpose of `stresses`.
@@ -347,12 +355,23 @@ class SideStresses:
         Returns:
             Weights of the pressures, shape (b, nx, ny).
         """
-        across_x, across_y = self._pairs
         turned = fields[:, _SWAPPED].transpose(0, 1, 3, 2)
-        one, other = _of_both(
-            lambda: across_x.adjoint(fields), lambda: across_y.adjoint(turned), fields[0, 0].size
-        )
-        return one + other.transpose(0, 2, 1)
+        x, y = self._of_both(_SidePair.adjoint, fields, turned)
+        return np.asarray(x + y.transpose(0, 2, 1))
+
+    def _of_both(
+        self, act: Callable[[_SidePair, Array], Array], of_x: Array, of_y: Array
+    ) -> tuple[Array, Array]:
+        """Return what the sides across x and those across y do with fields of cells."""
+        across_x, across_y = self._pairs
+        if of_x.shape[-2] * of_x.shape[-1] >= _MANY:  # which gain by threads
+            works = [lambda: act(across_x, of_x), lambda: act(across_y, of_y)]
+            one, other = in_threads(lambda work: work(), works)
+        elif across_x is across_y:  # together
+            one, other = np.split(act(across_x, np.concatenate([of_x, of_y])), 2)
+        else:
+            one, other = act(across_x, of_x), act(across_y, of_y)
+        return one, other
 
 
 @lru_cache(maxsize=8)
