@@ -220,9 +220,9 @@ class ContactSolver(StepSolver):
     def state(self) -> Any:
         """Return what later load steps depend on; it is whole on rank 0 alone.
 
-        It is the latest solution, and what finite slopes remember of all solutions. Where shear alone may change, what the normal contact was found from belongs to it: the
-        contact is then the same to the last digit, and cells that have yielded tell from which side
-        the plane came.
+        It is the latest solution, and what finite slopes remember of all. Where shear alone may
+        change, what the normal contact was found from belongs to it: the contact is then the same
+        to the last digit, and cells that have yielded tell from which side the plane came.
         """
         if self._friction is None:
             learnt = self._model.learnt if isinstance(self._model, HalfSpaceModel) else []
