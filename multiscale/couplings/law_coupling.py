@@ -50,7 +50,7 @@ class LawCoupling(Coupling):
     def table_tolerance(self) -> float:
         """Interpolation error that laws are tabulated to."""
         # finer tables on cells would trace the steps of single ones
-        default = 3e-3 if self.summits is None else 1e-4
+        default = 2e-3 if self.summits is None else 1e-4
         return self.scene.coupling.table_tolerance or default
 
     @abstractmethod

@@ -54,7 +54,7 @@ def consistent_laws(
     largest: Control,
     displacements: Displacements | None = None,
     pointwise: bool = False,
-    tolerance: float = 3e-3,
+    tolerance: float = 2e-3,
     most_rows: int = MOST_ROWS,
     comm: Any = None,
     observe: Observer | None = None,

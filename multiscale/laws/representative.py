@@ -161,7 +161,7 @@ def representative_laws(
             "coupling": "representative",
             "model": "half-space-periodic",
             "love": "none",
-            "tolerance": f"{options.get('tolerance', 1e-3):g}",
+            "tolerance": f"{options.get('tolerance', 3e-3):g}",
             "samples": ", ".join(str(len(regions[name])) for name in names.names),
         },
         force_error=max(law.interpolation_error for law in laws),

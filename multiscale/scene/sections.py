@@ -105,7 +105,7 @@ class CouplingSection:
             mean one, or that at its centre.
         interface: Whether the closure of a law is a mean over each patch, or taken at each point.
         table_tolerance: Interpolation error of the laws, relative to the force; 1e-4 when not
-            given, and 3e-3 with micro models that resolve the cells of the surface.
+            given, and 2e-3 with micro models that resolve the cells of the surface.
     """
 
     kind: Literal["isolated", "consistent", "concurrent", "analytic", "reference", "auto"] = (
