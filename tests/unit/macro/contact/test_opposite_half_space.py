@@ -272,6 +272,17 @@ def test_with_friction_too_a_body_is_solved_for_a_few_times(ratio):
     assert state.iterations <= 12
 
 
+def test_sliding_on_a_half_space_far_softer_than_springs_is_that_of_a_punch_without_springs():
+    """Stiff springs close by less and less of the approach: forces grow as the half-space's."""
+    scaled = []
+    for softer in (1e3, 1e4):  # than springs under the whole face
+        control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
+        state, _ = rubbed(face_of(2), control, opposite=softer / STIFF, friction=0.3)
+        scaled.append(softer * np.array([state.force, state.shear.force[0]]))
+        assert 0.0 < state.shear.force[0] < 0.3 * state.force
+    np.testing.assert_allclose(*scaled, rtol=0.02)  # the springs' share
+
+
 def test_a_shear_force_finds_the_shift_that_makes_it_and_sliding_is_the_coefficient():
     face = face_of(4)
     control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 2e-4)))
