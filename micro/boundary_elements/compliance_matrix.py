@@ -52,9 +52,13 @@ class ComplianceMatrix:
         """
         self.products += 1
         moved = np.matmul(self._matrix, pressure, out=out)
-        for factor, matrix in self._added:
-            moved += factor * (matrix @ pressure)
+        if self._added:
+            moved += self.displacement_by_added(pressure)
         return moved
+
+    def displacement_by_added(self, pressure: Array) -> Array | float:
+        """Return the part of the displacement that the added matrices have, shape (n, 1) [mm]."""
+        return sum(factor * (matrix @ pressure) for factor, matrix in self._added)
 
     def of(self, rows: Indices | slice) -> Array:
         """Return the matrix of some of the cells, by their indices: shape (m, m)."""

@@ -61,10 +61,11 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
         used += found.iterations
         pressure = np.zeros(len(few.cells))
         pressure[some] = found.pressure.ravel()
-        known = compliance.displacement(pressure)
+        known = compliance.displacement_by_added(pressure)
         few.learn(pressure)
-        change = few.compliance(pressure).displacement(pressure) - known
-        changed = float(np.abs(change[pressure > 0.0]).max(initial=0.0)) / largest
+        change = few.compliance(pressure).displacement_by_added(pressure) - known
+        changes = np.abs(np.broadcast_to(change, pressure.shape)[pressure > 0.0])
+        changed = float(changes.max(initial=0.0)) / largest
         if accuracy <= tolerance and changed <= max(_CONVERGED, 10.0 * tolerance):
             everywhere = np.zeros(problem.interference.shape)
             everywhere.ravel()[few.cells] = pressure
