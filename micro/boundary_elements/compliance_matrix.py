@@ -9,8 +9,6 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import scipy
 
@@ -23,13 +21,14 @@ class ComplianceMatrix:
 
     Args:
         matrix: Displacements of the cells by unit pressures / E* on them, shape (n, n) [mm].
-        added: Matrices that are added to it, with factors.
+        added: Columns a and b of a symmetric matrix a bᵀ + b aᵀ that is added to it, shape (n, m)
+            both; None: none.
 
     Attributes:
         products: Products with pressures so far.
     """
 
-    def __init__(self, matrix: Array, added: Sequence[tuple[float, Array]] = ()) -> None:
+    def __init__(self, matrix: Array, added: tuple[Array, Array] | None = None) -> None:
         self._matrix, self._added = matrix, added
         self._last: tuple[Cells, Array, tuple[Array, bool]] | None = None
         self.products = 0
@@ -39,9 +38,9 @@ class ComplianceMatrix:
         """Size of the matrix [B]."""
         return self._matrix.nbytes
 
-    def with_added(self, added: Sequence[tuple[float, Array]]) -> ComplianceMatrix:
-        """Return the compliance with matrices that are added, with factors."""
-        return ComplianceMatrix(self._matrix, [*self._added, *added])
+    def with_added(self, first: Array, second: Array) -> ComplianceMatrix:
+        """Return the compliance with columns a and b whose matrix a bᵀ + b aᵀ is added, (n, m)."""
+        return ComplianceMatrix(self._matrix, (first, second))
 
     def displacement(self, pressure: Array, out: Array | None = None) -> Array:
         """Return the displacement by pressures / E* on all cells, shape (n, 1) [mm].
@@ -52,23 +51,29 @@ class ComplianceMatrix:
         """
         self.products += 1
         moved = np.matmul(self._matrix, pressure, out=out)
-        if self._added:
+        if self._added is not None:
             moved += self.displacement_by_added(pressure)
         return moved
 
     def displacement_by_added(self, pressure: Array) -> Array | float:
-        """Return the part of the displacement that the added matrices have, shape (n, 1) [mm]."""
-        return sum(factor * (matrix @ pressure) for factor, matrix in self._added)
+        """Return the part of the displacement that the added matrix has, shape (n, 1) [mm]."""
+        if self._added is None:
+            return 0.0
+        first, second = self._added
+        return np.asarray(first @ (second.T @ pressure) + second @ (first.T @ pressure))
 
     def of(self, rows: Indices | slice) -> Array:
         """Return the matrix of some of the cells, by their indices: shape (m, m)."""
         one = self.among(rows)
-        return sum((factor * matrix for factor, matrix in one._added), one._matrix)
+        if one._added is None:
+            return one._matrix
+        half = one._added[0] @ one._added[1].T
+        return np.asarray(one._matrix + half + half.T)
 
     def among(self, rows: Indices | slice) -> ComplianceMatrix:
         """Return the compliance of some of the cells, by their indices."""
         square = (rows, rows) if isinstance(rows, slice) else np.ix_(rows, rows)
-        added = [(factor, matrix[square]) for factor, matrix in self._added]
+        added = None if self._added is None else (self._added[0][rows], self._added[1][rows])
         return ComplianceMatrix(self._matrix[square], added)
 
     def apply_compliance(self, cells: Cells, pressure: Array) -> Array:

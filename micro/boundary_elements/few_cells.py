@@ -65,7 +65,12 @@ class FewCells:
 
     def compliance(self, pressure: Array) -> ComplianceMatrix:
         """Return the compliance of the cells, finite slopes as under given pressures."""
-        return self.elastic.with_added(self._added(pressure))
+        if not self.slopes:
+            return self.elastic
+        loaded = pressure * self.modulus
+        columns = zip(*(each.columns(loaded) for each in self.slopes), strict=True)
+        displacements, directions = (np.concatenate(each, axis=1) for each in columns)
+        return self.elastic.with_added(self.modulus * displacements, directions)
 
     def slope_displacement(self, pressure: Array) -> Array | None:
         """Return what finite slopes add to the displacements of all cells, if any, (nx, ny)."""
@@ -89,9 +94,3 @@ class FewCells:
             rate[moving] = np.linalg.solve(matrix, np.ones(len(moving)))
             if not any([each.learn(rate, _REST_OF_RATE) for each in self.slopes]):
                 return rate
-
-    def _added(self, pressure: Array) -> list[tuple[float, Array]]:
-        """Return the matrices by finite slopes, for pressures / E*, with factors."""
-        loaded = pressure * self.modulus
-        return [(factor * self.modulus, matrix)
-                for each in self.slopes for factor, matrix in each.matrices(loaded)]  # fmt: skip

@@ -9,8 +9,8 @@ of what it does with the rest:
 
 What is left out, (1 − Π) L (1 − Π) p, changes a force by the product of two rests: that of the
 pressures and that of their derivative by the approach. Where the rest of the pressures is larger
-than a bound, L is worked out for it, too. On few cells the right-hand side is a symmetric matrix,
-which grows by a product of two columns and its transpose with every direction that is worked out.
+than a bound, L is worked out for it, too. On few cells the right-hand side is a symmetric matrix:
+the sum, over all directions that were worked out, of a product of two columns and its transpose.
 
 Theory: docs/theory.md, section 7.
 """
@@ -18,7 +18,6 @@ Theory: docs/theory.md, section 7.
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from micro.boundary_elements.finite_slopes import FiniteSlopes, second_share
 from support.arrays import Array, Indices
@@ -53,9 +52,10 @@ class RememberedSlopes:
         self._coarse = np.empty((3, 0, slopes.grid[0] * slopes.grid[1]))
         self._few = np.empty((3, 0, count))
         self._fields = np.empty((1, 0, 0))
+        # columns whose products with the directions, and transposes of these, are both orders
+        self._columns = np.empty((2, 0, count))
         # displacements in both orders along directions, and the form of first order from the top
         self._forms = np.zeros((3, _MOST, _MOST))
-        self._orders = np.zeros((2, count, count))
 
     def relearn(self, learnt: list[Array]) -> None:
         """Work out the orders for pressures as another memory did, see `learnt`; bit for bit."""
@@ -82,16 +82,18 @@ class RememberedSlopes:
         self._remember(pressure)
         return True
 
-    def matrices(self, pressure: Array) -> list[tuple[float, Array]]:
-        """Return the matrices that finite slopes add on the few cells, with factors.
+    def columns(self, pressure: Array) -> tuple[Array, Array]:
+        """Return columns a and b of the matrix a bᵀ + b aᵀ that finite slopes add on the few cells.
 
         Args:
             pressure: Pressures on these cells that set the share of the second order, (n,) [MPa].
 
         Returns:
-            Factors and symmetric matrices of displacements by unit pressures, (n, n) [mm/MPa].
+            Both of shape (n, m); the matrix is that of displacements by unit pressures [mm/MPa].
         """
-        return [(1.0, self._orders[0]), (self._share(pressure)[0], self._orders[1])]
+        first, second = self._columns[:, : self._known]
+        share = self._share(pressure)[0]
+        return (first + share * second).T, self._few[0, : self._known].T
 
     def share_rate(self, pressure: Array) -> tuple[Array, Array]:
         """Return columns a, b: along q the displacements change by a (b · q) as the share does.
@@ -99,7 +101,9 @@ class RememberedSlopes:
         Args:
             pressure: Pressures on the few cells, shape (n,) [MPa].
         """
-        return self._orders[1] @ pressure, self._share(pressure)[1]
+        second, directions = self._columns[1, : self._known], self._few[0, : self._known]
+        moved = (directions @ pressure) @ second + (second @ pressure) @ directions
+        return moved, self._share(pressure)[1]
 
     def displacement(self, pressure: Array) -> Array:
         """Return what is added to the displacements of all cells, shape (nx, ny) [mm].
@@ -143,6 +147,7 @@ class RememberedSlopes:
         self.learnt.append(pressure.copy())
         if last == self._few.shape[1]:
             self._coarse, self._few = _lengthened(self._coarse), _lengthened(self._few)
+            self._columns = _lengthened(self._columns)
         directions, loaded = self._coarse[0], self._loaded(pressure)
         for _ in range(2):  # orthogonal to rounding
             loaded = loaded - (directions[:last] @ loaded) @ directions[:last]
@@ -160,15 +165,11 @@ class RememberedSlopes:
         rows.append(self._fields[0, :end] @ works.ravel())
         for form, row in zip(self._forms, rows, strict=True):
             form[last, :end] = form[:end, last] = row
-        self._known, added = end, self._few[0, last]
-        for matrix, few, row in zip(self._orders, self._few[1:], rows, strict=False):
-            row = np.append(row[:-1], 0.5 * row[-1])
-            column = (few[last] - row @ self._few[0, :end]) / self._per_coarse
-            one, other = np.stack([added, column]), np.stack([column, added])
-            # in place: on 2000 cells a copy takes as long as the orders
-            scipy.linalg.blas.dgemm(
-                1.0, one.T, other.T, 1.0, matrix.T, trans_b=True, overwrite_c=True
-            )
+        self._known = end
+        for order, row in enumerate(rows[:2]):
+            half = np.append(row[:-1], 0.5 * row[-1])
+            column = self._few[1 + order, last] - half @ self._few[0, :end]
+            self._columns[order, last] = column / self._per_coarse
 
 
 def _lengthened(fields: Array) -> Array:
