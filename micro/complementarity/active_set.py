@@ -248,6 +248,8 @@ class ActiveSet:
         stay at a bound without a gap determine the tilt of a body that lies on two contacts in line
         with its middle.
         """
+        # what rounding has left on cells would be the first to leave, and come back as rounding
+        self.pressure[self.pressure <= _NOISE * self.pressure.max()] = 0.0
         cells, old, bounds = self._carrying(), self.pressure, self.problem.bound
         new, stop = old.copy(), self._stop(same=True)
         pressure, gap = old.ravel()[cells], self.gap.ravel()[cells]
