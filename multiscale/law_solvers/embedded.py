@@ -153,12 +153,12 @@ class EmbeddedLaws(LawSolver):
     def _pressed(self, control: Control) -> LoadStep:
         try:
             state = self._problem.solve(control)
+            step = self._step(control, state)
         except NotConverged as error:
             if not any(law.is_flat for law in self.table.laws):
                 raise
             problem = "a flat patch, whose pressure is a function of closure nowhere"
             raise self.beyond_law(control, problem) from error
-        step = self._step(control, state)
         self._last, self._body_state = state, control.body_state
         return step
 
