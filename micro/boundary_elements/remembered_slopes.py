@@ -103,7 +103,7 @@ class RememberedSlopes:
         """
         second, directions = self._columns[1, : self._known], self._few[0, : self._known]
         moved = (directions @ pressure) @ second + (second @ pressure) @ directions
-        return moved, self._share(pressure)[1]
+        return np.asarray(moved), self._share(pressure)[1]
 
     def displacement(self, pressure: Array) -> Array:
         """Return what is added to the displacements of all cells, shape (nx, ny) [mm].
