@@ -27,6 +27,7 @@ from petsc4py import PETSc
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from helpers.machine_parts import STEEL, Part, part_body, read_part
+from json_rows import keep
 
 from geometry import PatchGrid
 from geometry.rigid_plane import Control
@@ -115,7 +116,7 @@ def iterations(body, solver):
     return solver.its if solver.reason > 0 else -1
 
 
-def solve(name, body, *, aggregation):
+def solve(name, body, *, aggregation, json):
     """Print one line of the table."""
     assembly = timed(lambda: body.stiffness)
     setup = timed(lambda: body.solver)
@@ -132,13 +133,16 @@ def solve(name, body, *, aggregation):
     if COMM.rank == 0:
         used = (assembly[3], setup[3], whole)
         sizes = " ".join(f"{part.sum() / body.dofs:6.0f}" for part in used)
+        bytes_each = whole.sum() / body.dofs
+        seconds = {"set_up": setup[1], "solution": run[1]}
+        keep(json, part=name, unknowns=body.dofs, iterations=run[0], bytes=bytes_each, **seconds)
         print(
             f"{name:22s} {body.dofs:8d} {run[0]:6d} {setup[1]:7.2f} {run[1]:7.2f}   {sizes}{other}",
             flush=True,
         )
 
 
-def press(name, tagged, body, steps):
+def press(name, tagged, body, steps, json):
     """Press the part step by step, and print the time and memory of every phase."""
     tag = tagged.facet_names["contact"]
     face, facets = planar_face(tagged, tag), tagged.facet_tags.find(tag)
@@ -172,6 +176,9 @@ def press(name, tagged, body, steps):
         linear = [state.linear_iterations for state in states]
         print(f"  whole {whole / 1e9} GB, {whole.sum() / body.dofs:.0f} B per unknown")
         print(f"  Newton {newton}, linear {linear}, force {states[-1].force:.3f} N")
+        seconds = {phase: wall for phase, (_, _, wall, _) in lines}
+        counts = {"newton": newton, "linear": linear, "bytes": whole.sum() / body.dofs}
+        keep(json, part=name, unknowns=body.dofs, seconds=seconds, **counts)
 
 
 def main():
@@ -181,6 +188,7 @@ def main():
     parser.add_argument("--steps", type=int, default=0)
     parser.add_argument("--aggregation", action="store_true", help="beside PETSc's GAMG")
     parser.add_argument("--file", help="keep the mesh here, or take it: memory without gmsh's")
+    parser.add_argument("--json", metavar="FILE", help="append the rows to it")
     choice = parser.parse_args()
     if COMM.rank == 0 and not choice.steps:
         print(
@@ -198,9 +206,9 @@ def main():
             print(f"# {name}: read in {cpu:.1f} s CPU, {wall:.1f} s, {used / 1e9} GB", flush=True)
         body = part_body(tagged, *rest)
         if choice.steps:
-            press(name, tagged, body, choice.steps)
+            press(name, tagged, body, choice.steps, choice.json)
         else:
-            solve(name, body, aggregation=choice.aggregation)
+            solve(name, body, aggregation=choice.aggregation, json=choice.json)
         compat.collect_garbage(PETSc.COMM_WORLD)
 
 

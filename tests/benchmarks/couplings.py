@@ -1,6 +1,7 @@
 """What consistent laws, the condensed block and the concurrent coupling cost on the paper's cube.
 
-Run by hand: `.venv/bin/python tests/benchmarks/couplings.py`. Medians of five, one thread.
+Run by hand: `.venv/bin/python tests/benchmarks/couplings.py [--json FILE]`. Medians of five, one
+thread.
 """
 
 import os
@@ -8,10 +9,12 @@ import os
 os.environ["OMP_NUM_THREADS"] = "1"
 os.environ["PATCHLAW_CACHE"] = "off"
 
+import argparse
 import statistics
 import time
 from dataclasses import replace
 
+from json_rows import keep
 from mpi4py import MPI
 
 from geometry import BlockShape, Control, PatchGrid, Spectrum, patch_means, synthesise
@@ -63,7 +66,7 @@ def condensed(table, compliance):
     return list(load_steps(CondensedLaws(table, compliance), load_history))
 
 
-def by_laws(body, face, count):
+def by_laws(body, face, count, json):
     """Print the times of laws and of load steps with them."""
     _, model = models(256, body, face)
     patches = PatchGrid(grid=(count, count), lengths=model.surface.lengths)
@@ -80,8 +83,10 @@ def by_laws(body, face, count):
         )
         used = max(len(law.rows) for law in table.laws)
         print(f"laws of {count**2} patches on the block, 256², {used} rows: {spent:.2f} s")
+        keep(json, patches=count**2, most_rows=rows, rows=used, seconds=spent)
     spent, _ = median(condensed, table, compliance)
     print(f"100 condensed load steps, {count**2} patches: {spent:.3f} s")
+    keep(json, patches=count**2, steps=100, seconds=spent)
 
 
 def together(model):
@@ -101,10 +106,13 @@ def by_contacts(body, face, cells):
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--json", metavar="FILE", help="append the times of laws to it")
+    json = parser.parse_args().json
     spent, (body, face) = median(block)
     print(f"compliance of the block's top: {spent:.2f} s")
     for count in (4, 16):
-        by_laws(body, face, count)
+        by_laws(body, face, count, json)
     for cells in (64, 128, 256):
         by_contacts(body, face, cells)
 

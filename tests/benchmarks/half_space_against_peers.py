@@ -27,6 +27,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from json_rows import keep
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
@@ -96,7 +97,7 @@ def compare(pythons, task, repeats, exact):
     return {code: fresh[code] | {"seconds": statistics.median(rows[code])} for code in rows}
 
 
-def large(pythons, sizes, boundaries, threads, repeats):
+def large(pythons, sizes, boundaries, threads, repeats, json_file):
     """Solve large surfaces once per process; print a table per size, area and boundary."""
     own = CODES[0]
     with tempfile.TemporaryDirectory() as folder:
@@ -116,6 +117,7 @@ def large(pythons, sizes, boundaries, threads, repeats):
                         process.close()
                 rows = {name: median(found) for name, found in runs.items()}
                 show(f"{n} x {n}, {kind}, {area:.0%} contact, {threads} threads", rows, n * n)
+                keep(json_file, cells=n, boundary=kind, area=area, codes=rows)
 
 
 def median(answers):
@@ -158,13 +160,15 @@ def main():
     parser.add_argument(
         "--boundaries", nargs="+", choices=BOUNDARIES, default=BOUNDARIES, help="in that table"
     )
+    parser.add_argument("--json", metavar="FILE", help="append the rows to it")
     options = parser.parse_args()
     if options.peers is None and options.codes != ["patchlaw"]:
         parser.error("--peers names the interpreter of the peers; without one: --codes patchlaw")
     pythons = {code: options.peers for code in options.codes}
     pythons["patchlaw"] = sys.executable  # to whose times all others are related
     if options.large:
-        large(pythons, options.large, options.boundaries, options.threads, options.repeats)
+        given = options.large, options.boundaries, options.threads, options.repeats
+        large(pythons, *given, options.json)
         return
     with tempfile.TemporaryDirectory() as folder:
         for n in options.sizes:
@@ -175,10 +179,9 @@ def main():
             for tolerance in options.tolerances:
                 task = {"heights": file, "pressures": [LOAD], "tolerance": tolerance}
                 repeats = options.repeats if n <= 512 else max(1, options.repeats // 2)
-                show(
-                    f"cold {n} x {n}, tolerance {tolerance:g}",
-                    compare(pythons, task, repeats, exact),
-                )
+                rows = compare(pythons, task, repeats, exact)
+                show(f"cold {n} x {n}, tolerance {tolerance:g}", rows)
+                keep(options.json, cells=n, tolerance=tolerance, codes=rows)
         for n in options.curve:
             file = str(Path(folder) / f"{n}.npy")
             np.save(file, surface(n).heights)

@@ -1,10 +1,11 @@
 """What rows of patch laws cost: consistent laws against the concurrent coupling, in one run.
 
-Run by hand: ``.venv/bin/python tests/benchmarks/law_rows.py [repeats]``. Processor time on one
-thread, each run from nothing, in turn; medians, and their ratios to the concurrent coupling. Also
-the pressings, products of the compliance and evaluations of finite slopes of each.
+Run by hand: ``.venv/bin/python tests/benchmarks/law_rows.py [repeats] [--json FILE]``. Processor
+time on one thread, each run from nothing, in turn; medians, and their ratios to the concurrent
+coupling. Also the pressings, products of the compliance and evaluations of finite slopes of each.
 """
 
+import argparse
 import os
 import sys
 
@@ -13,6 +14,8 @@ os.environ["OMP_NUM_THREADS"] = "1"
 import statistics
 import time
 from collections import Counter
+
+from json_rows import keep
 
 from geometry import Spectrum, synthesise
 from micro import HalfSpaceModel
@@ -87,7 +90,11 @@ def of_samples(samples):
 
 def main():
     """Print a line for each case."""
-    repeats = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("repeats", type=int, nargs="?", default=5)
+    parser.add_argument("--json", metavar="FILE", help="append the rows to it")
+    choice = parser.parse_args()
+    repeats = choice.repeats
     spectrum = {"hurst": 0.8, "waves": (2, 32), "rms_slope": 0.2}
     samples = [
         synthesise(Spectrum(**spectrum, seed=seed), grid=(128, 128), lengths=(1.0, 1.0))
@@ -107,6 +114,7 @@ def main():
     for name, median in medians.items():
         more = ", ".join(f"{number} {label}" for label, number in numbers[name].items())
         print(f"{name:40}{median:8.2f}{median / medians['concurrent']:8.2f}   {more}")
+        keep(choice.json, case=name, seconds=median, counts=numbers[name])
     slopes = medians["concurrent, 64²"] / medians["concurrent, 64², small slopes"]
     print(f"finite slopes at 64²: {slopes:.2f} times as long")
 

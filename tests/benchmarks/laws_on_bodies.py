@@ -35,6 +35,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from body_solvers import COMM, LINING, PARTS, iterations
 from helpers.body_meshes import HIGH, LOW, box
 from helpers.machine_parts import STEEL, part_body, read_part
+from json_rows import keep
 
 from geometry import Friction, PatchGrid, ShearControl
 from geometry.rigid_plane import Control
@@ -111,7 +112,7 @@ def slab_on(face, plane, degree, size):
     return FacePair(face, LoadedFace(body, facets, face.patches))
 
 
-def press_pad(file, friction=None, roughnesses=(16.0, 4.0, 1.0)):
+def press_pad(file, friction=None, roughnesses=(16.0, 4.0, 1.0), json=None):
     """Print the time of the demo's load steps as a multiple of that of one linear solution."""
     tagged = read_mesh(file, COMM)
     names, volumes = tagged.facet_names, tagged.cell_names
@@ -128,7 +129,7 @@ def press_pad(file, friction=None, roughnesses=(16.0, 4.0, 1.0)):
         print(f"  set-up {said(set_up)}; solution {said(one)}, {alone} iterations", flush=True)
     body.solver.setTolerances(rtol=1e-10)
     if friction is not None:
-        rub_pad(face, friction)
+        rub_pad(face, friction, roughnesses, json)
         return
     for roughness in roughnesses:
         problem = LawContactProblem(face, [ExponentialLaw(1e-3 * roughness)], "pointwise")
@@ -144,6 +145,9 @@ def press_pad(file, friction=None, roughnesses=(16.0, 4.0, 1.0)):
                 f"{len(apart)} set-ups {said(sum(apart))}; Newton {newton}, linear {linear}",
                 flush=True,
             )
+            solutions = dict(zip(("wall", "cpu", "flops"), steps / one, strict=True))
+            counts = {"newton": sum(newton), "linear": linear}
+            keep(json, unknowns=body.dofs, roughness=roughness, **counts, **solutions)
 
 
 @contextmanager
@@ -174,10 +178,10 @@ def said(work):
     return ", ".join(f"{part:.4g}" for part in work)
 
 
-def rub_pad(face, friction):
+def rub_pad(face, friction, roughnesses, json):
     """Print the CPU time of the pad's load steps with friction over that without, and of shear."""
     loads = [Control(force=2e3 * k) for k in (1, 2, 3, 4)]
-    for roughness in (16.0, 4.0, 1.0):
+    for roughness in roughnesses:
         law = [ExponentialLaw(1e-3 * roughness)]
         spent, counts = {}, {}
         for name in (None, friction):
@@ -197,6 +201,7 @@ def rub_pad(face, friction):
                 f"sheared {sheared:.1f} s ({work_of(states)})",
                 flush=True,
             )
+            keep(json, roughness=roughness, friction=spent[friction] / spent[None])
 
 
 def work_of(states):
@@ -222,10 +227,12 @@ def main():
     parser.add_argument("--pad", metavar="FILE")
     parser.add_argument("--friction", type=float)
     parser.add_argument("--roughness", type=float, nargs="*", default=(16.0, 4.0, 1.0))
+    parser.add_argument("--json", metavar="FILE", help="append the rows of the pad to it")
     choice = parser.parse_args()
     if choice.pad:
         mu = choice.friction
-        press_pad(choice.pad, mu and Friction(coefficient=mu, poisson_ratio=0.25), choice.roughness)
+        law = mu and Friction(coefficient=mu, poisson_ratio=0.25)
+        press_pad(choice.pad, law, choice.roughness, choice.json)
         return
     for name in choice.parts or PARTS:
         part, *rest = PARTS[name]

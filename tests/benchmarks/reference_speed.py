@@ -16,6 +16,7 @@ import resource
 import time
 
 import numpy as np
+from json_rows import keep
 from mpi4py import MPI
 
 from geometry import (
@@ -50,7 +51,7 @@ class Clock:
 
 def per_solve(block):
     """Return a list to which every linear solve of an active set adds its iterations."""
-    counts, solver = [], block._method._solver
+    counts, solver = [], block.method._solver
     improve = solver.improve
 
     def counted(*arguments):
@@ -119,6 +120,7 @@ def main():
     parser.add_argument("--edges", type=float, nargs="+", default=[1.5, 2.0, 3.0, 4.0])
     parser.add_argument("--approach", type=float, default=8e-3)
     parser.add_argument("--steps", type=int, default=8)
+    parser.add_argument("--json", metavar="FILE", help="append time and memory of hexahedra to it")
     choice = parser.parse_args()
     surface = synthesise(SPECTRUM, grid=(256, 256), lengths=(SIDE, SIDE))
     approaches = choice.approach * np.arange(1, choice.steps + 1) / choice.steps
@@ -129,7 +131,10 @@ def main():
         interface=(SIDE, SIDE), height=SIDE, cells=tuple(choice.cells), grading=choice.grading
     )
     say(f"{np.prod(choice.cells)} hexahedra")
-    curve(surface, shape, approaches)
+    _, seconds = curve(surface, shape, approaches)
+    used = memory()
+    if COMM.rank == 0:
+        keep(choice.json, seconds=seconds, gigabytes=used)
 
 
 def say(line):

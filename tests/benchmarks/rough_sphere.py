@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+sys.path.insert(0, str(Path(__file__).parents[1] / "verification"))
 
 from helpers.rough_sphere_oracle import gaussian, rough_sphere
 from test_rough_sphere import forces_on_strips

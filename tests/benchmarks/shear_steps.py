@@ -6,10 +6,11 @@ product of the half-space is one transform forth and one back; one with traction
 The products of the approximate inverse come on top of both, one in every iteration.
 """
 
-import sys
+import argparse
 import time
 
 import numpy as np
+from json_rows import keep
 
 from geometry import Material, MaterialPair, ShearControl, Spectrum, synthesise
 from micro import FrictionModel, HalfSpaceModel
@@ -47,7 +48,11 @@ def case(cells, *, periodic, poisson_ratio):
 
 def main():
     """Print a line for every case."""
-    cells = int(sys.argv[1]) if len(sys.argv) > 1 else 512
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("cells", type=int, nargs="?", default=512)
+    parser.add_argument("--json", metavar="FILE", help="append the ratios to it")
+    choice = parser.parse_args()
+    cells = choice.cells
     print(f"{cells}² cells: normal steps at an unchanged set-up, then steps in shear")
     for periodic in (False, True):
         for poisson_ratio in (0.0, 0.3):
@@ -61,6 +66,8 @@ def main():
                 f"(worst step {max(one for _, one in work['shear']) / normal[1]:.2f}); at the end "
                 f"{100 * slips:.0f} % of the contact slips"
             )
+            ratio = shear[1] / normal[1]
+            keep(choice.json, periodic=periodic, poisson_ratio=poisson_ratio, ratio=ratio)
 
 
 if __name__ == "__main__":

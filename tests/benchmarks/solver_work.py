@@ -132,7 +132,7 @@ def show(step: str, newton: int, linear: int, work: dict[str, float], stream: fl
     )
 
 
-def steps(run: Run, work: Work) -> Iterator[tuple]:
+def steps(run: Run, work: Work) -> Iterator[tuple[str, int, int, dict[str, float]]]:
     """Yield the load steps with what they took, and all together."""
     log, whole, newton, linear = Log(work.grids), [], 0, 0
     for step in run.load_steps():
@@ -179,7 +179,7 @@ def main() -> None:
     rates = ", ".join(f"{name} {rate / 1e9:.1f} GB/s" for name, rate in stream.items())
     say(f"{work.unknowns} unknowns on {COMM.size} ranks, {work.grids} grids; memory gives {rates}")
     made = mean(logged("PCSetUp")["time"])
-    say(f"block {run.seconds['block']:.1f} s, of which its multigrid {made:.1f} s")
+    say(f"block {run.clock.seconds['block']:.1f} s, of which its multigrid {made:.1f} s")
     say("                       products with K,             in them,            ", end="")
     say("  shares of the wall time")
     say(" step  Newton  linear   coarser ones      GB  wall [s]   all    GB/s   floor", end="")

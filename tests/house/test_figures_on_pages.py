@@ -8,9 +8,15 @@ import sys
 from pathlib import Path
 from statistics import median
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
-DATA = ROOT / "demos" / "data"
-FRONT_PAGE = runpy.run_path(str(ROOT / "tests" / "benchmarks" / "front_page.py"))
+DATA, BENCHMARKS = ROOT / "demos" / "data", ROOT / "tests" / "benchmarks"
+sys.path.insert(0, str(BENCHMARKS))
+try:
+    PUBLISHED = runpy.run_path(str(BENCHMARKS / "published_times.py"))
+finally:
+    sys.path.remove(str(BENCHMARKS))
 TEXTS = {
     path.stem: path.read_text(encoding="utf-8")
     for path in (ROOT / "README.md", *(ROOT / "docs").glob("*.md"))
@@ -35,7 +41,14 @@ def numbers(text):
     return [float(one.replace("−", "-")) for one in re.findall(r"[−-]?\d+(?:\.\d+)?", text)]
 
 
-rounded, percent = FRONT_PAGE["rounded"], FRONT_PAGE["percent"]
+def times(name):
+    """Return the rows of a measured table of the page of times, without its header."""
+    rest = TEXTS["speed"].split(f"<!-- times: {name} -->\n\n", maxsplit=1)[1]
+    lines = rest[: rest.index("\n\n")].splitlines()[2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+rounded, percent = PUBLISHED["rounded"], PUBLISHED["percent"]
 
 
 def drawn_again(demo, folder):
@@ -53,9 +66,10 @@ def test_configurations_of_the_papers_scene():
     coarse, fine = (f"concurrent, half-space {n} × {n}" for n in (64, 128))
     paper = "the scene as it is: isolated, 4 × 4 patches, circular, 40 × 40 × 25 elements"
     mesh, small = "reference, 1 mesh, 10.4 µm", "concurrent, half-space 128 × 128, small slopes"
-    assert FRONT_PAGE["with_rows"](TEXTS["README"]) == TEXTS["README"]
-    says("README", "of 1.9 million, 2 ranks | 3 h | 28 s | – |")
-    says("speed", f"slopes {error[small]} % are left after {time[small]} s", "takes 28 s on two")
+    assert PUBLISHED["with_rows"](TEXTS["README"]) == TEXTS["README"]
+    ((unknowns, seconds, _),) = times("reference")
+    says("README", f"of {unknowns}, 2 ranks | 3 h | {seconds} | – |")
+    says("speed", f"slopes {error[small]} % are left after {time[small]} s")
     early, late = (f"{float(time[one]):.1f}" for one in (coarse, fine))
     says(
         "choosing",
@@ -170,35 +184,49 @@ def test_errors_of_discretisation():
     says("limits", "4 edges along the contact radius they are 12 % too stiff")
 
 
-def test_times_beside_peers():
-    def ratios(*rows):
-        columns = zip(*rows, strict=True)
-        return [[re.search(r"\(([\d.]+) ×\)", one)[1] for one in column] for column in columns]
+def test_every_table_of_times_has_its_columns():
+    for name, (header, _) in PUBLISHED["TABLES"].items():
+        rows = times(name)
+        assert rows, f"no row in the table {name!r}"
+        assert {len(row) for row in rows} == {len(header)}
 
-    section = "## The half-space model compared"
-    one = [cells("speed", section, f"{n}² |") for n in (128, 256, 512)]
-    kinds = ("periodic | 2", "periodic | 11", "free | 2", "free | 10")
-    two = [cells("speed", section, f"512² | {kind}")[-2:] for kind in kinds]
-    large = cells("speed", section, "2048² | periodic | 2 %")[-2:]
-    tamaas, _ = ratios(*(row[1:3] for row in one))
-    spans = [(min(map(int, column)), max(map(int, column))) for column in ratios(*two)]
-    huge = " and ".join(column[0] for column in ratios(large))
-    least, most = round(float(tamaas[0])), spans[1][1]
-    says("README", f"{least} to {most} times as fast as Tamaas", f"{huge} times on 2048²")
-    says("peers", f"{least} to {most} times as fast as Tamaas", f"on 2048² cells {huge} times")
-    says("choosing", ", ".join(row[0] for row in one) + " |")
+
+def test_tables_are_written_in_place():
+    text = "a\n\n<!-- times: shear -->\n\n| x |\n| --- |\n| 1 |\n\nb\n"
+    for old in (text, text.replace("| x |\n| --- |\n| 1 |\n", "")):
+        new = PUBLISHED["with_table"](old, "shear", [["free", "0", "1.5"]])
+        head = "| boundary | ν | shear over normal |\n| --- | --- | --- |\n"
+        assert new == f"a\n\n<!-- times: shear -->\n\n{head}| free | 0 | 1.5 |\n\nb\n"
+    with pytest.raises(SystemExit, match="no table 'shear'"):
+        PUBLISHED["with_table"]("a", "shear", [])
+
+
+def test_times_beside_peers():
+    def ratios(rows):
+        return [float(re.search(r"\(([\d.]+) ×\)", cell)[1]) for row in rows for cell in row]
+
+    small = times("peers")
+    medium = [row[-2:] for row in times("peers_large") if row[0] == "512²"]
+    assert len(medium) == 4
+    words = " ".join(TEXTS["speed"].split())
+    huge = re.search(r"Tamaas took \d+ s, (\d+) times .* \d+ s, (\d+) times", words)
+    both = ratios([row[2:4] for row in small]) + ratios(medium)
+    span = f"{round(min(both))} to {round(max(both))}"
+    tamaas, other = huge.groups()
+    says("README", f"{span} times as fast as Tamaas", f"{tamaas} and {other} times on 2048²")
+    says("peers", f"{span} times as fast as Tamaas", f"on 2048² cells {tamaas} and {other} times")
+    says("choosing", ", ".join(row[1] for row in small) + " |")
 
 
 def test_other_times():
-    pad = re.compile(r"pad of (\d+ \d+) unknowns with a law at every point takes (\d+ s)")
-    unknowns, time = pad.search(TEXTS["speed"]).groups()
-    says("README", f"{unknowns} unknowns with a law takes {time} for 8 load steps on 2 ranks")
-    says("choosing", f"brake pad of {unknowns} unknowns, 8 load steps, 2 ranks: {time} |")
+    unknowns, *_, whole, _newton, _linear, _bytes = times("large_pad")[0]
+    says("README", f"{unknowns} unknowns with a law takes {whole} s for 8 load steps on 2 ranks")
+    says("choosing", f"brake pad of {unknowns} unknowns, 8 load steps, 2 ranks: {whole} s |")
     first = re.search(r"After (\d+ s) it has", TEXTS["README"])[1]
     says("my_surface", f"The first takes {first} on one core")
-    laws = cells("speed", "## Couplings", "consistent laws on the block")[0]
-    steps = numbers(cells("speed", "## Couplings", "100 load steps")[0])[0]
-    says("choosing", f"once, {laws} at 256² heights; then {10.0 * steps:.1f} ms a load step")
+    (_, laws, _), (_, hundred, _) = times("couplings")
+    each = f"{10.0 * float(hundred.removesuffix(' s')):.1f} ms a load step"
+    says("choosing", f"once, {laws} at 256² heights; then {each}")
 
 
 def test_effect_of_a_hardness():

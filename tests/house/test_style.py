@@ -1,5 +1,6 @@
 """Linter, formatter and type checker, as a developer runs them; no merge is left half done."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -25,6 +26,30 @@ def test_tool_has_no_complaint(command):
         [sys.executable, "-m", *command], cwd=ROOT, capture_output=True, text=True, check=False
     )
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("folder", ["tests/benchmarks", "demos"])
+def test_scripts_run_by_hand_name_what_there_is(folder):
+    """Nothing else calls most of them, so that what they need could go unnoticed."""
+    if np.lib.NumpyVersion(np.__version__) >= "2.0.0":
+        pytest.skip("types are checked against numpy 1.24")
+    peers = "half_space_peers.py"  # for another interpreter
+    files = [str(file) for file in (ROOT / folder).glob("*.py") if file.name != peers]
+    options = ("--check-untyped-defs", "--allow-untyped-defs", "--explicit-package-bases")
+    result = subprocess.run(
+        [sys.executable, "-m", "mypy", *options, *files],
+        cwd=ROOT,
+        env=os.environ | {"MYPYPATH": os.pathsep.join(["tests", "tests/verification", folder])},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    kinds = ("[attr-defined]", "[call-arg]", "[name-defined]", "[import-not-found]")
+    assert f"checked {len(files)} source files" in result.stdout, result.stdout + result.stderr
+    bases = ('"object" has no', '"Coupling" has no')  # what classes derived from them may have
+    errors = [line for line in result.stdout.splitlines() if line.endswith(kinds)]
+    assert [line for line in errors if not any(base in line for base in bases)] == []
 
 
 def test_no_merge_is_left_half_done():
