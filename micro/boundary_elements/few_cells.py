@@ -87,6 +87,7 @@ class FewCells:
         moving, rate = np.flatnonzero(pressure), np.zeros_like(pressure)
         loaded = pressure * self.modulus
         while True:
+            self.learn(pressure)  # a memory that is full has begun anew with the rate
             matrix = self.compliance(pressure).of(moving)
             for each in self.slopes:
                 moved, along = each.share_rate(loaded)

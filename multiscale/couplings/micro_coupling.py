@@ -40,8 +40,7 @@ from support.errors import InputError
 _TRACTIONS = 12.0
 """Solutions of a meshed face under 3 × 16² modes of traction over those under 8² of pressure."""
 _FEW_CELLS = 1000
-"""Cells that can touch, at most, for load steps by one matrix with the finite slopes: three times
-8 MB."""
+"""Cells that can touch, at most, for load steps by one matrix, of 8 MB, with the finite slopes."""
 _CHECK_OF_CELLS, _CHECK_OF_LAWS = 3.0, 25.0
 """Contact problems on the cells of the run, by processor time, that a point of the path is worth
 in measuring the errors of the shear. On 64² and 96² cells with two points: 1.4 on a half-space,

@@ -118,6 +118,8 @@ def test_a_full_memory_begins_anew(slopes, monkeypatch):
         state = quick.press(control, start=start)
         start = state.guess
         assert state.force == pytest.approx(model.press(control).force, rel=2e-8)
+        exact = model.stiffness(state, turns=False).value
+        assert quick.stiffness(state, turns=False).value == pytest.approx(exact, rel=2e-7)
 
 
 def test_a_larger_load_than_foreseen_is_solved_all_the_same(slopes):
