@@ -37,9 +37,9 @@ COLUMNS = ("name", "kind", "status", "is_measure", "seconds", "error_force_max")
 COUPLINGS = {  # name, and where it stands beside the first curve
     "analytic": ("micro models\nalone", (0.03, 20.0), "left"),
     "isolated": ("patches on their own", (1.1, 20.0), "left"),
-    "consistent": ("laws of the\nwhole surface", (1.6, 1.6), "left"),
+    "consistent": ("laws of the\nwhole surface", (4.0, 1.6), "left"),
     "concurrent": ("contacts and\nblock together", (0.17, 0.4), "right"),
-    "reference": ("roughness\nmeshed", (11.0, 0.4), "left"),
+    "reference": ("roughness\nmeshed", (20.0, 0.4), "left"),
 }
 
 
