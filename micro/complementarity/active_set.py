@@ -82,6 +82,7 @@ class ActiveSet:
         self._constrained: Indices = np.zeros(0, np.intp)  # cells at a bound that have no gap
         self._set: Flags = np.zeros(problem.interference.shape, bool)
         self._yielding: Flags | None = None
+        self._ends = float(problem.interference.min()), float(problem.interference.max())
         self.gap = np.empty_like(start)
         pressure, self.motion = admissible_start(problem, start)
         self._accept(pressure)
@@ -106,23 +107,20 @@ class ActiveSet:
         def extremes(rows: slice) -> tuple[float, float, float, float]:
             """Let free motions act; return four extremes.
 
-            They are the largest interference, its largest absolute value, the largest size of the
+            They are the largest interference, that of the opposite sign, the largest size of the
             gaps of cells that carry, and of the negative gaps of all others.
             """
-            nearer, here, p = motions.displacement(self.motion, rows), gap[rows], pressure[rows]
-            here -= nearer
-            nearer += interference[rows]
-            carrying = p > 0.0
-            closed = np.where(carrying, here, 0.0)
+            here, p = gap[rows], pressure[rows]
+            least, most = self._moved_nearer(here, rows)
+            closed = here * (p > 0.0)
             apart, open_gaps = float(closed.max()), here - closed
             if problem.bound.is_finite:
                 yielding = problem.bound.on((rows, slice(None))).reached(p)
                 closed[yielding] = 0.0  # yielding cells may have negative gaps
-            inside = max(apart, -float(closed.min()))
-            return float(nearer.max()), float(np.abs(nearer).max()), inside, -float(open_gaps.min())
+            return most, -least, max(apart, -float(closed.min())), -float(open_gaps.min())
 
-        total, elastic, pressed = np.sum(in_threads(work, parts), axis=0)
-        self._energy = float(elastic - 2.0 * pressed)
+        total, elastic, pressed = map(sum, zip(*in_threads(work, parts), strict=True))
+        self._energy = elastic - 2.0 * pressed
         if motions.count and total > 0.0:
             if motions.turns or problem.bound.is_finite or self._constrained.size:
                 self.motion = self._closing(pressure)
@@ -132,16 +130,31 @@ class ActiveSet:
                     lambda rows: float(np.vdot(pressure[rows], gap[rows] - base)), parts
                 )
                 self.motion = np.array([base + sum(beyond) / total])
-        largest = np.max(in_threads(extremes, parts), axis=0)
-        self.scale = float(largest[0])
-        if self.scale <= 0.0 and total > 0.0:  # clear of all cells, and yet loaded
-            self.scale = float(largest[1])
+        most, least, inside, outside = map(max, zip(*in_threads(extremes, parts), strict=True))
+        # clear of all cells, and yet loaded: the largest absolute value counts
+        self.scale = most if most > 0.0 or total == 0.0 else max(most, least)
         self.residual = self.rounding = 0.0
-        self._enters = not float(largest[2]) > _CLOSED * float(largest[3])
+        self._enters = not inside > _CLOSED * outside
         if self.scale > 0.0:
-            self.residual = float(largest[2:].max(initial=0.0)) / self.scale
+            self.residual = max(inside, outside, 0.0) / self.scale
             if motions.turns:
-                self.rounding = _ROUNDING * float(largest[1]) / self.scale
+                self.rounding = _ROUNDING * max(most, least) / self.scale
+
+    def _moved_nearer(self, gap: Array, rows: slice) -> tuple[float, float]:
+        """Take the free motions off the gaps of some rows; return the ends of their interference.
+
+        Args:
+            gap: Gaps of these rows without the motions; overwritten [mm].
+            rows: The rows.
+        """
+        if not self.problem.motions.turns:
+            approach = float(self.motion.sum())
+            gap -= approach
+            return self._ends[0] + approach, self._ends[1] + approach
+        nearer = self.problem.motions.displacement(self.motion, rows)
+        gap -= nearer
+        nearer += self.problem.interference[rows]
+        return float(nearer.min()), float(nearer.max())
 
     def _closing(self, pressure: Array) -> Array:
         """Return the free motions that close the gaps of cells that carry between the bounds.
@@ -179,7 +192,7 @@ class ActiveSet:
         Args:
             cautious: Whether no step may raise the energy.
         """
-        few = self.problem.motions.turns and np.count_nonzero(self.pressure) <= _FEW
+        few = self.problem.motions.turns and np.count_nonzero(self.pressure > 0.0) <= _FEW
         if not self._one_by_one and not few:
             old = self.pressure
             if self._step_together(cautious=cautious or self.problem.unloaded):
@@ -224,8 +237,8 @@ class ActiveSet:
 
         def work(some: slice) -> None:
             most = upper if np.ndim(upper) == 0 else np.asarray(upper)[some]
-            np.add(flat[cells[some]], change[some], out=wanted[some])
-            flat[cells[some]] = np.clip(wanted[some], 0.0, most)
+            here = np.add(flat[cells[some]], change[some], out=wanted[some])
+            flat[cells[some]] = np.minimum(np.maximum(here, 0.0), most)
 
         in_threads(work, blocks(len(cells), CELLS))
         final = not problem.bound.is_finite or not problem.motions.count

@@ -31,7 +31,7 @@ class PressureBound:
     @property
     def least(self) -> float:
         """The smallest bound of all cells."""
-        return float(np.min(self.value))
+        return self.value if isinstance(self.value, float) else float(np.min(self.value))
 
     def of(self, cells: Indices) -> Array | float:
         """Return the bound of some cells by their flat indices: a number, or shape (n,)."""
@@ -70,7 +70,7 @@ ELASTIC = PressureBound()
 def coarsened(field: Array, factors: Sequence[int]) -> Array:
     """Average blocks of cells; an incomplete last block is filled with its last cells."""
     missing = [(0, -n % factor) for n, factor in zip(field.shape, factors, strict=True)]
-    full = np.pad(field, missing, mode="edge")
+    full = np.pad(field, missing, mode="edge") if np.any(missing) else field
     rows, columns = (n // factor for n, factor in zip(full.shape, factors, strict=True))
     return np.asarray(full.reshape(rows, factors[0], columns, factors[1]).mean(axis=(1, 3)))
 

@@ -46,7 +46,11 @@ class ContactCells:
         self.resistance = modes
         if not self._inverse.accurate:
             self.resistance = np.array([self._inverse(mode) for mode in modes]).reshape(modes.shape)
-        self.inverse = np.linalg.pinv(modes @ self.resistance.T, rcond=1e-10)
+        loads = modes @ self.resistance.T
+        if len(modes) > 1:
+            self.inverse = np.linalg.pinv(loads, rcond=1e-10)
+        else:  # at once what takes as long as a product on few cells
+            self.inverse = np.divide(1.0, loads, out=np.zeros_like(loads), where=loads != 0.0)
 
     def balanced(self, gap: Array) -> Array:
         """Subtract from gaps the part that free motions of the body take up."""

@@ -103,7 +103,7 @@ class Motions:
         """
         if not self.turns:  # the approach, whose mode is 1
             return np.array([np.vdot(pressure, gap) / pressure.sum()])
-        cells = np.flatnonzero(pressure)
+        cells = np.flatnonzero(pressure > 0.0)
         root = np.sqrt(pressure.ravel()[cells] / pressure.max())
         modes, left = self.modes_of(cells), gap.ravel()[cells]
         motion = np.zeros(self.count)
@@ -151,9 +151,9 @@ class Motions:
             factor = float(self.loads[0]) / total
             in_threads(lambda rows: np.multiply(pressure[rows], factor, pressure[rows]), parts)
             return pressure
-        cells, loads, acting = np.flatnonzero(pressure), self.loads, 0.0
+        cells, loads, acting = np.flatnonzero(pressure > 0.0), self.loads, 0.0
         if fixed is not None:
-            cells = np.flatnonzero(np.where(fixed, 0.0, pressure))
+            cells = np.flatnonzero((pressure > 0.0) & ~fixed)
             stay = np.flatnonzero(fixed)
             loads = loads - self.modes_of(stay) @ pressure.ravel()[stay]
             acting = float(pressure.ravel()[stay].sum())
