@@ -298,10 +298,12 @@ class LawErrorProbe:
             reference = probe.model.reference_height - sample.mean_height
             law, closure = self.laws[number], float(closures[number])
             approach = reference - separation_of(law, closure, reference)
-            force = probe.on_body(probe.model, probe.order).press(Control(approach=approach)).force
+            model = probe.on_body(probe.model, probe.order)
+            state = model.press(Control(approach=approach))
+            force = state.force
             if not force:  # the closure is that of others of the samples
                 return 0.0, 0.0, 0.0, 0.0
-            parts = probe.measure(force, approach, (0.0, 0.0)).parts
+            parts = probe.measure(force, approach, (0.0, 0.0), start=state.guess).parts
             width = self.edge_width_of(self.samples[number], sample, force / sample.area)
             return parts["grid"], parts["slopes"], width * force, force
 
