@@ -21,11 +21,13 @@ Theory: docs/theory.md, section 4.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from numpy.typing import NDArray
 
 from micro.boundary_elements.half_space_grid import Cells
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.cores import BLOCK, CELLS, blocks, in_threads
 
 Field = NDArray[np.float32]
@@ -38,6 +40,9 @@ _NONE = 1e-20
 """Weights up to which a cell knows nothing; quotients of smaller ones are inaccurate."""
 _SMALLEST = 2
 """Cells along the shorter side of the coarsest grid."""
+_SMALL = 64
+"""Cells along the longer side of a grid up to which matrices interpolate to it: two products take
+as long as two of the twenty operations on rows and columns."""
 
 
 class Extension:
@@ -54,7 +59,7 @@ class Extension:
 
     def __init__(self, cells: Cells, period: tuple[int, int], weights: Array | None = None) -> None:
         self.place = rows, columns = np.empty_like(cells.row), cells.column
-        shape = _halved(period)
+        self._period, shape = period, _halved(period)
         self._block = np.empty_like(rows)
 
         def locate(some: slice) -> None:
@@ -80,13 +85,14 @@ class Extension:
 
         Args:
             values: Of the cells, shape (n,).
-            out: Overwritten by their extension, shape (mx, my).
+            out: Row by row in memory, at least (mx, my); its first my columns are overwritten by
+                the extension.
         """
-        self.interpolated(values, out)
-        rows, columns = self.place
+        self.interpolated(values, out[:, : self._period[1]])
+        flat = out.ravel()
 
         def put(some: slice) -> None:
-            out[rows[some], columns[some]] = values[some]
+            flat[self._flat(some, out)] = values[some]
 
         in_threads(put, blocks(len(values), CELLS))
 
@@ -94,22 +100,25 @@ class Extension:
         """Return the transpose of `extended` times a field.
 
         Args:
-            field: Shape (mx, my); overwritten.
+            field: Row by row in memory, at least (mx, my); overwritten.
 
         Returns:
             Shape (n,).
         """
-        rows, columns = self.place
-        own = np.empty(len(rows))
+        flat, own = field.ravel(), np.empty(len(self._block))
 
         def take(some: slice) -> None:
-            place = rows[some], columns[some]
-            own[some] = field[place]
-            field[place] = 0.0
+            place = self._flat(some, field)
+            own[some] = flat[place]
+            flat[place] = 0.0
 
         in_threads(take, blocks(len(own), CELLS))
-        own += self.collected(field)
+        own += self.collected(field[:, : self._period[1]])
         return own
+
+    def _flat(self, some: slice, field: Field) -> Indices:
+        """Return the flat indices of some cells in a field, which are faster than two."""
+        return np.asarray(self.place[0][some] * field.shape[1] + self.place[1][some])
 
     def interpolated(self, weighted: Array, out: Field) -> None:
         """Interpolate from coarser grids to all cells, those that know values among them.
@@ -120,7 +129,7 @@ class Extension:
         """
         scales = self._scales
         sums = np.bincount(self._block, weighted, minlength=scales[0].size)
-        known = [sums.reshape(scales[0].shape).astype(np.float32) * scales[0]]
+        known = [np.multiply(sums.reshape(scales[0].shape), scales[0], dtype=np.float32)]
         for scale in scales[1:]:
             known.append(scale * _sums(known[-1]))
         field = known.pop()
@@ -191,10 +200,11 @@ def _scaled_sum(fine: Field, coarse: Field, scale: Field) -> Field:
     height, width = fine.shape
 
     def work(here: slice) -> None:
-        rows = np.repeat(coarse[here], 2, axis=1)[:, :width]
+        rows = np.empty((here.stop - here.start, 2 * coarse.shape[1]), np.float32)
+        rows[:, 0::2] = rows[:, 1::2] = coarse[here]  # faster than to repeat columns
         for below in (0, 1):
             part = fine[2 * here.start + below : 2 * here.stop : 2]
-            part += rows[: len(part)]
+            part += rows[: len(part), :width]
         some = slice(2 * here.start, 2 * here.stop)
         fine[some] *= scale[some]
 
@@ -213,28 +223,32 @@ def _interpolate(
         factors: What these are multiplied by, of the same shape; 1 when not given.
         terms: What is added then; nothing when not given.
     """
-    (rows, columns), (_, width) = coarse.shape, out.shape
+    (rows, columns), (height, width) = coarse.shape, out.shape
+    if max(height, width) <= _SMALL:
+        np.matmul(_interpolation(height) @ coarse, _interpolation(width).T, out=out)
+        out *= 1.0 if factors is None else factors
+        out += 0.0 if terms is None else terms
+        return
 
     def work(here: slice) -> None:
         near = coarse[np.arange(here.start - 1, here.stop + 1) % rows]
-        quarter = np.float32(0.25) * near
-        middle = near[1:-1] - quarter[1:-1]
-        across = np.empty((2 * len(middle), columns + 2), np.float32)
-        inner = across[:, 1:-1]
-        np.add(middle, quarter[:-2], out=inner[0::2])
-        np.add(middle, quarter[2:], out=inner[1::2])
-        across[:, 0], across[:, -1] = across[:, -2], across[:, 1]
-        quarter = np.float32(0.25) * across
-        middle = across[:, 1:-1] - quarter[:, 1:-1]
-        fine = out[2 * here.start : 2 * here.stop]
-        some = slice(len(fine))
-        np.add(middle[some], quarter[some, :-2], out=fine[:, 0::2])
-        odd = width // 2
-        np.add(middle[some, :odd], quarter[some, 2 : odd + 2], out=fine[:, 1::2])
+        near *= np.float32(1.0 / 16.0)
+        across, middle = np.empty((len(near), width), np.float32), np.float32(3.0) * near
+        np.add(middle[:, 1:], near[:, :-1], out=across[:, 2::2])
+        np.add(middle[:, 0], near[:, -1], out=across[:, 0])
+        np.add(middle[:, :-1], near[:, 1:], out=across[:, 1 : 2 * columns - 1 : 2])
+        if width % 2 == 0:
+            np.add(middle[:, -1], near[:, 0], out=across[:, -1])
+        middle = np.float32(3.0) * across[1:-1]
+        some = slice(2 * here.start, 2 * here.stop)
+        fine = out[some]
+        np.add(middle, across[:-2], out=fine[0::2])
+        odd = len(fine) // 2
+        np.add(middle[:odd], across[2 : odd + 2], out=fine[1::2])
         if factors is not None:
-            fine *= factors[2 * here.start : 2 * here.stop]
+            fine *= factors[some]
         if terms is not None:
-            fine += terms[2 * here.start : 2 * here.stop]
+            fine += terms[some]
 
     in_threads(work, blocks(rows, BLOCK // (16 * width)))
 
@@ -248,39 +262,47 @@ def _collected(fine: Field, factors: Field | None = None) -> Field:
     """
     height, width = fine.shape
     rows, columns = _halved((height, width))
+    if max(height, width) <= _SMALL:
+        field = fine if factors is None else fine * factors
+        return np.asarray(_interpolation(height).T @ field @ _interpolation(width))
     result = np.empty((rows, columns), np.float32)
 
-    def along(rows: slice | list[int]) -> Field:
-        """Collect in some rows."""
-        part = fine[rows] if factors is None else fine[rows] * factors[rows]
-        even = np.empty((len(part), columns + 1), np.float32)
-        odd = np.zeros_like(even)
-        even[:, :-1], odd[:, 1 : width // 2 + 1] = part[:, 0::2], part[:, 1::2]
-        even[:, -1], odd[:, 0] = even[:, 0], odd[:, -1]
-        quarter = even[:, 1:] + odd[:, :-1]
-        quarter -= even[:, :-1]
-        quarter -= odd[:, 1:]
-        quarter *= np.float32(0.25)
-        quarter += even[:, :-1]
-        quarter += odd[:, 1:]
-        return quarter
+    def part(some: slice | int) -> Field:
+        """Return some rows, or one."""
+        return fine[some] if factors is None else fine[some] * factors[some]
 
     def work(here: slice) -> None:
-        count = here.stop - here.start
-        even, odd = np.zeros((2, count + 1, columns), np.float32)
-        found = along(slice(2 * here.start, 2 * here.stop))
-        even[:-1], odd[1 : 1 + len(found) // 2] = found[0::2], found[1::2]
-        even[-1] = along([2 * (here.stop % rows)])[0]
+        block = part(slice(2 * here.start, 2 * here.stop))
+        even, odd = block[0::2], block[1::2]
+        total = even.copy()
+        total[: len(odd)] += odd
+        total *= np.float32(3.0)
+        total[:-1] += even[1:]
+        total[-1] += part(2 * (here.stop % rows))
+        total[1:] += odd[: len(total) - 1]
         before = 2 * ((here.start - 1) % rows) + 1
         if before < height:
-            odd[0] = along([before])[0]
-        quarter = even[1:] + odd[:-1]
-        quarter -= even[:-1]
-        quarter -= odd[1:]
-        quarter *= np.float32(0.25)
-        quarter += even[:-1]
-        quarter += odd[1:]
-        result[here] = quarter
+            total[0] += part(before)
+        even, odd, found = total[:, 0::2], total[:, 1::2], result[here]
+        found[...] = even
+        found[:, : width // 2] += odd
+        found *= np.float32(3.0)
+        found[:, :-1] += even[:, 1:]
+        found[:, -1] += even[:, 0]
+        found[:, 1:] += odd[:, : columns - 1]
+        if width % 2 == 0:
+            found[:, 0] += odd[:, -1]
+        found *= np.float32(1.0 / 16.0)
 
     in_threads(work, blocks(rows, BLOCK // (16 * width)))
     return result
+
+
+@cache
+def _interpolation(count: int) -> Field:
+    """Return the linear interpolation to a number of fine cells as a matrix, see `_interpolate`."""
+    fine, coarse = np.arange(count), (count + 1) // 2
+    matrix = np.zeros((count, coarse), np.float32)
+    matrix[fine, fine // 2] = 0.75
+    matrix[fine, (fine // 2 + 2 * (fine % 2) - 1) % coarse] += 0.25
+    return matrix

@@ -230,10 +230,12 @@ class Convolution:
         in_threads(take, parts)
         return found
 
-    def field(self) -> Field:
-        """Return memory for a field on all cells, which the next product overwrites, (nx, ny)."""
-        real = self._work.real.dtype
-        return self._rows(self.grid[0]).view(real)[:, : self.grid[1]]
+    def memory(self) -> Field:
+        """Return memory for a field on all cells, which the next product overwrites.
+
+        Its first ny columns take the field: their rows are followed by those of their transforms.
+        """
+        return self._rows(self.grid[0]).view(self._work.real.dtype)
 
     def _rows(self, count: int) -> Field:
         """Return the memory of transformed rows, shape (count, my // 2 + 1)."""

@@ -83,6 +83,7 @@ class ExtendedInverse:
     def __call__(self, displacement: Array) -> Array:
         """Return roughly the pressures / E* that displace the cells; see `ContactInverse`."""
         scale = float(np.abs(displacement).max(initial=0.0)) or 1.0  # single precision: 1e-38
-        field = self._inverse.field()
-        self._extension.extended(displacement / scale, field)
-        return scale * self._extension.gathered(self._inverse(field))
+        memory = self._inverse.memory()
+        self._extension.extended(displacement / scale, memory)
+        self._inverse(memory[:, : self._inverse.grid[1]])
+        return scale * self._extension.gathered(memory)
