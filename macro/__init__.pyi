@@ -7,7 +7,6 @@ from macro.compat import vector_space as vector_space
 from macro.compliance.face_compliance import FaceCompliance as FaceCompliance
 from macro.compliance.face_compliance import face_compliance as face_compliance
 from macro.compliance.face_tractions import face_tractions as face_tractions
-from macro.contact.contact_forces import ContactLaw as ContactLaw
 from macro.contact.contact_problem import ContactProblem as ContactProblem
 from macro.contact.face_equilibrium import FaceEquilibrium as FaceEquilibrium
 from macro.contact.face_pair import FacePair as FacePair
@@ -19,6 +18,7 @@ from macro.contact.loaded_face import LoadedFace as LoadedFace
 from macro.contact.loaded_face import displacements_under as displacements_under
 from macro.contact.loaded_face import largest_rise as largest_rise
 from macro.contact.loaded_face import patch_compliance_matrix as patch_compliance_matrix
+from macro.contact.pressed_plane import ContactLaw as ContactLaw
 from macro.contact.rough_face import RoughFace as RoughFace
 from macro.contact.unilateral_problem import UnilateralContactProblem as UnilateralContactProblem
 from macro.contact.unilateral_problem import nodal_contact as nodal_contact

@@ -2,9 +2,9 @@
 
     LawContactProblem           laws of patches on a face                    `law_problem`
       └ LoadedFace, FacePair    patches on the faces of one body, or two     `loaded_face`, …
-      └ ContactForces           laws under a plane                           `contact_forces`
-        └ FrictionalForces      with shear stresses                          `frictional_forces`
-          └ FaceSliders         by sliders, remembered between load steps    `face_sliders`
+      └ ContactForces           pressures and shear stresses                 `contact_forces`
+        └ PressedPlane          by laws under a plane                        `pressed_plane`
+        └ FaceSliders           by sliders, remembered between load steps    `face_sliders`
       └ ContactResponse         first order changes of an equilibrium        `contact_response`
       └ BesideHalfSpace         load steps against a half-space              `beside_half_space`
     ContactProblem              laws in a user's own variational problem     `contact_problem`

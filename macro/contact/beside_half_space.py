@@ -14,8 +14,6 @@ from macro import compat
 from macro.contact.contact_forces import ContactForces
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.face_sliders import FaceSliders
-from macro.contact.frictional_forces import FrictionalForces, sliders_of
 from macro.contact.loaded_face import ContactFace
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.contact.sampling import Sampling
@@ -25,8 +23,6 @@ from support.errors import NotConverged
 
 _ROUGHLY = 1e-4
 """Residual of a solution of the body over that before it: as pressures converge, so does it."""
-_UNSUPPORTED = 1e-12
-"""Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
 
 class BesideHalfSpace:
@@ -74,7 +70,7 @@ class BesideHalfSpace:
         contact = _LoadStep(forces, gap, body)
         found = self._half_space.follow(contact, f"the half-space at {control}")
         closure, shear = contact.closure, None
-        if isinstance(forces, FrictionalForces):
+        if forces.sliders is not None:
             moved = self._half_space.at_both(found.along) + found.deviation[:, 1:]
             at = closure, moved, forces.pressure(closure), forces.stiffness(closure)
             shear = forces.sliders.accept(forces.sliders.respond(*at))
@@ -160,7 +156,6 @@ class _UnderStresses:
             self._sampling.values.array[:] = pressure
             self._sampling.operator.mult(self._sampling.values, load)
         else:
-            assert isinstance(forces, FrictionalForces)
             forces.write_stresses(pressure, stress, load)
         self._body.stiffness.mult(self.displacement, self._product)
         size = load.norm()
@@ -189,7 +184,7 @@ class _LoadStep:
 
     def __init__(self, forces: ContactForces, gap: Array, body: _UnderStresses) -> None:
         self._forces, self._gap, self.displacements = forces, gap, body.displacements
-        self.directions = 3 if isinstance(forces, FrictionalForces) else 1
+        self.directions = forces.directions
         self.closure: Array = np.zeros_like(gap)
         self._by_slip: Array = np.zeros((len(gap), 2, 2))
 
@@ -205,11 +200,12 @@ class _LoadStep:
 
     def changes(self, way: Array) -> Array:
         """Return the change of pressures where samples close in, to first order."""
-        return _changes(self._forces, way)
+        return self._forces.pressure_change(self._forces.weight * way)
 
     def stresses(self, moved: Array) -> Array:
         """Return the shear stresses; all stick where no shift makes the prescribed force yet."""
-        sliders = self._sliders
+        sliders = self._forces.sliders
+        assert sliders is not None
         at = self.closure, moved, self._pressure, self._stiffness
         try:
             found = sliders.respond(*at)
@@ -220,19 +216,9 @@ class _LoadStep:
 
     def stress_changes(self, way: Array) -> Array:
         """Return the change of stresses where samples slip on, the plane shifting where free."""
-        sliders = self._sliders
+        assert self._forces.sliders is not None
         change = np.einsum("nij,nj->ni", self._by_slip, way)
-        if sliders.shifts:
-            whole = sliders.total(self._by_slip.reshape(-1, 4)).reshape(2, 2)
-            shift = np.linalg.lstsq(whole, sliders.total(change), rcond=_UNSUPPORTED)[0]
-            change -= self._by_slip @ shift
-        return np.asarray(change)
-
-    @property
-    def _sliders(self) -> FaceSliders:
-        sliders = sliders_of(self._forces)
-        assert sliders is not None
-        return sliders
+        return self._forces.sliders.with_shift(self._by_slip, change)
 
 
 class _Linearised:
@@ -269,12 +255,12 @@ class _Linearised:
 
     def pressures(self, moved: Array) -> Array:
         """Return the changes of pressures in gaps that are wider by so much."""
-        self.pressure = _changes(self._forces, self._way - moved)
+        self.pressure = self.changes(self._way - moved)
         return self.pressure
 
     def changes(self, way: Array) -> Array:
         """Return the change of these where samples close in."""
-        return _changes(self._forces, way)
+        return self._forces.pressure_change(self._forces.weight * way)
 
     def stresses(self, moved: Array) -> Array:
         """Return the changes of shear stresses where slip is less by so much."""
@@ -288,13 +274,3 @@ class _Linearised:
     def displacements(self, pressure: Array, stress: Array | None) -> Array:
         """Return the displacements of the body."""
         return self.body.displacements(pressure, stress)
-
-
-def _changes(forces: ContactForces, way: Array) -> Array:
-    """Return the change of pressures where samples close in on a rigid body, (n,) [MPa]."""
-    stiffness = forces.normal_slope * forces.weight
-    border = forces.border(stiffness)
-    change = stiffness * way
-    if border.shape[1]:
-        change -= border @ forces.levers.summed(border.T @ (forces.weight * way))
-    return np.asarray(change)

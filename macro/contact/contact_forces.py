@@ -1,32 +1,29 @@
 """Forces of contact laws on a face under a rigid plane, and their exact derivative.
 
-Theory: section 11 of ``docs/theory.md``.
+Theory: sections 11 and 15 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Sequence
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
-from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
-from macro.contact.face_equilibrium import FaceEquilibrium
-from macro.contact.loaded_face import ContactFace
-from macro.contact.sampling import Sampling, by_patch
-from support.collective import together
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
-
-_FIRST, _FARTHEST = 1e-6, 1e3
-"""First and last approach that first touch is looked for at, in halves of the diagonal."""
-
+from geometry.rigid_plane import Control
+from geometry.sliders import SliderResponse
+from geometry.spring_bed import Friction
+from macro.contact.face_equilibrium import FaceShear
+from macro.contact.face_sliders import FaceSliders
+from macro.contact.lines import ShearLines, shear_lines
+from macro.contact.loaded_face import ContactFace, Mode
+from macro.contact.pressed_plane import ContactLaw, ContactLaws, PressedPlane
+from support.arrays import Array
+from support.errors import NotConverged
 
 _MOVED, _SMOOTH = 1.5, 1.0 / 30.0
 """Ratio of stiffnesses of laws and body together that a preconditioner does not overlook, and
@@ -38,92 +35,34 @@ iterations a solve, in place of 5 to 10."""
 _MATRIX = "patchlaw matrix"
 
 
-class ContactLaw(Protocol):
-    """Contact pressure p of a patch as a function of its closure c.
-
-    Closure is the approach of the plane minus the downward displacement of the block's surface
-    [mm]. Pressures are positive in compression [MPa], and the stiffness is dp/dc ≥ 0 [MPa/mm]. Both
-    must be defined for every closure, because Newton's iterates may leave the range of a tabulated
-    law: whoever tabulates laws extends them and checks the converged closures.
-    """
-
-    def pressure(self, closure: Array, /) -> Array:
-        """Return the pressures at closures of shape (n,)."""
-        ...
-
-    def stiffness(self, closure: Array, /) -> Array:
-        """Return the exact derivative of the pressures at closures of shape (n,)."""
-        ...
-
-
-@runtime_checkable
-class ContactLaws(Protocol):
-    """The laws of all patches, evaluated together: as quick for many patches as for one."""
-
-    def __len__(self) -> int:
-        """Return the number of patches."""
-        ...
-
-    def pressures(self, patch: Indices, closure: Array, /) -> Array:
-        """Return the pressures at closures of patches, shape (n,) [MPa]; see `ContactLaw`."""
-        ...
-
-    def stiffnesses(self, patch: Indices, closure: Array, /) -> Array:
-        """Return the exact derivatives of the pressures, shape (n,) [MPa/mm]."""
-        ...
-
-
-class SingleLaws:
-    """The laws of patches, evaluated one by one, and checked: they may be a user's functions.
-
-    Args:
-        laws: One law per patch.
-    """
-
-    def __init__(self, laws: Sequence[ContactLaw]) -> None:
-        self._pressures = [law.pressure for law in laws]
-        self._stiffnesses = [law.stiffness for law in laws]
-
-    def __len__(self) -> int:
-        return len(self._pressures)
-
-    def pressures(self, patch: Indices, closure: Array) -> Array:
-        """Return the pressures at closures of patches, see `ContactLaws.pressures`."""
-        return by_patch(self._pressures, patch, closure)
-
-    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
-        """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
-        return by_patch(self._stiffnesses, patch, closure)
-
-
-class ContactForces:
+class ContactForces(PressedPlane):
     """Nodal forces B p(c(u)) of contact laws on a face that a rigid plane is pressed on.
 
-    Closures are c = δ − g − Bᵀu / w, with the approach δ of the plane at the samples and the
-    macroscopic gap g. Free motions of the plane follow from the displacement s of the samples: the
-    force is the prescribed one, and there is no moment about the middle of the patches.
+    A sample bears a pressure, and with Coulomb friction two shear stresses, those of `FaceSliders`.
 
-    The forces are minus the gradient of a convex energy if no law softens: the minimum of the
-    energy over the motions of the plane is convex in s where the energy under a fixed plane is.
-    With the stiffness D of the laws, the areas W of the samples and their levers G, closures change
-    by G dq − ds, where (Gᵀ W D G) dq = Gᵀ W D ds. The derivative −B (diag(p'/w) − E Eᵀ) Bᵀ is
-    applied without being assembled: B has few columns (patches) or few rows with entries (nodes of
-    the interface), and E has a column for every free motion.
+    Without friction the forces are minus the gradient of a convex energy if no law softens: the
+    minimum of the energy over the motions of the plane is convex in the displacements s = Bᵀu / w
+    of the samples where the energy under a fixed plane is. With the stiffness D of the laws, the
+    areas W of the samples and their levers G, closures change by G dq − ds, where
+    (Gᵀ W D G) dq = Gᵀ W D ds. The derivative −B (diag(p'/w) − E Eᵀ) Bᵀ is applied without being
+    assembled: B has few columns (patches) or few rows with entries (nodes of the interface), and E
+    has a column for every free motion. Shear stresses add ∂τ/∂c, with which the derivative is
+    unsymmetric; the shift of the plane under a prescribed shear force is eliminated likewise.
 
     Args:
         face: The contact face with its patches.
-        sampling: Where the laws are evaluated.
+        mode: Where the laws are evaluated.
         laws: One law per patch, or all of them together; the same on every rank.
         gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
+        friction: The friction; None: none.
 
     Attributes:
-        gap: The gap; set it anew where other loads of the body change it.
-        laws: The laws of all patches.
-        levers: Levers of this rank's samples about the middle of the patches.
-        plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
-        control: What the load step prescribes of the plane.
-        slope: p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵].
-        comm: MPI communicator of the mesh.
+        sliders: The sliders of the samples; None without friction.
+        directions: d, the stresses of a sample: 1, or 3 with friction.
+        slope: Stiffness over w of this rank's samples in all directions at the latest `update`,
+            shape (n d,) [N/mm⁵].
+        tangents: Derivatives of (p, τx, τy)/w by closure and slips there, under a plane in a given
+            place, shape (n, d, d) [N/mm⁵].
 
     Note:
         Every method is collective.
@@ -132,111 +71,90 @@ class ContactForces:
     def __init__(
         self,
         face: ContactFace,
-        sampling: Sampling,
+        mode: Mode,
         laws: Sequence[ContactLaw] | ContactLaws,
         gap: Array,
+        friction: Friction | None = None,
     ) -> None:
-        self._face, self._sampling, self.comm = face, sampling, face.comm
-        self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
-        patches = face.patches
-        self.levers = PlaneLevers.at(
-            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
-        )
-        self.gap = gap
-        self.plane: Array = np.zeros(3)
-        self.control = Control(approach=0.0)
-        self._unloaded = False
-        self.slope: Array = np.zeros(len(sampling.weight))  # p'/w
-        self._border: Array = np.zeros((len(sampling.weight), 0))  # E
+        super().__init__(face, face.sampling(mode), laws, gap)
+        self.sliders: FaceSliders | None = None
+        self._operator, self._stresses = self._sampling.operator, self._sampling.values
+        if friction is not None:
+            each: Any = getattr(laws, "laws", laws)
+            self.sliders = FaceSliders(self._sampling, self.levers, each, friction, self.comm)
+            self._operator = face.in_all_directions(mode)
+            self._stresses = self._operator.createVecRight()
+        self.directions = 1 if friction is None else 3
+        self._lines: ShearLines | None = None
+        self.slope: Array = np.zeros(len(self.weight) * self.directions)
+        self.tangents: Array = np.zeros((len(self.weight), self.directions, self.directions))
+        self._border: Array = np.zeros((len(self.weight), 0))  # E
 
     def prescribe(self, control: Control, plane: Array) -> None:
-        """Set what a load step prescribes.
+        """Set what a load step prescribes, of the shear too: without any the plane does not shift.
 
         Args:
-            control: What a load step prescribes. Without any force the plane just touches the
-                surface, wherever displacements bring that: it follows them, and nothing resists.
+            control: What a load step prescribes.
             plane: Where the plane is now, shape (3,).
         """
-        self.control, self.plane = control, control.prescribed(plane)
-        self._unloaded = control.force == 0.0
+        super().prescribe(control, plane)
+        self._lines = None
+        if self.sliders is not None:
+            self.sliders.prescribe(control)
 
-    def closure(self, displacement: PETSc.Vec) -> Array:
-        """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
-        return self.closure_of(self._sampling.displacements(displacement))
-
-    def closure_of(self, displacement: Array) -> Array:
-        """Bring the plane into equilibrium, and return the closures of this rank's samples.
+    def respond(self, closure: Array, displacement: PETSc.Vec) -> SliderResponse | None:
+        """Return the shear stresses at closures and displacements; the plane shifts where free.
 
         Args:
-            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            displacement: Displacements of the body [mm].
 
         Returns:
-            Closures, shape (n,) [mm].
+            The shear stresses; None without friction.
 
         Raises:
-            NotConverged: When nothing can hold the plane.
+            NotConverged: When the contact does not transmit the prescribed shear force.
         """
-        matrix, weight = self.levers.matrix, self._sampling.weight
+        if self.sliders is None:
+            return None
+        pressure, stiffness = self.pressure(closure), self.stiffness(closure)
+        return self.sliders.respond(closure, self.along(displacement), pressure, stiffness)
 
-        def closure(plane: Array) -> Array:
-            # no other order of the sums: first touch is found to the last digit of closures
-            return matrix @ plane - self.gap - displacement
+    def along(self, displacement: PETSc.Vec) -> Array:
+        """Return displacements of samples along the axes of the face, shape (n, 2) [mm].
 
-        def respond(plane: Array) -> PlaneResponse[Array]:
-            closed = closure(plane)
-            return PlaneResponse(
-                loads=self.loads(self.pressure(closed)),
-                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closed)),
-                state=closed,
-            )
-
-        if self._unloaded:
-            slopes = self.plane[1:]
-            approach = first_touch(
-                lambda at: float(respond(np.array([at, *slopes])).loads[0]) > 0.0,
-                self.control,
-                self.levers.half,
-            )
-            self.plane = np.array([approach, *slopes])
-        if not self.control.free.any():
-            return closure(self.plane)
-        self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
-        return closed
-
-    def closure_on_lines(
-        self, displacement: Array, pressure: Callable[[Array], Array], stiffness: Array
-    ) -> Array:
-        """Bring the plane into equilibrium on laws that are lines, and return the closures.
-
-        Args:
-            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
-            pressure: Pressures of the samples [MPa] as linear functions of closures.
-            stiffness: Their stiffnesses, shape (n,) [MPa/mm].
+        Of two bodies they are the differences of both. Nothing follows them without friction, and
+        their shape is (n, 0).
         """
-        levers, free, weight = self.levers, self.control.free, self._sampling.weight
-        closure = levers.matrix @ self.plane - self.gap - displacement
-        if not free.any():
-            return closure
-        missing = self.control.loads - levers.loads(weight * pressure(closure))
-        unit = levers.unit[free]
-        resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
-        scaled = np.linalg.lstsq(
-            resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED
-        )
-        self.plane = self.plane.copy()
-        self.plane[free] += unit * scaled[0]
-        return levers.matrix @ self.plane - self.gap - displacement
+        if self.sliders is None:
+            return np.zeros((len(self.weight), 0))
+        return self._stretched(displacement)[:, 1:] / self.weight[:, None]
+
+    def _stretched(self, displacement: PETSc.Vec) -> Array:
+        """Return w times the displacements of samples against the directions, shape (n, d)."""
+        self._operator.multTranspose(displacement, self._stresses)
+        return self._stresses.array_r.reshape(-1, self.directions).copy()
+
+    # --- the forces
 
     def write(self, displacement: PETSc.Vec, load: PETSc.Vec) -> None:
-        """Write the forces B p(c(u)) at a displacement u.
+        """Write the forces by pressures and shear stresses at a displacement.
 
         Args:
             displacement: u [mm].
             load: Receives the nodal forces [N].
         """
-        samples = self._sampling.values
-        samples.array[:] = self.pressure(self.closure(displacement))
-        self._sampling.operator.mult(samples, load)
+        closure = self.closure(displacement)
+        pressure, shear = self.pressure(closure), np.zeros((len(closure), 0))
+        if self.sliders is not None:
+            at = closure, self.along(displacement), pressure, self.stiffness(closure)
+            shear = self.sliders.respond(*at).stress
+        self.write_stresses(pressure, shear, load)
+
+    def write_stresses(self, pressure: Array, shear: Array, load: PETSc.Vec) -> None:
+        """Write the forces by pressures (n,) and shear stresses (n, d − 1) of the samples."""
+        self._stresses.array[:] = np.column_stack([pressure, shear]).ravel()
+        self._operator.mult(self._stresses, load)
 
     def write_lines(
         self,
@@ -258,12 +176,43 @@ class ContactForces:
             stiffness: Their stiffnesses [MPa/mm].
             load: Receives the nodal forces [N].
             body: Stiffness of the body under all samples, which friction asks for [MPa/mm].
-            shear: Predicted shear stresses, shape (n, 2 or 0) [MPa]; None: those on the last lines.
+            shear: Predicted shear stresses, shape (n, d − 1) [MPa]; None: those on the last lines.
         """
-        samples = self._sampling.values
-        samples.array[:] = pressure
-        self._sampling.operator.mult(samples, load)
-        self.linearise(stiffness)
+        stress, response = np.zeros((len(closure), 0)), None
+        if self.sliders is not None:
+            at = closure, self.along(displacement), pressure, stiffness
+            self._lines = lines = self._shear_lines(self.sliders, *at, body, shear)
+            stress, response = lines.stress, lines.response
+        self.write_stresses(pressure, stress, load)
+        self.linearise(stiffness, response)
+
+    def _shear_lines(
+        self,
+        sliders: FaceSliders,
+        closure: Array,
+        moved: Array,
+        pressure: Array,
+        stiffness: Array,
+        body: float,
+        shear: Array | None,
+    ) -> ShearLines:
+        """Return shear stresses as lines; see `write_lines`.
+
+        Springs stick where pressures on the lines do not transmit the prescribed shear force yet.
+        """
+        if sliders.shifts:
+            at = closure, moved, pressure, stiffness
+            try:
+                found = sliders.respond(*at)
+            except NotConverged:
+                found = sliders.respond(*at, sticks=True)
+            return ShearLines(found.slip, closure, found.stress, found)
+        slip = sliders.slip(moved)
+        respond = partial(sliders.at_slip, closure, np.maximum(pressure, 0.0), stiffness)
+        if shear is None:
+            assert self._lines is not None
+            shear = self._lines.at(slip, closure)
+        return shear_lines(respond, slip, closure, shear, body)
 
     def write_shear_in(
         self,
@@ -276,41 +225,79 @@ class ContactForces:
     ) -> None:
         """Add the work of shear stresses in each of k displacements, none without friction.
 
+        The latest stresses stay where pressures do not transmit the prescribed shear force yet.
+
         Args:
             parts: Receives the work on this rank, and its derivatives by the shares, (> k, k).
             y: Shares of the displacements, shape (k,).
             stretches: What samples move by in each against their directions, times their weights,
-                shape (k, n, 1 or 3) [mm³].
+                shape (k, n, d) [mm³].
             closure: Closures of this rank's samples, shape (n,) [mm].
             pressure: Their pressures on the lines [MPa].
             stiffness: Their stiffnesses [MPa/mm].
         """
-
-    def along(self, displacement: PETSc.Vec) -> Array:
-        """Return displacements along the face that shear stresses follow, none without friction."""
-        return np.zeros((len(self._sampling.weight), 0))
+        if self.sliders is None:
+            return
+        along = stretches[:, :, 1:]
+        moved = np.einsum("k,kni->ni", y, along) / self.weight[:, None]
+        try:
+            found = self.sliders.respond(closure, moved, pressure, stiffness)
+        except NotConverged:
+            parts[0] -= np.einsum("kni,ni->k", along, self.last_shear)
+            return
+        self.linearise(stiffness, found)
+        parts[0] -= np.einsum("kni,ni->k", along, found.stress)
+        changes = np.array([self._stress_change(each)[:, 1:] for each in stretches])
+        parts[1 : len(y) + 1] += np.einsum("kni,lni->kl", along, changes)
 
     @property
     def last_shear(self) -> Array:
-        """Shear stresses of the latest load step, (n, 2) [MPa]; none without friction, (n, 0)."""
-        return np.zeros((len(self._sampling.weight), 0))
+        """Shear stresses of the latest load step, shape (n, d − 1) [MPa]."""
+        return np.zeros((len(self.weight), 0)) if self.sliders is None else self.sliders.stress
 
     def write_last_shear(self, load: PETSc.Vec) -> None:
-        """Write the forces by the shear stresses of the latest load step, none without friction.
+        """Write the forces by the shear stresses of the latest load step.
 
         Args:
             load: Receives the nodal forces [N].
         """
-        load.set(0.0)
+        self.write_stresses(np.zeros(len(self.weight)), self.last_shear, load)
+
+    # --- their derivative
 
     def update(self, displacement: PETSc.Vec) -> None:
         """Move the derivative to a displacement."""
-        self.linearise(self.stiffness(self.closure(displacement)))
+        closure = self.closure(displacement)
+        self.linearise(self.stiffness(closure), self.respond(closure, displacement))
 
-    def linearise(self, stiffness: Array) -> None:
-        """Move the derivative to stiffnesses of this rank's samples, shape (n,) [MPa/mm]."""
-        self.slope = stiffness / self._sampling.weight
-        self._border = self.border(stiffness)
+    def linearise(
+        self,
+        stiffness: Array,
+        response: SliderResponse | None = None,
+        *,
+        by_slip: Array | float = 0.0,
+    ) -> None:
+        """Move the derivative to stiffnesses of the samples; without those of shear none slips.
+
+        Args:
+            stiffness: Stiffnesses of the laws, shape (n,) [MPa/mm].
+            response: The shear stresses, with their stiffnesses.
+            by_slip: Stiffnesses of the shear stresses in its place, shape (n, 2, 2) [MPa/mm].
+        """
+        tangent = np.zeros_like(self.tangents)
+        tangent[:, 0, 0] = stiffness
+        tangent[:, 1:, 1:] = by_slip if response is None else response.by_slip
+        if response is not None:
+            tangent[:, 1:, 0] = response.by_closure
+        slope = np.einsum("nii->ni", tangent).copy()
+        if self.directions > 1:
+            slope[:, 1:] = 0.5 * slope[:, 1:].sum(axis=1, keepdims=True)  # all that springs know
+        self.slope = (slope / self.weight[:, None]).ravel()
+        self.tangents, self._by_slip = tangent / self.weight[:, None, None], tangent[:, 1:, 1:]
+        self._border, closes = self.border(stiffness), stiffness[:, None]
+        self._by_pressure = np.divide(  # of (p, τx, τy) as the plane moves
+            tangent[:, :, 0], closes, out=np.zeros(slope.shape), where=closes > 0.0
+        )
 
     def moved_from(self, slope: Array, elements: float) -> bool:
         """Return whether the stiffness of laws and elements has changed since earlier slopes.
@@ -319,41 +306,35 @@ class ContactForces:
             slope: The earlier ones, as `slope`.
             elements: Stiffness of the elements at the face [MPa/mm].
         """
-        areas = np.repeat(self.weight, len(slope) // max(len(self.weight), 1))
+        areas = np.repeat(self.weight, self.directions)
         body = _SMOOTH * elements
         ratio = (areas * self.slope + body) / (areas * slope + body)
         most = float(np.maximum(ratio, 1.0 / ratio).max(initial=1.0))
         return bool(self.comm.allreduce(most, op=MPI.MAX) > _MOVED)
 
     @property
-    def weight(self) -> Array:
-        """Areas of this rank's samples, shape (n,) [mm²]."""
-        return self._sampling.weight
-
-    @property
     def normal_slope(self) -> Array:
         """p'/w of this rank's samples at the latest `update`, shape (n,) [N/mm⁵]."""
-        return self.slope
+        return self.slope[:: self.directions]
 
     def add_product(self, x: PETSc.Vec, y: PETSc.Vec, known: Array | float = 0.0) -> None:
-        """Add the product B (diag(p'/w) − E Eᵀ) Bᵀ x to y.
+        """Add the product of the derivative with x to y.
 
         Args:
             x: A vector.
             y: What it is added to.
-            known: A part of p'/w that is left out, as y holds its product already, shape (n,).
+            known: A part of `slope` that is left out, as y holds its product already, shape (n d,).
         """
-        self._add_product(x, y, self.slope - known, self._border)
+        stretch = self._stretched(x)
+        self._add_stresses(self._stress_change(stretch).ravel() - known * stretch.ravel(), y)
 
     def add_springs_product(self, slope: Array, x: PETSc.Vec, y: PETSc.Vec) -> None:
-        """Add the product B diag(s) Bᵀ x with other slopes s, shape (n,), to y."""
-        self._add_product(x, y, slope, self._border[:, :0])
+        """Add the product with springs of other slopes, shape (n d,), to y."""
+        self._add_stresses(slope * self._stretched(x).ravel(), y)
 
-    def _add_product(self, x: PETSc.Vec, y: PETSc.Vec, slope: Array, border: Array) -> None:
-        operator, samples = self._sampling.operator, self._sampling.values
-        operator.multTranspose(x, samples)
-        samples.array[:] = self._change(samples.array_r, slope, border)
-        operator.multAdd(samples, y, y)
+    def _add_stresses(self, stresses: Array, y: PETSc.Vec) -> None:
+        self._stresses.array[:] = stresses
+        self._operator.multAdd(self._stresses, y, y)
 
     @property
     def loads_of_motions(self) -> Array:
@@ -373,97 +354,51 @@ class ContactForces:
         Args:
             stretch: What this rank's samples close in by, times their weights, shape (n,) [mm³].
         """
-        return self._change(stretch, self.normal_slope, self._border)
+        return np.asarray(self.normal_slope * stretch - self._parted(stretch))
 
-    def _change(self, stretch: Array, slope: Array, border: Array) -> Array:
-        pressure = slope * stretch
-        if border.shape[1]:
-            pressure -= border @ self.levers.summed(border.T @ stretch)
-        return np.asarray(pressure)
+    def _parted(self, stretch: Array) -> Array:
+        """Return how the plane that follows lessens the change of pressures, shape (n,) [MPa]."""
+        border = self._border
+        if not border.shape[1]:
+            return np.zeros(len(border))
+        return np.asarray(border @ self.levers.summed(border.T @ stretch))
 
-    def pressure(self, closure: Array) -> Array:
-        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
-
-        What a law raises on one rank is raised on all.
-        """
-        return together(self.comm, lambda: self.laws.pressures(self._sampling.patch, closure))
-
-    def stiffness(self, closure: Array) -> Array:
-        """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
-        if self._unloaded:
-            return np.zeros_like(closure)
-        return together(self.comm, lambda: self.laws.stiffnesses(self._sampling.patch, closure))
-
-    def loads(self, pressure: Array) -> Array:
-        """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
+    def _stress_change(self, stretch: Array) -> Array:
+        """Return the change of pressures and shear stresses where samples move, shape (n, d).
 
         Args:
-            pressure: Pressures of this rank's samples, shape (n,) [MPa].
+            stretch: What they move by against the directions, times their weights, (n, d) [mm³].
         """
-        return self.levers.loads(self._sampling.weight * pressure)
+        change = np.einsum("nij,nj->ni", self.tangents, stretch)
+        change -= self._by_pressure * self._parted(stretch[:, 0])[:, None]
+        if self.sliders is not None:
+            change[:, 1:] = self.sliders.with_shift(self._by_slip, change[:, 1:])
+        return change
 
-    def state(self, closure: Array, **known: Any) -> FaceEquilibrium:
-        """Return the contact under the plane as it is now.
+    # --- load steps
+
+    def accept(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
+        """Move the sliders on to the end of a load step that has converged.
+
+        Args:
+            closure: Closures at its end, shape (n,) [mm].
+            displacement: Displacements there [mm].
+
+        Returns:
+            The shear of the face there; None without friction.
+        """
+        found = self.respond(closure, displacement)
+        return self.sliders.accept(found) if self.sliders and found else None
+
+    def shear_state(self, closure: Array, displacement: PETSc.Vec) -> FaceShear | None:
+        """Return the shear of the face at closures and displacements; None without friction.
 
         Args:
             closure: Closures of this rank's samples, shape (n,) [mm].
-            known: What else is known of the state.
+            displacement: Displacements [mm].
         """
-        pressure, areas = self.pressure(closure), self._face.areas
-        (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
-        (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
-        return FaceEquilibrium(
-            plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
-            force=float(force),
-            moment=np.array(moment),
-            patch_force=patch_force,
-            patch_pressure=patch_force / areas,
-            patch_closure=self._sampling.patch_sums(closure) / areas,
-            sample_closure=closure,
-            sample_pressure=pressure,
-            **known,
-        )
-
-    def border(self, stiffness: Array) -> Array:
-        """Return E, shape (n, k'): free motions of the plane reduce D ds by E Eᵀ W ds.
-
-        Args:
-            stiffness: D of this rank's samples, shape (n,) [MPa/mm].
-        """
-        free, unit = self.control.free, self.levers.unit
-        columns = self.levers.scaled(free) * stiffness[:, None]
-        if not free.any():
-            return columns
-        resistance = self.levers.stiffness(self._sampling.weight * stiffness)
-        values, vectors = np.linalg.eigh((resistance * np.outer(unit, unit))[np.ix_(free, free)])
-        supported = values > UNSUPPORTED * max(values[-1], 0.0)
-        return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
-
-
-def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:
-    """Find the largest approach at which a plane is not in contact yet [mm].
-
-    Args:
-        touched: Returns whether the plane is in contact at an approach.
-        control: What is prescribed of the plane, for an error.
-        half: Half the diagonal of the interface [mm].
-
-    Raises:
-        NotConverged: When it never is, or always.
-    """
-    below, above, width = -_FIRST * half, _FIRST * half, np.inf
-    while touched(below):
-        below, above = 3.0 * below, below
-        if below < -_FARTHEST * half:
-            raise plane_failure(control, "NO_RELEASE")
-    while not touched(above):
-        below, above = above, 3.0 * above
-        if above > _FARTHEST * half:
-            raise plane_failure(control, "NO_CONTACT")
-    while 0.0 < above - below < width:  # to neighbouring numbers
-        width, middle = above - below, 0.5 * (below + above)
-        below, above = (below, middle) if touched(middle) else (middle, above)
-    return below
+        found = self.respond(closure, displacement)
+        return self.sliders.shear_of(found) if self.sliders and found else None
 
 
 class AddsProduct(Protocol):

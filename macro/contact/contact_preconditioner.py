@@ -14,7 +14,6 @@ from petsc4py import PETSc
 
 from macro import compat
 from macro.contact.equations import Equilibrium
-from macro.contact.frictional_forces import FrictionalForces
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, springs_at
 from macro.linear_solvers.slow_modes import Balanced
@@ -47,7 +46,7 @@ class ContactPreconditioner:
     def __init__(self, equilibrium: Equilibrium, face: Any, sampling: Sampling) -> None:
         self._equilibrium, self._face, self._sampling = equilibrium, face, sampling
         self._knows_laws = face is not None and equilibrium.body.lattice is None
-        self._rubs = isinstance(equilibrium.forces, FrictionalForces)
+        self._rubs = equilibrium.forces.sliders is not None
         self._with_laws: PETSc.KSP | None = None
         self._stiffened: Stiffened | None = None
         self._turning: Balanced | None = None

@@ -96,7 +96,7 @@ class ContactProblem:
         usual = _FACTORISED if self._equations.matrix.getSize()[0] <= _SMALL else _multigrid(space)
         # multigrid smooths with the shell otherwise, whose tangent moves on
         options = {**usual, "pc_use_amat": False}
-        if any(interface.rubs for interface in self.interfaces):
+        if any(interface.forces.sliders for interface in self.interfaces):
             options |= UNSYMMETRIC
         self._newton = Newton(self._equations, options=options, given=petsc_options, method="gmres")
 

@@ -13,7 +13,7 @@ from macro import compat
 from macro.contact.beside_half_space import BesideHalfSpace
 from macro.contact.contact_preconditioner import ContactPreconditioner
 from macro.contact.equations import Equilibrium
-from macro.contact.frictional_forces import FrictionalForces
+from macro.contact.face_sliders import FaceSliders
 from macro.contact.newton import Newton
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.solvers import solve_linear
@@ -141,25 +141,25 @@ class ContactResponse:
             NotConverged: When the linear solve fails.
         """
         forces = self._equilibrium.forces
-        assert isinstance(forces, FrictionalForces)
-        ahead = forces.sliders.memory.direction
-        forces.linearise_sticking(forces.stiffness(closure), stuck)
+        sliders = forces.sliders
+        assert sliders is not None
+        sliders.hold_shift()
+        forces.linearise(forces.stiffness(closure), by_slip=stuck[:, None, None] * np.eye(2))
+        ahead = sliders.memory.direction
         way = np.broadcast_to(ahead, (len(stuck), 2))
         if beside is None:
             self._preconditioner.update()
-            return self._shear_stiffness(way, stuck, forces)
+            return self._shear_stiffness(way, stuck, sliders)
         stress, iterations = beside.sheared(way, stuck)
-        return float(forces.sliders.total(stress) @ ahead), iterations
+        return float(sliders.total(stress) @ ahead), iterations
 
-    def _shear_stiffness(
-        self, way: Array, stuck: Array, forces: FrictionalForces
-    ) -> tuple[float, int]:
+    def _shear_stiffness(self, way: Array, stuck: Array, sliders: FaceSliders) -> tuple[float, int]:
         """Return what shear stresses by slips (n, 2) do on these, and the linear iterations.
 
         The tangent of springs that stick is symmetric, and the work of what is left of the load
         makes the error one of second order.
         """
-        equilibrium = self._equilibrium
+        equilibrium, forces = self._equilibrium, self._equilibrium.forces
         load, moved = equilibrium.matrix.createVecLeft(), equilibrium.matrix.createVecRight()
         solver, stress = self._newton.snes.ksp, stuck[:, None] * way
         solver.setOperators(equilibrium.tangent, equilibrium.matrix)
@@ -170,7 +170,7 @@ class ContactResponse:
         equilibrium.tangent.mult(moved, left)
         left.aypx(-1.0, load)
         stress = stress - stuck[:, None] * forces.along(moved)
-        work = forces.sliders.total((stress * way).sum(axis=1, keepdims=True))
+        work = sliders.total((stress * way).sum(axis=1, keepdims=True))
         stiffness = float(work[0]) - moved.dot(left)
         compat.collect_garbage(load.comm)
         return stiffness, iterations

@@ -2,7 +2,7 @@
 
 Beside a step between two laws, an edge or a border of contact, pressures change over a few
 elements, and the body is stiffer against that than against pressures everywhere. One stiffness
-of the body (`law_lines`) then sends Newton's method from there to the solution in small steps:
+of the body (`lines`) then sends Newton's method from there to the solution in small steps:
 pressures that the last lines made negative, for one, grow by a factor of two to five a step. So the
 laws are solved there before the next solve of the whole body: on the layer of elements beneath,
 with the rest of the body at rest, under the plane in its equilibrium. Only the lines are taken from
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
-from macro.contact.law_lines import Lines, law_lines
+from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from macro.linear_solvers.options import conjugate_gradients, shell

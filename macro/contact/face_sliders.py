@@ -28,6 +28,8 @@ Indices = NDArray[np.intp]
 _HELD = ShearControl(shift=(0.0, 0.0))
 _SAME_PLACE = 1e-6
 """Distance of a sample from where its sliders were written, relative to the face's size."""
+_UNHELD = 1e-13
+"""Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
 
 class SliderMemory(NamedTuple):
@@ -161,6 +163,11 @@ class FaceSliders:
         self._shift, found = find_shift(respond, self.total, self._shift, self._control, most)
         return found
 
+    @property
+    def stress(self) -> Array:
+        """Shear stresses of the latest load step, shape (n, 2) [MPa]."""
+        return self.memory.stress
+
     def slip(self, moved: Array) -> Array:
         """Return the slips under the shift as it is, shape (n, 2) [mm].
 
@@ -212,6 +219,18 @@ class FaceSliders:
             Shape (k,), the same on every rank.
         """
         return np.asarray(self._comm.allreduce(self._sampling.weight @ values))
+
+    def with_shift(self, by_slip: Array, change: Array) -> Array:
+        """Return changes of shear stresses, the plane shifting where its shear force is prescribed.
+
+        Args:
+            by_slip: Stiffnesses of the stresses, shape (n, 2, 2) [MPa/mm].
+            change: Their changes under a plane that stays, shape (n, 2) [MPa].
+        """
+        if not self.shifts:
+            return change
+        moves = self.total(by_slip.reshape(-1, 4)).reshape(2, 2)
+        return change - by_slip @ np.linalg.lstsq(moves, self.total(change), rcond=_UNHELD)[0]
 
     # --- load steps
 

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from macro.contact.equations import Equilibrium
 from macro.contact.face_layer import FaceLayer
 from macro.contact.initial_guess import DisplacementBasis
-from macro.contact.law_lines import Lines, law_lines
+from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
 from support.errors import NotConverged
 

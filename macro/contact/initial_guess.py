@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
-from macro.contact.law_lines import Lines, law_lines
+from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
 
 Array = NDArray[np.float64]

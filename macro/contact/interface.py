@@ -20,10 +20,10 @@ from geometry.rigid_plane import Control, RigidPlane
 from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
-from macro.contact.contact_forces import ContactLaw, ContactTangent
+from macro.contact.contact_forces import ContactForces, ContactTangent
 from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
 from macro.contact.face_leak import FaceLeak, LeakingFace, face_leak, transmissivities_of
-from macro.contact.frictional_forces import FrictionalForces, contact_forces
+from macro.contact.face_sliders import FaceSliders
 from macro.contact.interface_parts import (
     InterfaceLaws,
     chosen_face,
@@ -31,6 +31,7 @@ from macro.contact.interface_parts import (
     laws_on_face,
 )
 from macro.contact.loaded_face import LoadedFace, Mode
+from macro.contact.pressed_plane import ContactLaw
 from macro.contact.sampling import by_patch, crown_depth
 from macro.linear_solvers.node_matrices import coupled_springs_at, free_unknowns, springs_at
 from macro.mesh.contact_face import ContactFacets
@@ -145,7 +146,7 @@ class Interface:
         self._face = LoadedFace(SimpleNamespace(space=self.space), facets, chosen.patches)
         self.sampling = sampling = self._face.sampling(chosen.mode)
         gap = together(self.comm, lambda: sampling.below(self._crown))
-        self.forces = contact_forces(self._face, chosen.mode, chosen.laws, gap, self._friction)
+        self.forces = ContactForces(self._face, chosen.mode, chosen.laws, gap, self._friction)
         for evaluate in (self.forces.pressure, self.forces.stiffness):  # refuse what is no law
             values = evaluate(-gap)
             if not all(self.comm.allgather(bool(np.isfinite(values).all()))):
@@ -257,10 +258,10 @@ class Interface:
                 allowed="pointwise laws under a plane in a given place; else Interface.tangent",
             )
         self.move_tangent(x)
-        if self.rubs is None:
+        if self.forces.sliders is None:
             self.add_springs(self.forces.slope, matrix)
             return
-        added = coupled_springs_at(self._points_by_free, self.rubs.tangents)
+        added = coupled_springs_at(self._points_by_free, self.forces.tangents)
         matrix.axpy(1.0, added, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
         added.destroy()
 
@@ -325,19 +326,12 @@ class Interface:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
         vector = self._vector(x)
-        closure, shear = self.forces.closure(vector), None
-        if self.rubs is not None:
-            shear = self.rubs.shear_state(closure, vector)
-        area = self._contact_area(closure)
+        closure = self.forces.closure(vector)
+        area, shear = self._contact_area(closure), self.forces.shear_state(closure, vector)
         self._state = self.forces.state(closure, contact_area=area, shear=shear)
         return self._state
 
     # --- friction
-
-    @property
-    def rubs(self) -> FrictionalForces | None:
-        """The forces of the laws where they have friction; None without."""
-        return self.forces if isinstance(self.forces, FrictionalForces) else None
 
     def accept(self, x: Any) -> None:
         """Accept displacements as the end of a load step; later steps start from their slip.
@@ -349,9 +343,9 @@ class Interface:
         Args:
             x: Displacements, as a Function or a vector of PETSc [mm].
         """
-        if self.rubs is not None:
+        if self.forces.sliders is not None:
             vector = self._vector(x)
-            self.rubs.accept(self.forces.closure(vector), vector)
+            self.forces.accept(self.forces.closure(vector), vector)
 
     @property
     def slip_record(self) -> SliderRecord:
@@ -362,11 +356,11 @@ class Interface:
         Raises:
             InputError: Without friction; when it is set, where it is that of another face.
         """
-        return self._rubbing().sliders.record()
+        return self._sliders.record()
 
     @slip_record.setter
     def slip_record(self, record: SliderRecord) -> None:
-        self._rubbing().sliders.restore(record)
+        self._sliders.restore(record)
 
     @property
     def shear_force(self) -> Array:
@@ -398,14 +392,14 @@ class Interface:
         return None if sticks is None or self.area is None else self.area - sticks
 
     def _sheared(self) -> FaceShear:
-        self._rubbing()
-        assert self.state.shear is not None
+        assert self._sliders is not None and self.state.shear is not None
         return self.state.shear
 
-    def _rubbing(self) -> FrictionalForces:
-        if self.rubs is None:
+    @property
+    def _sliders(self) -> FaceSliders:
+        if self.forces.sliders is None:
             raise InputError("the interface has no friction", key="friction", allowed="a number")
-        return self.rubs
+        return self.forces.sliders
 
     @property
     def state(self) -> FaceEquilibrium:
@@ -492,7 +486,7 @@ class Interface:
 
         With friction there are three rows for every point: along both axes as well.
         """
-        face, rubs = self._face, self.rubs is not None
+        face, rubs = self._face, self.forces.sliders is not None
         rows = face.points_in_all_directions if rubs else face.points_by_dofs
         if self._free is None:
             return rows

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from geometry.face_frame import FaceFrame
 from geometry.patches import PatchGrid
 from macro import compat
-from macro.contact.contact_forces import ContactLaw
 from macro.contact.loaded_face import Mode
+from macro.contact.pressed_plane import ContactLaw
 from macro.mesh.contact_face import ContactFacets, contact_facets
 from macro.mesh.facets import facet_indices, facet_outline
 from macro.mesh.tagged import FLAT_IN_FILES, TaggedMesh, bounding_box, planar_face

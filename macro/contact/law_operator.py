@@ -42,11 +42,11 @@ class LawsAtPoints:
             raise InputError(
                 "an external operator holds at points", value=interface.mode, allowed="pointwise"
             )
-        if interface.rubs is not None:
+        if interface.forces.sliders is not None:
             raise InputError(
                 "an external operator knows pressures alone",
                 key="friction",
-                value=interface.rubs.sliders.friction.coefficient,
+                value=interface.forces.sliders.friction.coefficient,
                 allowed="no friction; or Interface.add_residual and ContactProblem",
             )
         self._interface = interface

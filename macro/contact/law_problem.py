@@ -18,18 +18,18 @@ from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.beside_half_space import BesideHalfSpace
-from macro.contact.contact_forces import ContactLaw, ContactLaws
+from macro.contact.contact_forces import ContactForces
 from macro.contact.contact_preconditioner import ContactPreconditioner
 from macro.contact.contact_response import ApproachResponse, ContactResponse
 from macro.contact.equations import Equilibrium
-from macro.contact.face_equilibrium import FaceEquilibrium, FaceShear
+from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_layer import FaceLayer
 from macro.contact.face_sliders import SliderMemory
 from macro.contact.first_steps import FirstSteps
-from macro.contact.frictional_forces import FrictionalForces, contact_forces, sliders_of
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
+from macro.contact.pressed_plane import ContactLaw, ContactLaws
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
@@ -90,9 +90,8 @@ class LawContactProblem:
         self._undeformed_gap = together(face.comm, lambda: sampling.below(crown))
         self._flat_gap = self._undeformed_gap
         self._preload: Array | None = None
-        self._flat_preload: Array = np.zeros((len(sampling.weight), 2))
-        self.forces = contact_forces(face, mode, laws, self._undeformed_gap, friction)
-        self._sliders = sliders_of(self.forces)
+        self.forces = ContactForces(face, mode, laws, self._undeformed_gap, friction)
+        self._sliders = self.forces.sliders
         self.equilibrium = Equilibrium(body, self.forces)
         self._beside = None
         if opposite is not None:
@@ -154,7 +153,9 @@ class LawContactProblem:
         residuals, spent = self._first_steps.take(self.newton.snes.ksp, solution, self.basis)
         report = self.newton.solve(solution, f"the block at {control}", self._remedies)
         self._closure, body = self.forces.closure(solution), equilibrium.body
-        shear = self._accepted(solution)
+        shear = self.forces.accept(self._closure, solution)
+        if shear is not None:
+            self._stuck = shear.stuck
         self.basis.add(solution, self.forces.pressure(self._closure), self.forces.last_shear)
         self._plane = self.forces.plane.copy()
         state = self.forces.state(
@@ -172,15 +173,6 @@ class LawContactProblem:
 
     def _with_preload(self, displacement: Array) -> Array:
         return displacement if self._preload is None else displacement + self._preload
-
-    def _accepted(self, solution: PETSc.Vec) -> FaceShear | None:
-        """Move sliders on to a solution, and return its shear; None without friction."""
-        forces = self.forces
-        if not isinstance(forces, FrictionalForces):
-            return None
-        shear = forces.accept(self._closure, solution)
-        self._stuck = shear.stuck
-        return shear
 
     @property
     def sampling(self) -> Sampling:
@@ -309,9 +301,8 @@ class LawContactProblem:
             moved.array[:] = self._preload
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
             self._flat_gap = self.forces.gap
-            if isinstance(self.forces, FrictionalForces):
-                self._flat_preload = self.forces.along(moved)
-                self.forces.sliders.preload = self._flat_preload
+            if self._sliders:
+                self._sliders.preload = self.forces.along(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

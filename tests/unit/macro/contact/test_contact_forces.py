@@ -3,7 +3,7 @@
 import pytest
 
 from geometry import Control, NotConverged
-from macro.contact.contact_forces import first_touch
+from macro.contact.pressed_plane import first_touch
 
 NO_FORCE = Control(force=0.0)
 

@@ -10,7 +10,7 @@ from geometry.patches import PatchGrid
 from geometry.rigid_plane import Control
 from macro import LawContactProblem, Material
 from macro.contact.face_layer import FaceLayer
-from macro.contact.law_lines import law_lines
+from macro.contact.lines import law_lines
 
 HALVES = PatchGrid(grid=(2, 1), lengths=(3.0, 1.0))
 SOFT = Material(young_modulus=1000.0, poisson_ratio=0.3)

@@ -6,7 +6,7 @@ from scipy.optimize import root
 
 from geometry.sliders import Sliders
 from geometry.spring_bed import springs_of_law
-from macro.contact.shear_lines import shear_lines
+from macro.contact.lines import shear_lines
 
 
 class Square:

@@ -1,0 +1,288 @@
+"""A rigid plane pressed on a face by contact laws: closures, pressures, equilibrium.
+
+Theory: section 11 of ``docs/theory.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from petsc4py import PETSc
+
+from geometry.plane_equilibrium import UNSUPPORTED, PlaneResponse, find_equilibrium
+from geometry.rigid_plane import Control, PlaneLevers, RigidPlane, plane_failure
+from macro.contact.face_equilibrium import FaceEquilibrium
+from macro.contact.loaded_face import ContactFace
+from macro.contact.sampling import Sampling, by_patch
+from support.arrays import Array, Indices
+from support.collective import together
+
+_FIRST, _FARTHEST = 1e-6, 1e3
+"""First and last approach that first touch is looked for at, in halves of the diagonal."""
+
+
+class ContactLaw(Protocol):
+    """Contact pressure p of a patch as a function of its closure c.
+
+    Closure is the approach of the plane minus the downward displacement of the block's surface
+    [mm]. Pressures are positive in compression [MPa], and the stiffness is dp/dc ≥ 0 [MPa/mm]. Both
+    must be defined for every closure, because Newton's iterates may leave the range of a tabulated
+    law: whoever tabulates laws extends them and checks the converged closures.
+    """
+
+    def pressure(self, closure: Array, /) -> Array:
+        """Return the pressures at closures of shape (n,)."""
+        ...
+
+    def stiffness(self, closure: Array, /) -> Array:
+        """Return the exact derivative of the pressures at closures of shape (n,)."""
+        ...
+
+
+@runtime_checkable
+class ContactLaws(Protocol):
+    """The laws of all patches, evaluated together: as quick for many patches as for one."""
+
+    def __len__(self) -> int:
+        """Return the number of patches."""
+        ...
+
+    def pressures(self, patch: Indices, closure: Array, /) -> Array:
+        """Return the pressures at closures of patches, shape (n,) [MPa]; see `ContactLaw`."""
+        ...
+
+    def stiffnesses(self, patch: Indices, closure: Array, /) -> Array:
+        """Return the exact derivatives of the pressures, shape (n,) [MPa/mm]."""
+        ...
+
+
+class SingleLaws:
+    """The laws of patches, evaluated one by one, and checked: they may be a user's functions.
+
+    Args:
+        laws: One law per patch.
+    """
+
+    def __init__(self, laws: Sequence[ContactLaw]) -> None:
+        self._pressures = [law.pressure for law in laws]
+        self._stiffnesses = [law.stiffness for law in laws]
+
+    def __len__(self) -> int:
+        return len(self._pressures)
+
+    def pressures(self, patch: Indices, closure: Array) -> Array:
+        """Return the pressures at closures of patches, see `ContactLaws.pressures`."""
+        return by_patch(self._pressures, patch, closure)
+
+    def stiffnesses(self, patch: Indices, closure: Array) -> Array:
+        """Return the stiffnesses at closures of patches, see `ContactLaws.stiffnesses`."""
+        return by_patch(self._stiffnesses, patch, closure)
+
+
+class PressedPlane:
+    """A rigid plane on contact laws at the samples of a face, in equilibrium with its loads.
+
+    Closures are c = δ − g − s, with the approach δ of the plane at the samples, the macroscopic gap
+    g and the downward displacement s of the samples. Free motions of the plane follow from s: the
+    force is the prescribed one, and there is no moment about the middle of the patches.
+
+    Args:
+        face: The contact face with its patches.
+        sampling: Where the laws are evaluated.
+        laws: One law per patch, or all of them together; the same on every rank.
+        gap: Macroscopic gap between plane and face at this rank's samples, shape (n,) [mm].
+
+    Attributes:
+        gap: The gap; set it anew where other loads of the body change it.
+        laws: The laws of all patches.
+        levers: Levers of this rank's samples about the middle of the patches.
+        weight: Areas of this rank's samples, shape (n,) [mm²].
+        plane: Approach at the middle of the patches [mm] and slopes along x and y, shape (3,).
+        control: What the load step prescribes of the plane.
+        comm: MPI communicator of the mesh.
+
+    Note:
+        Every method is collective.
+    """
+
+    def __init__(
+        self,
+        face: ContactFace,
+        sampling: Sampling,
+        laws: Sequence[ContactLaw] | ContactLaws,
+        gap: Array,
+    ) -> None:
+        self._face, self._sampling, self.comm = face, sampling, face.comm
+        self.laws = laws if isinstance(laws, ContactLaws) else SingleLaws(laws)
+        self.weight, patches = sampling.weight, face.patches
+        self.levers = PlaneLevers.at(
+            sampling.x, sampling.y, patches.lengths, centre=patches.middle, comm=self.comm
+        )
+        self.gap = gap
+        self.plane: Array = np.zeros(3)
+        self.control = Control(approach=0.0)
+        self._unloaded = False
+
+    def prescribe(self, control: Control, plane: Array) -> None:
+        """Set what a load step prescribes.
+
+        Args:
+            control: What a load step prescribes. Without any force the plane just touches the
+                surface, wherever displacements bring that: it follows them, and nothing resists.
+            plane: Where the plane is now, shape (3,).
+        """
+        self.control, self.plane = control, control.prescribed(plane)
+        self._unloaded = control.force == 0.0
+
+    def closure(self, displacement: PETSc.Vec) -> Array:
+        """Bring the plane into equilibrium, and return this rank's closures, shape (n,) [mm]."""
+        return self.closure_of(self._sampling.displacements(displacement))
+
+    def closure_of(self, displacement: Array) -> Array:
+        """Bring the plane into equilibrium, and return the closures of this rank's samples.
+
+        Args:
+            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+
+        Returns:
+            Closures, shape (n,) [mm].
+
+        Raises:
+            NotConverged: When nothing can hold the plane.
+        """
+        matrix, weight = self.levers.matrix, self.weight
+
+        def closure(plane: Array) -> Array:
+            # no other order of the sums: first touch is found to the last digit of closures
+            return matrix @ plane - self.gap - displacement
+
+        def respond(plane: Array) -> PlaneResponse[Array]:
+            closed = closure(plane)
+            return PlaneResponse(
+                loads=self.loads(self.pressure(closed)),
+                stiffness=lambda: self.levers.stiffness(weight * self.stiffness(closed)),
+                state=closed,
+            )
+
+        if self._unloaded:
+            slopes = self.plane[1:]
+            approach = first_touch(
+                lambda at: float(respond(np.array([at, *slopes])).loads[0]) > 0.0,
+                self.control,
+                self.levers.half,
+            )
+            self.plane = np.array([approach, *slopes])
+        if not self.control.free.any():
+            return closure(self.plane)
+        self.plane, closed = find_equilibrium(respond, self.control, self.plane, self.levers.half)
+        return closed
+
+    def closure_on_lines(
+        self, displacement: Array, pressure: Callable[[Array], Array], stiffness: Array
+    ) -> Array:
+        """Bring the plane into equilibrium on laws that are lines, and return the closures.
+
+        Args:
+            displacement: Downward displacements of this rank's samples, shape (n,) [mm].
+            pressure: Pressures of the samples [MPa] as linear functions of closures.
+            stiffness: Their stiffnesses, shape (n,) [MPa/mm].
+        """
+        levers, free, weight = self.levers, self.control.free, self.weight
+        closure = levers.matrix @ self.plane - self.gap - displacement
+        if not free.any():
+            return closure
+        missing = self.control.loads - levers.loads(weight * pressure(closure))
+        unit = levers.unit[free]
+        resistance = levers.stiffness(weight * stiffness)[np.ix_(free, free)]
+        scaled = np.linalg.lstsq(
+            resistance * np.outer(unit, unit), unit * missing[free], UNSUPPORTED
+        )
+        self.plane = self.plane.copy()
+        self.plane[free] += unit * scaled[0]
+        return levers.matrix @ self.plane - self.gap - displacement
+
+    def pressure(self, closure: Array) -> Array:
+        """Return the laws' pressures at this rank's samples, shape (n,) [MPa].
+
+        What a law raises on one rank is raised on all.
+        """
+        return together(self.comm, lambda: self.laws.pressures(self._sampling.patch, closure))
+
+    def stiffness(self, closure: Array) -> Array:
+        """Return the laws' stiffnesses dp/dc likewise, none without force, (n,) [MPa/mm]."""
+        if self._unloaded:
+            return np.zeros_like(closure)
+        return together(self.comm, lambda: self.laws.stiffnesses(self._sampling.patch, closure))
+
+    def loads(self, pressure: Array) -> Array:
+        """Return force and first moments about the middle of pressures, shape (3,) [N, N mm].
+
+        Args:
+            pressure: Pressures of this rank's samples, shape (n,) [MPa].
+        """
+        return self.levers.loads(self.weight * pressure)
+
+    def state(self, closure: Array, **known: Any) -> FaceEquilibrium:
+        """Return the contact under the plane as it is now.
+
+        Args:
+            closure: Closures of this rank's samples, shape (n,) [mm].
+            known: What else is known of the state.
+        """
+        pressure, areas = self.pressure(closure), self._face.areas
+        (force, *moment), patch_force = self.loads(pressure), self._sampling.patch_sums(pressure)
+        (approach, *tilt), (xc, yc) = map(float, self.plane), map(float, self._face.patches.middle)
+        return FaceEquilibrium(
+            plane=RigidPlane(approach=approach, tilt=(tilt[0], tilt[1]), centre=(xc, yc)),
+            force=float(force),
+            moment=np.array(moment),
+            patch_force=patch_force,
+            patch_pressure=patch_force / areas,
+            patch_closure=self._sampling.patch_sums(closure) / areas,
+            sample_closure=closure,
+            sample_pressure=pressure,
+            **known,
+        )
+
+    def border(self, stiffness: Array) -> Array:
+        """Return E, shape (n, k'): free motions of the plane reduce D ds by E Eᵀ W ds.
+
+        Args:
+            stiffness: D of this rank's samples, shape (n,) [MPa/mm].
+        """
+        free, unit = self.control.free, self.levers.unit
+        columns = self.levers.scaled(free) * stiffness[:, None]
+        if not free.any():
+            return columns
+        resistance = self.levers.stiffness(self.weight * stiffness)
+        values, vectors = np.linalg.eigh((resistance * np.outer(unit, unit))[np.ix_(free, free)])
+        supported = values > UNSUPPORTED * max(values[-1], 0.0)
+        return columns @ (vectors[:, supported] / np.sqrt(values[supported]))
+
+
+def first_touch(touched: Callable[[float], bool], control: Control, half: float) -> float:
+    """Find the largest approach at which a plane is not in contact yet [mm].
+
+    Args:
+        touched: Returns whether the plane is in contact at an approach.
+        control: What is prescribed of the plane, for an error.
+        half: Half the diagonal of the interface [mm].
+
+    Raises:
+        NotConverged: When it never is, or always.
+    """
+    below, above, width = -_FIRST * half, _FIRST * half, np.inf
+    while touched(below):
+        below, above = 3.0 * below, below
+        if below < -_FARTHEST * half:
+            raise plane_failure(control, "NO_RELEASE")
+    while not touched(above):
+        below, above = above, 3.0 * above
+        if above > _FARTHEST * half:
+            raise plane_failure(control, "NO_CONTACT")
+    while 0.0 < above - below < width:  # to neighbouring numbers
+        width, middle = above - below, 0.5 * (below + above)
+        below, above = (below, middle) if touched(middle) else (middle, above)
+    return below
