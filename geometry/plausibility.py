@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from geometry.statistics import roughness
+from geometry.statistics import derivatives
 from geometry.surface import Surface
 from support.checks import is_level
 from support.errors import InputError
@@ -41,7 +43,7 @@ def rms_gradient(surface: Surface) -> float:
     """
     kept = vars(surface)  # not a field: another surface has another one
     if "rms_gradient" not in kept:
-        kept["rms_gradient"] = roughness(surface).sdq
+        kept["rms_gradient"] = math.sqrt(sum(derivatives(surface)[:2]))
     return float(kept["rms_gradient"])
 
 

@@ -95,7 +95,7 @@ def roughness(surface: Surface) -> Roughness:
     square = h * h  # powers of arrays are slow
     variance = float(np.mean(square))
     flat = np.ptp(h) <= 1e-14 * np.abs(surface.heights).max()
-    xx, yy, x4, y4, laplacian = _spectral(surface) if surface.periodic else _differences(surface)
+    xx, yy, x4, y4, laplacian = derivatives(surface)
     return Roughness(
         sa=float(np.mean(np.abs(h))),
         sq=math.sqrt(variance),
@@ -158,17 +158,32 @@ def _power(h: Array) -> Array:
     return np.abs(scipy.fft.fft2(h, norm="forward", workers=cores())) ** 2
 
 
+def derivatives(surface: Surface) -> list[float]:
+    """Return the means of squares <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²>; see `roughness`.
+
+    Args:
+        surface: The surface.
+    """
+    return _spectral(surface) if surface.periodic else _differences(surface)
+
+
 def _spectral(surface: Surface) -> list[float]:
-    """Return <h_x²>, <h_y²>, <h_xx²>, <h_yy²>, <(∇²h)²> of the trigonometric interpolant."""
-    power = _power(surface.heights - surface.mean_height)
+    """Return these means of the trigonometric interpolant."""
+    waves = scipy.fft.rfft2(
+        surface.heights - surface.mean_height, norm="forward", overwrite_x=True, workers=cores()
+    )
+    power = np.square(waves.real)
+    power += np.square(waves.imag)
+    power[:, 1 : (surface.grid[1] + 1) // 2] *= 2.0  # waves of the other half
     x, y = (wavenumber.ravel() ** 2 for wavenumber in _wavenumbers(surface))
+    y = y[: power.shape[1]]
     along_x, along_y = power.sum(axis=1), power.sum(axis=0)
     xx, yy, mixed = float(along_x @ x**2), float(along_y @ y**2), float(x @ power @ y)
     return [float(along_x @ x), float(along_y @ y), xx, yy, xx + 2.0 * mixed + yy]
 
 
 def _differences(surface: Surface) -> list[float]:
-    """Return the same means from central differences over the inner cells."""
+    """Return these means from central differences over the inner cells."""
     h, (dx, dy) = surface.heights, surface.spacing
     x = (h[2:, :] - h[:-2, :]) / (2.0 * dx)
     y = (h[:, 2:] - h[:, :-2]) / (2.0 * dy)

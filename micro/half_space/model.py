@@ -32,7 +32,7 @@ from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices
 from support.checks import of_kind
-from support.cores import blas_threads
+from support.cores import BLOCK, blas_threads, blocks, in_threads
 from support.errors import InputError
 
 _REST, _LEAST_REST = 500.0, 1e-7
@@ -297,11 +297,17 @@ class HalfSpaceModel:
         Returns:
             The interference, shape (nx, ny) [mm]; negative where there is a gap.
         """
-        surface = self.surface
-        below = self.reference_height - surface.heights
-        if depth is not None:
-            below += depth
-        return np.asarray(plane.at(surface.x[:, None], surface.y) - below)
+        surface, highest = self.surface, self.reference_height
+        found = np.empty(surface.grid)
+
+        def work(rows: slice) -> None:
+            below = highest - surface.heights[rows]
+            if depth is not None:
+                below += depth[rows]
+            np.subtract(plane.at(surface.x[rows, None], surface.y), below, out=found[rows])
+
+        in_threads(work, blocks(surface.grid[0], BLOCK // (8 * surface.grid[1])))
+        return found
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:
         """Return dF/dδ on the side that the plane came from; see `MicroModel.stiffness`."""
