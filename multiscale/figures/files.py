@@ -87,6 +87,16 @@ def pictures_of(drawing: Drawing) -> Pictures:
     return Pictures({f"{drawing.name}.{kind}": content for kind, content in contents.items()})
 
 
+def load_without_help() -> None:
+    """Load matplotlib without the help on its artists, which takes a third of the time to load.
+
+    For processes in which nobody asks for help. Where matplotlib is missing, drawing says so.
+    """
+    if "matplotlib.artist" not in sys.modules:
+        with suppress(ImportError):
+            vars(import_module("matplotlib.artist"))["kwdoc"] = lambda _: ""
+
+
 def write_pictures(folder: Path, drawn: Pictures) -> list[Path]:
     """Write the files of figures.
 
@@ -193,6 +203,7 @@ def serve(handles: Sequence[int]) -> None:
     Args:
         handles: Numbers of the files that are these ends; each gets a process.
     """
+    load_without_help()
     with suppress(Exception):  # it is told with the first figure
         for module in ("contact", "curves", "surface"):
             import_module(f"multiscale.figures.{module}")

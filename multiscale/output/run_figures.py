@@ -13,7 +13,14 @@ from typing import Any
 
 from multiscale.couplings.coupling import Coupling
 from multiscale.figures.contact_scales import ContactScales
-from multiscale.figures.files import Drawing, FigureProcess, Pictures, file_kinds, pictures_of
+from multiscale.figures.files import (
+    Drawing,
+    FigureProcess,
+    Pictures,
+    file_kinds,
+    load_without_help,
+    pictures_of,
+)
 from multiscale.output.report import CONTACT_OF_STEP, shown_contacts
 from multiscale.results.contact_record import ContactRecord
 from multiscale.run import Run
@@ -60,10 +67,12 @@ class RunFigures:
     def __init__(self, scene: Scene, comm: Any) -> None:
         self._figures, self._comm = scene.output.figures, comm
         self._process: FigureProcess | None = None
+        self._by_command = False
         self._begun: dict[str, Future[Pictures]] = {}
 
     def __enter__(self) -> RunFigures:
         """Start the processes that draw, which load what they need while the run is set up."""
+        self._by_command = True
         if self._figures and self._comm is None and (count := cores()) > 1:
             with suppress(OSError):  # none can be started, and figures are drawn here
                 self._process = FigureProcess(min(count, _MOST_PROCESSES))
@@ -102,6 +111,8 @@ class RunFigures:
         with run.clock.phase("output"):
             drawings = [*self._after_load_steps(run), *self._before_load_steps(run)]
             if self._process is None:
+                if self._by_command:
+                    load_without_help()
                 comm = self._comm
                 return shared(comm, len(drawings), lambda index: pictures_of(drawings[index]))
             ahead = []

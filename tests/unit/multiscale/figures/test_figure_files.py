@@ -8,11 +8,20 @@ from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
+from matplotlib.artist import kwdoc
+from matplotlib.lines import Line2D
 
 from geometry import PatchGrid, Spectrum, synthesise
 from multiscale.cli.command_line import main
 from multiscale.figures import style
-from multiscale.figures.files import Drawing, FigureProcess, Pictures, file_kinds, pictures_of
+from multiscale.figures.files import (
+    Drawing,
+    FigureProcess,
+    Pictures,
+    file_kinds,
+    load_without_help,
+    pictures_of,
+)
 from multiscale.figures.surface import surface_figure
 
 PAPER = "demos/scenes/paper.toml"
@@ -166,3 +175,8 @@ def test_no_label_is_cut(lengths, size):
         for box in (axes.get_tightbbox(), *(label.get_window_extent() for label in labels)):
             assert box.x0 >= 0.0 and box.y0 >= 0.0 and box.x1 <= width and box.y1 <= height
     assert figure.get_size_inches()[0] == style.FULL_WIDTH and figure.get_size_inches()[1] < 8.0
+
+
+def test_a_matplotlib_that_somebody_has_loaded_keeps_its_help():
+    load_without_help()
+    assert "linewidth" in kwdoc(Line2D)
