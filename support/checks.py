@@ -144,6 +144,8 @@ def real_array(value: Any) -> Array:
     Raises:
         InputError: When it has a unit, or is complex, logical, ragged, or of objects.
     """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value  # 20 µs less, which laws of users are asked for at every closure
     allowed = "whole or floating-point numbers"
     for unit in (getattr(value, "units", None), getattr(value, "unit", None)):
         if unit is not None:  # of pint, astropy or xarray

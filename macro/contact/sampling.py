@@ -108,7 +108,7 @@ def by_patch(
     """
     values = np.empty_like(closure)
     ends = np.searchsorted(patch, np.arange(len(functions) + 1))
-    for i in np.unique(patch):
+    for i in np.flatnonzero(np.diff(ends)):
         part = slice(ends[i], ends[i + 1])
         values[part] = _one_each(functions[i](closure[part]), closure[part], f"law {i}")
     return values
@@ -147,4 +147,4 @@ def _one_each(values: Any, points: Array, what: str) -> Array:
             value=numbers.shape,
             allowed=str(points.shape),
         )
-    return np.broadcast_to(numbers, points.shape)
+    return numbers if numbers.shape else np.broadcast_to(numbers, points.shape)

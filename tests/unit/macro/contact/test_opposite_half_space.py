@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers.block_cases import block_of
+from scipy.linalg import lu_factor, lu_solve
 
 from geometry import Control, Friction, Material, MaterialPair, PatchGrid, ShearControl
 from macro import LawContactProblem, LoadedFace
@@ -147,14 +148,14 @@ def test_a_flat_punch_on_a_half_space_that_is_far_softer_than_springs():
     errors = [
         pressed(face_of(cells), 1e7, Control(approach=APPROACH), opposite=5e-3)[1].force / expected
         - 1
-        for cells in (4, 8)
+        for cells in (2, 4)
     ]
-    assert 0.0 < errors[1] < errors[0]  # squares of the border reach beyond the face
-    assert errors[1] < 0.05
+    assert 0.0 < errors[1] < 0.5 * errors[0]  # squares of the border reach beyond the face
+    assert errors[1] < 0.065
 
 
-RATIOS = {1e-4: 0.134014784, 1e-2: 13.121229, 1.0: 521.210092, 1e2: 909.79741, 1e4: 916.844654}
-"""Forces on steep springs by moduli of the half-space over that of the body. From 1e-2 on they are
+RATIOS = {1e-4: 0.134014784, 1.0: 521.210092, 1e4: 916.844654}
+"""Forces on steep springs by moduli of the half-space over that of the body. From 1 on they are
 those that Newton's method on the displacements of the half-space found, another algorithm."""
 
 
@@ -216,7 +217,7 @@ def rubbed(face, control, *, opposite=COMPLIANCE, nu=NU, friction=10.0):
     return state, problem.tangential_stiffness()[0]
 
 
-def rigid_square_on_springs(nu, compliance, n=24):
+def rigid_square_on_springs(nu, compliance, n=16):
     """Return normal and shear force of a rigid square on springs on a half-space, by squares.
 
     Pressures and tractions in turn until they agree, each by a dense matrix.
@@ -232,13 +233,14 @@ def rigid_square_on_springs(nu, compliance, n=24):
     xy = xy * np.sign(di) * np.sign(dj)
     along = np.block([[xx, xy], [xy, yy]]) + RATIO / STIFF * np.eye(2 * n * n)
     cross = CrossCompliance((n, n), spacing, pair, periodic=False)
+    normal, along = lu_factor(normal), lu_factor(along)
     traction = np.zeros((2, n, n))
     for _ in range(12):
         # the half-space bears the opposite traction, and its sideways displacement adds to the slip
         across = -cross.across(traction).ravel()
-        pressure = np.linalg.solve(normal, APPROACH - across).reshape(n, n)
+        pressure = lu_solve(normal, APPROACH - across).reshape(n, n)
         slip = np.array([SHIFT, 0.0])[:, None, None] + cross.sideways(pressure)
-        traction = np.linalg.solve(along, slip.ravel()).reshape(2, n, n)
+        traction = lu_solve(along, slip.ravel()).reshape(2, n, n)
     return pressure.mean(), traction[0].mean()
 
 
@@ -257,7 +259,7 @@ def test_a_rigid_body_shears_a_half_space_as_dense_matrices_say(nu, opposite):
     assert stiffness < 0.9 * rigid
 
 
-@pytest.mark.parametrize("ratio", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("ratio", [1e-3, 1e3])
 def test_with_friction_too_a_body_is_solved_for_a_few_times(ratio):
     """The solutions of both load steps together."""
     opposite, control = (1.0 - NU**2) / (STIFF * 10.0 * ratio), Control(approach=APPROACH)
@@ -277,7 +279,7 @@ def test_sliding_on_a_half_space_far_softer_than_springs_is_that_of_a_punch_with
     scaled = []
     for softer in (1e3, 1e4):  # than springs under the whole face
         control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
-        state, _ = rubbed(face_of(2), control, opposite=softer / STIFF, friction=0.3)
+        state, _ = rubbed(face_of(1), control, opposite=softer / STIFF, friction=0.3)
         scaled.append(softer * np.array([state.force, state.shear.force[0]]))
         assert 0.0 < state.shear.force[0] < 0.3 * state.force
     np.testing.assert_allclose(*scaled, rtol=0.02)  # the springs' share

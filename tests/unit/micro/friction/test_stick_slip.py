@@ -38,6 +38,8 @@ def oracle(made, matrix, motion=(0.0, 0.0), steps=20000):
     for number in range(steps):
         left = shift - (matrix @ ahead.ravel()).reshape(2, -1)
         moved = made.within_bounds(ahead + step * left)
+        if np.abs(moved - ahead).max() < 1e-14:  # rounding: the steps to come change nothing
+            return moved
         restart = float(np.vdot(left, moved - now)) < 0.0
         ahead = moved if restart else moved + number / (number + 3.0) * (moved - now)
         now = moved
