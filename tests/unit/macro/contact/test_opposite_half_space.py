@@ -217,7 +217,7 @@ def rubbed(face, control, *, opposite=COMPLIANCE, nu=NU, friction=10.0):
     return state, problem.tangential_stiffness()[0]
 
 
-def rigid_square_on_springs(nu, compliance, n=16):
+def rigid_square_on_springs(nu, compliance, n=24):
     """Return normal and shear force of a rigid square on springs on a half-space, by squares.
 
     Pressures and tractions in turn until they agree, each by a dense matrix.

@@ -4,9 +4,13 @@ import csv
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from multiscale.cli import main
+
+PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
     "surface.grid=[32, 32]", "block.cells=[4, 4, 3]", "load.steps=2", "output.figures=false",
     "output.report=false", "output.check=none",
@@ -18,7 +22,7 @@ def patchlaw(root, tmp_path):
     def run(*options, environment=None, settings=()):
         words = [
             "run",
-            "demos/scenes/paper.toml",
+            PAPER,
             "--out",
             tmp_path,
             "--set",
@@ -39,9 +43,10 @@ def patchlaw(root, tmp_path):
     return run
 
 
-def history(folder):
+def iterations(folder):
+    """Return the linear iterations of all load steps."""
     with (folder / "history.csv").open(encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        return [int(row["linear_iterations"]) for row in csv.DictReader(file)]
 
 
 def test_options_reach_the_solver_and_a_misspelt_one_is_named(patchlaw, tmp_path):
@@ -50,9 +55,9 @@ def test_options_reach_the_solver_and_a_misspelt_one_is_named(patchlaw, tmp_path
     assert "SNES Function norm" in watched.stdout
     assert "unused database option" in watched.stdout  # the misspelt one, at the end
     assert "-patchlaw_ksp_tpye" in watched.stdout
-    tight = [int(row["linear_iterations"]) for row in history(tmp_path)]
+    tight = iterations(tmp_path)
     assert patchlaw("-patchlaw_ksp_rtol", "1e-2").returncode == 0
-    loose = [int(row["linear_iterations"]) for row in history(tmp_path)]
+    loose = iterations(tmp_path)
     assert tight[-1] > 1.5 * loose[-1], (tight, loose)
 
 
@@ -60,23 +65,19 @@ ISOLATED = ["coupling.kind=isolated"]
 
 
 def test_options_in_the_environment_take_the_mesh_as_those_behind_dashes_do(patchlaw, tmp_path):
-    found = []
+    """And a log of PETSc is printed."""
+    assert main(["run", PAPER, "--out", str(tmp_path), "--set", *SMALL, *ISOLATED]) == 0
+    found = [iterations(tmp_path)]
     for options, variable in (
-        ((), ""),
         ((), "-patchlaw_ksp_rtol 1e-4"),
-        (("-ksp_rtol", "1e-4"), ""),
+        (("-ksp_rtol", "1e-4", "-log_view"), ""),
     ):
         done = patchlaw(*options, environment={"PETSC_OPTIONS": variable}, settings=ISOLATED)
         assert done.returncode == 0, done.stderr
-        found.append([int(row["linear_iterations"]) for row in history(tmp_path)])
+        found.append(iterations(tmp_path))
     alone, environment, dashes = found
     assert environment == dashes
     assert min(environment) > 2 * max(alone)  # of the compliance, which needs no mesh
-
-
-def test_a_log_of_petsc_is_printed(patchlaw):
-    done = patchlaw("-log_view", settings=[*ISOLATED, "coupling.newton=full"])
-    assert done.returncode == 0, done.stderr
     assert {"MatMult", "KSPSolve", "PCApply"} <= set(done.stdout.split())
 
 

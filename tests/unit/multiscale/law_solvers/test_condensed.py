@@ -24,7 +24,8 @@ FORCES = {"approach": {}, "force": {"force": "2 N", "approach": None}}
 
 
 def scene(*overrides, **load):
-    data = Scene.load(PAPER, [*SMALL, *overrides]).to_dict()
+    laws = [] if "coupling.kind=analytic" in overrides else ["coupling.table_tolerance=0.01"]
+    data = Scene.load(PAPER, [*SMALL, *laws, *overrides]).to_dict()
     data["load"] |= load
     return Scene.from_dict(data)
 
