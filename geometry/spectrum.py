@@ -195,8 +195,7 @@ def _check_resolved(grid: tuple[int, int], largest: tuple[int, int], *, per_wave
     if any(cells <= per_wave * waves for cells, waves in zip(grid, largest, strict=True)):
         needed = " × ".join(f"{max(4, 2 * waves + 1)}" for waves in largest)
         raise InputError(
-            "the grid is too coarse for the shortest waves of the spectrum",
-            value=grid,
+            f"a grid of {grid[0]} × {grid[1]} heights is too coarse for the shortest waves",
             allowed=f"at least {needed} heights",
         )
 

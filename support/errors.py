@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import reprlib
 from collections.abc import Iterable
 from enum import Enum
@@ -155,6 +156,7 @@ def _shortened(value: Any) -> str:
         text = short.repr(value)
     except ValueError:  # of thousands of digits
         return f"<{type(value).__name__}>"
+    text = re.sub(r"\s*\n\s*", " ", text)  # numpy breaks lines of arrays
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 

@@ -63,10 +63,8 @@ def length_unit(text: str) -> str:
     unit = _SPELLINGS.get(text.strip(), text.strip())
     if unit not in LENGTH_UNITS:
         hint = did_you_mean(unit, LENGTH_UNITS, cutoff=1.0)
-        raise InputError(
-            f"'{text}' is no unit of heights{hint}",
-            allowed=", ".join(LENGTH_UNITS),
-        )
+        problem, allowed = f"is no unit of heights{hint}", ", ".join(LENGTH_UNITS)
+        raise InputError(problem, value=text, allowed=allowed)
     return unit
 
 

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import logging
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -43,19 +46,30 @@ def read_instrument(
     check_memory(file.stat().st_size * 20)
     library = _library(file)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of readers, about metadata
-            with library.open_topography(str(file)) as reader:
-                chosen = _channel(reader, channel)
-                if states_sides and chosen.physical_sizes is None:
-                    raise UnknownFormat("the text states no sides that SurfaceTopography knows")
-                return _content(reader, chosen)
+        with _silence(), library.open_topography(str(file)) as reader:
+            chosen = _channel(reader, channel)
+            if states_sides and chosen.physical_sizes is None:
+                raise UnknownFormat("the text states no sides that SurfaceTopography knows")
+            return _content(reader, chosen)
     except InputError:
         raise
     except Exception as error:  # its readers raise errors of many families
         several = len(str(error).splitlines()) > 1  # it tried all its readers in vain
         reason = type(error).__name__ if several else first_line(error)
         raise UnknownFormat(f"SurfaceTopography cannot read it: {reason}") from None
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Keep back what readers say of metadata, and of files that they do not know."""
+    disabled = logging.root.manager.disable
+    logging.disable()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
+    finally:
+        logging.disable(disabled)
 
 
 def _content(reader: Any, channel: Any) -> FileContent:

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, InstanceOf
+from pydantic import AfterValidator, BeforeValidator, InstanceOf
 from pydantic.json_schema import SkipJsonSchema
 
 from geometry.files.content import length_unit
@@ -94,7 +94,7 @@ class SurfaceSection(Preparation):
     spectrum: Spectrum | None = None
     file: Annotated[str, NAMES_A_FILE] | None = None
     heights: HeightsInMemory = None
-    height_unit: str | None = None
+    height_unit: Annotated[str, AfterValidator(length_unit)] | None = None
     channel: str | Annotated[int, Limits(ge=0)] | None = None
     grid: tuple[Heights, Heights] | Auto | None = None
     lengths: tuple[PositiveLength, PositiveLength] | None = None
@@ -121,8 +121,6 @@ class SurfaceSection(Preparation):
                 "grid = 'auto' needs a 'spectrum'",
                 allowed="the grid of the file, or leave it out",
             )
-        if self.height_unit is not None:
-            length_unit(self.height_unit)
 
     @property
     def lacks_grid(self) -> bool:

@@ -227,7 +227,7 @@ def test_a_rank_may_own_nothing_of_the_interface(waiting_ranks):
     ("override", "text"),
     [
         ("block.young=3", "block.young: unknown key; did you mean 'young_modulus'?"),
-        ("surface.spectrum.waves=[2, 200]", "the grid is too coarse"),  # found as it is made
+        ("surface.spectrum.waves=[2, 200]", "heights is too coarse"),  # found as it is made
     ],
 )
 def test_wrong_input_ends_all_ranks_with_one_message(waiting_ranks, tmp_path, override, text):

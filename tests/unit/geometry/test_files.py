@@ -97,7 +97,7 @@ def test_point_lists_may_carry_rounded_coordinates(tmp_path):
         ("a.txt", "1 2 3 4 5\n", "1 rows of 5 numbers are a profile, not a surface"),
         ("a.dat", "0 1\n1 1\n2 3\n", "3 rows of 2 numbers are a profile, not a surface"),
         ("a.txt", "0 1 2 3\n" * 3, r"a surface needs at least 4 × 4 heights.*: \(3, 4\)"),
-        ("a.txt", "# Value units: V\n" + "0 1 2 3\n" * 4, "'V' is no unit of heights"),
+        ("a.txt", "# Value units: V\n" + "0 1 2 3\n" * 4, "is no unit of heights: 'V'"),
         ("a.npy", "not an array", "not a whole, readable numpy array"),
         ("a.npy", "", "not a whole, readable numpy array"),
         ("a.xyz", "1 2\n3 4\n", "a point list needs three columns x, y, z: 2 .*a profile"),

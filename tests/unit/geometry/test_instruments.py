@@ -125,8 +125,13 @@ def test_profiles_are_refused_as_profiles(tmp_path):
         read_surface(tmp_path / "profile.nc")
 
 
-def test_what_no_reader_knows(tmp_path):
+def test_what_no_reader_knows(tmp_path, caplog):
+    """What readers log while they try is no message of ours."""
     library()
+    (tmp_path / "scan.dat").write_bytes(bytes(range(256)) * 4)  # Igor's reader logs an error
+    with pytest.raises(InputError, match=r"scan\.dat: SurfaceTopography cannot read it: Cannot"):
+        read_surface(tmp_path / "scan.dat")
+    assert not caplog.records
     (tmp_path / "scan.opd").write_bytes(b"\0")
     with pytest.raises(InputError, match=r"scan\.opd: SurfaceTopography cannot read it: Cannot"):
         read_surface(tmp_path / "scan.opd")

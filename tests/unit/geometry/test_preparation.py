@@ -110,7 +110,7 @@ def test_heights_in_the_wrong_unit_are_asked_about(tmp_path):
         read(tmp_path, heights)
     surface = read(tmp_path, heights, height_unit="µm")
     np.testing.assert_allclose(surface.heights, rough().heights, rtol=1e-15)
-    with pytest.raises(InputError, match="'furlong' is no unit of heights"):
+    with pytest.raises(InputError, match="is no unit of heights: 'furlong'"):
         read(tmp_path, heights, height_unit="furlong")
 
 

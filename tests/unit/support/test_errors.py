@@ -3,6 +3,7 @@
 import pickle
 import re
 
+import numpy as np
 import pytest
 
 from support.errors import InputError, NotConverged
@@ -46,8 +47,14 @@ class Odd:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(Mute(), r"<Mute "), (Odd(), "<Odd "), ([Mute()], r"\[<Mute "), (10**5000, "<int>: is wrong")],
-    ids=["mute", "odd", "inside", "long"],
+    [
+        (Mute(), r"<Mute "),
+        (Odd(), "<Odd "),
+        ([Mute()], r"\[<Mute "),
+        (10**5000, "<int>: is wrong"),
+        (np.eye(2), r"array\(\[\[1., 0.\], \[0., 1.\]\]\): is wrong"),
+    ],
+    ids=["mute", "odd", "inside", "long", "array"],
 )
 def test_values_without_a_text_are_named_by_their_type(value, text):
     assert re.match(text, str(InputError("is wrong", value=value)))

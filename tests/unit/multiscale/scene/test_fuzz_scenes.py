@@ -68,8 +68,8 @@ def refused(tmp_path, key, value, *, kind="isolated"):
     [
         ("surface.grid", [10**6, 10**6], "surface.grid = [1000000, 1000000]: needs about 1e+05 GB"),
         ("surface.grid", [10**43, 4], "surface.grid.0 = 1" + "0" * 43 + ": must be less than or"),
-        ("surface.spectrum.waves", [2, 1e9], "(16, 16): the grid is too coarse for the shortest"),
-        ("surface.spectrum.waves", [2, 1e308], "(16, 16): the grid is too coarse for the shortest"),
+        ("surface.spectrum.waves", [2, 1e9], "a grid of 16 × 16 heights is too coarse"),
+        ("surface.spectrum.waves", [2, 1e308], "a grid of 16 × 16 heights is too coarse"),
         ("patches.grid", [10**5, 10**5], "patches.grid = [100000, 100000]: needs about 1e+03 GB"),
         ("load.steps", 10**9, "load.steps = 1000000000: must be less than or equal to 1000000"),
         (
