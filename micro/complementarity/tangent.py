@@ -38,11 +38,13 @@ def approach_stiffness(problem: CellProblem, pressure: Array) -> tuple[float, in
 
     Returns:
         The derivative of the sum of pressures / E* [1/mm], NaN where the iteration does not
-        converge, and the products of the compliance.
+        converge or a period is in full contact, and the products of the compliance.
     """
     moving = pressure > 0.0
     if not moving.any():
         return 0.0, 0
+    if problem.compliance.periodic and moving.all():
+        return np.nan, 0  # equal pressures on all cells displace none
     few = problem.compliance.few_cells(pressure.shape, problem.spacing)
     if few is not None and not problem.motions.count and few.hold(pressure):
         return float(few.rate(pressure.ravel()[few.cells]).sum()), 1

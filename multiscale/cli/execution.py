@@ -113,6 +113,25 @@ def scene_and_folder(
     return on_root(comm, read)
 
 
+def refuse_other_kind(folder: Path, *, cases: bool) -> None:
+    """Refuse a run where cases of a study are, and these where a run is: their files have one name.
+
+    Args:
+        folder: The folder.
+        cases: Whether cases are to be written, of a sweep or a comparison.
+
+    Raises:
+        InputError: When the folder holds the other kind alone.
+    """
+    from multiscale.output.checkpoint import FILE_NAME  # `help` and `schema` do without
+    from multiscale.studies.running import Journal
+
+    of_run = any((folder / name).exists() for name in ("provenance.json", FILE_NAME))
+    if (of_run, not Journal(folder, {}).files()) == (cases, cases):
+        held = "a run" if of_run else "cases of a sweep or a comparison"
+        raise InputError(f"holds {held}", key="--out", value=str(folder), allowed="another folder")
+
+
 def complain_of_stream(name: str, failure: OSError) -> int:
     """Say that a standard stream took no more, and return the exit code of that.
 

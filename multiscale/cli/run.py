@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from multiscale import console
-from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from multiscale.cli.interruption import Interruption, Stopped, watching
 from multiscale.output.checkpoint import FILE_NAME, Checkpoint, CheckpointWriter
 from multiscale.output.fields import write_fields
@@ -78,6 +78,7 @@ def _earlier(
         return kept, f"goes on after load step {len(kept.steps)}, kept in {folder}{anew}"
     if not choice.overwrite:
         refuse_other_results(folder, identity(scene))
+        refuse_other_kind(folder, cases=False)
     if choice.resume:
         return None, f"nothing to resume in {folder}: begins with the first load step"
     interrupted = (folder / FILE_NAME).exists()

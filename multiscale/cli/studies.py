@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from multiscale import console
-from multiscale.cli.execution import scene_and_folder
+from multiscale.cli.execution import refuse_other_kind, scene_and_folder
 from multiscale.cli.words import COMPARE_ENDING, DIFF_ENDING, SWEEP_ENDING
 from multiscale.figures.files import (
     Drawing,
@@ -51,6 +51,8 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
     which, parts = choice.part or slurm_part()
+    if not choice.overwrite:
+        on_root(comm, lambda: refuse_other_kind(folder, cases=True))
     with locked(folder / JOURNAL / part_name((which, parts)), comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
@@ -214,6 +216,7 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     if options:
         raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
+    on_root(comm, lambda: refuse_other_kind(folder, cases=True))
     with locked(folder, comm):
         with following(comm) as (begun, ended):
 

@@ -21,7 +21,7 @@ from multiscale.measured_errors.contact import error_notes
 from multiscale.readable import Detail, quantity
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History
-from support.errors import NotConverged
+from support.errors import InputError, NotConverged, PatchlawError
 
 T = TypeVar("T")
 
@@ -98,11 +98,14 @@ class StepObserver:
     def release(self) -> None:
         """Let go of what holds bodies in memory."""
 
+    _unsolved: tuple[type[PatchlawError], ...] = (NotConverged,)
+    """Errors of a problem without a solution."""
+
     def _tried(self, what: str, solve: Callable[[], T]) -> T | None:
-        """Return what is solved for; None where that does not converge, which is noted."""
+        """Return what is solved for; None where there is no solution, which is noted."""
         try:
             return solve()
-        except NotConverged as error:
+        except self._unsolved as error:
             self._failures[f"{what}: {error}"] = None
             return None
 
@@ -207,6 +210,9 @@ class ContactRecorder(StepObserver):
 
 class ErrorCheck(StepObserver):
     """Adds measured errors to load steps, as the scene's ``output.check`` says."""
+
+    # of a period in full contact other cells may have no gap left at the approach of the run's
+    _unsolved = (NotConverged, InputError)
 
     def observe(self, step: LoadStep, past: Sequence[LoadStep], *, last: bool) -> LoadStep:
         """Return the load step with its errors, where they are to be measured."""

@@ -64,3 +64,11 @@ def test_stiffness_of_a_sphere_is_that_of_hertz():
 def test_stiffness_is_zero_without_contact():
     contact = model()
     assert contact.stiffness(contact.press(Control(approach=-1e-3)), turns=False) == (0.0, 0, 0.0)
+
+
+def test_stiffness_of_a_period_in_full_contact_is_not_known():
+    """Further pressures, which are equal, do not displace a surface from its mean."""
+    contact = model(periodic=True)
+    full = contact.press(Control(force=2000.0))
+    assert full.in_contact.all()
+    assert contact.stiffness(full, turns=False) == (None, 0, 0.0)

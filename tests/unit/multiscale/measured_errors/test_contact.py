@@ -139,6 +139,17 @@ def test_what_cannot_be_measured_is_said_and_the_run_goes_on(monkeypatch):
     assert any(note.startswith("errors of load step 2 not measured") for note in history.notes)
 
 
+def test_a_period_in_full_contact_runs_without_errors_that_need_a_gap():
+    """Other cells touch everywhere before the approach of the run's, which does not end it."""
+    rough = {"surface.periodic": True, "surface.spectrum.rms_slope": 0.02}
+    history = run(scene(load={"force": [400.0, 1.5], "steps": 2}, check="all").with_(rough))
+    assert (history.contact_area_fraction[:2] == 1.0).all()
+    assert history.approach_mm[1] == pytest.approx(history.approach_mm[0], rel=1e-2)
+    assert np.isnan(history.stiffness_N_per_mm[:2]).all() and history[-1].stiffness_N_per_mm > 0.0
+    assert any("errors of load step 2 not measured" in note for note in history.notes)
+    assert history[-1].approach_error_mm > 0.0
+
+
 def test_an_accuracy_that_is_not_kept_is_said():
     wanted = replace(scene(grid=96, finite_slopes=False), accuracy=0.005)
     history = run(wanted)

@@ -360,6 +360,22 @@ def test_command_writes_cases_histories_and_statistics(file, tmp_path, capsys, m
     assert len(rows(out / "history.csv")) == 3
 
 
+@pytest.mark.parametrize(
+    ("first", "second"), [("run", "sweep"), ("sweep", "run"), ("run", "compare")]
+)
+def test_runs_and_cases_do_not_replace_each_other(file, tmp_path, capsys, first, second):
+    """Both write a history.csv or a report.html."""
+    out = tmp_path / "out"
+    more = {"run": [], "sweep": ["--vary", f"{SEED}=0..1"], "compare": []}
+    assert main([first, str(file), "--out", str(out), *more[first]]) == 0
+    before = {path: path.read_bytes() for path in out.iterdir() if path.is_file()}
+    assert main([second, str(file), "--out", str(out), *more[second]]) == 2
+    held = "cases of a sweep or a comparison" if first == "sweep" else "a run"
+    assert f"out': holds {held} (allowed: another folder" in capsys.readouterr().err
+    assert {path: path.read_bytes() for path in out.iterdir() if path.is_file()} == before
+    assert main([first, str(file), "--out", str(out), *more[first]]) == 0
+
+
 def test_command_runs_the_part_of_a_slurm_task(file, tmp_path, capsys, monkeypatch):
     words = ["sweep", str(file), "--vary", f"{SEED}=0..2", "--out", str(tmp_path / "out")]
     for task in ("4", "6"):
