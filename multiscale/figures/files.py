@@ -90,10 +90,10 @@ def pictures_of(drawing: Drawing) -> Pictures:
 def load_without_help() -> None:
     """Load matplotlib without the help on its artists, which takes a third of the time to load.
 
-    For processes in which nobody asks for help. Where matplotlib is missing, drawing says so.
+    For processes in which nobody asks for help. Where matplotlib cannot be loaded, drawing says so.
     """
     if "matplotlib.artist" not in sys.modules:
-        with suppress(ImportError):
+        with suppress(Exception):
             vars(import_module("matplotlib.artist"))["kwdoc"] = lambda _: ""
 
 
