@@ -25,13 +25,17 @@ from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.form_cache import TIMEOUT, explained
+from support.arrays import Array
 from support.errors import InputError
 
 _JIT = {"timeout": TIMEOUT}  # for a slow machine on which another process compiles the same form
 HAS_VTX = hasattr(io, "VTXWriter")
 """Whether this dolfinx was built with ADIOS2."""
 
-_CELLS = {"hexahedron": basix.CellType.hexahedron, "tetrahedron": basix.CellType.tetrahedron}
+_CELLS = {
+    name: getattr(basix.CellType, name)
+    for name in ("triangle", "quadrilateral", "tetrahedron", "hexahedron")
+}
 _SHAPES = {
     4: ("tetrahedron", 1),
     8: ("hexahedron", 1),
@@ -266,6 +270,24 @@ def lagrange_points(cell_name: str, degree: int) -> NDArray[np.float64]:
     return np.asarray(_lagrange(cell_name, degree).points)
 
 
+def lagrange_table(cell_name: str, degree: int, points: Array) -> Array:
+    """Return the Lagrange basis and its derivatives along the coordinates.
+
+    Args:
+        cell_name: Name of the cell, such as ``hexahedron``.
+        degree: Polynomial degree, 1 or 2.
+        points: Coordinates in the reference cell of dimension d, shape (n, d).
+
+    Returns:
+        Values, then derivatives along each coordinate, shape (1 + d, n, nodes).
+    """
+    element = _lagrange(cell_name, degree)
+    if not len(points):  # which basix aborts on
+        return np.empty((1 + points.shape[1], 0, element.dim))
+    return np.asarray(element.tabulate(1, points))[..., 0]
+
+
+@cache
 def _lagrange(cell_name: str, degree: int) -> Any:
     return basix.create_element(
         basix.ElementFamily.P, _CELLS[cell_name], degree, basix.LagrangeVariant.equispaced

@@ -110,7 +110,7 @@ def facet_nodes(mesh: Any, facets: NDArray[np.int32]) -> FacetNodes:
 
 
 BETWEEN: dict[int, list[tuple[int, ...]]] = {
-    3: [(0, 1), (0, 2), (1, 2)],
+    3: [(1, 2), (0, 2), (0, 1)],
     4: [(0, 1), (0, 2), (1, 3), (2, 3), (0, 1, 2, 3)],
 }
 """Corners of a facet, by their number, between which its nodes of second order lie."""
@@ -139,40 +139,9 @@ def facet_basis(count: int, local: Array) -> tuple[Array, Array]:
     Returns:
         Values, shape (n, count), and slopes along both coordinates, shape (n, count, 2).
     """
-    s, t = local.T
-    if count in (3, 6):
-        basis = np.stack([1.0 - s - t, s, t], axis=1)
-        slopes = np.broadcast_to([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]], (len(s), 3, 2))
-        if count == 3:
-            return basis, slopes
-        pairs = np.array(BETWEEN[3])
-        first, second = basis[:, pairs[:, 0]], basis[:, pairs[:, 1]]
-        products = 4.0 * (
-            first[..., None] * slopes[:, pairs[:, 1]] + second[..., None] * slopes[:, pairs[:, 0]]
-        )
-        return (
-            np.concatenate([basis * (2.0 * basis - 1.0), 4.0 * first * second], axis=1),
-            np.concatenate([(4.0 * basis - 1.0)[..., None] * slopes, products], axis=1),
-        )
-    if count == 4:
-        lines = [
-            (np.stack([1.0 - z, z]), np.stack([-np.ones_like(z), np.ones_like(z)])) for z in (s, t)
-        ]
-        at = [(0, 0), (1, 0), (0, 1), (1, 1)]
-    else:  # ends, then the middle
-        lines = [
-            (
-                np.stack([(1.0 - 2.0 * z) * (1.0 - z), z * (2.0 * z - 1.0), 4.0 * z * (1.0 - z)]),
-                np.stack([4.0 * z - 3.0, 4.0 * z - 1.0, 4.0 - 8.0 * z]),
-            )
-            for z in (s, t)
-        ]
-        at = [(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2), (1, 2), (2, 1), (2, 2)]
-    (along_s, slope_s), (along_t, slope_t) = lines
-    i, j = np.array(at).T
-    values = along_s[i] * along_t[j]
-    slopes = np.stack([slope_s[i] * along_t[j], along_s[i] * slope_t[j]], axis=-1)
-    return values.T, np.moveaxis(slopes, 0, 1)
+    cell = "triangle" if count in (3, 6) else "quadrilateral"
+    table = compat.lagrange_table(cell, 1 if count < 6 else 2, np.asarray(local, float))
+    return table[0], np.moveaxis(table[1:], 0, -1)
 
 
 def parts(mesh: Any) -> list[int]:

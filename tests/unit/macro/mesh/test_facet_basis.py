@@ -41,6 +41,12 @@ def test_polynomials_are_those_of_their_values_at_the_nodes(count):
     np.testing.assert_allclose(found, np.column_stack([along_s, along_t]), rtol=0.0, atol=1e-13)
 
 
+@pytest.mark.parametrize("count", POWERS)
+def test_a_rank_may_have_no_points(count):
+    values, slopes = facet_basis(count, np.empty((0, 2)))
+    assert values.shape == (0, count) and slopes.shape == (0, count, 2)
+
+
 @pytest.mark.parametrize(("corners", "count"), [(3, 1), (3, 4), (4, 1), (4, 3)])
 def test_parts_fill_the_facet_once(corners, count):
     parts = _lattice_triangles(corners, count)
