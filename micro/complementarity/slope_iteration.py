@@ -37,6 +37,10 @@ both a force under a hardness erred by 1e-8 after unloading, with 1e-9 by 7e-11.
 _PART = 0.1
 """Residual of a solution over the last change, at most: the mixing takes differences of changes.
 Without it a plane 800 µm into heights of 10 µm took 2070 iterations, with it 216."""
+_AGAIN = 0.2
+"""Residual of a solution over the change expected next, at most: it adds to the one after that. On
+eight surfaces of 128² to 256² cells, two of which yield and two of which are periodic, it took 159
+evaluations of finite slopes where 1 took 177, and as many products."""
 _MEMORY = 2
 """Steps that the mixing remembers."""
 _NOISE = 2.0
@@ -216,7 +220,8 @@ class _SlopeIteration:
         )
         self._accuracy = tolerance
         if self._ahead > least:
-            self._accuracy = max(tolerance, min(_FIRST, self._ahead, _PART * self.change))
+            change = min(_AGAIN * self._ahead, _PART * self.change)
+            self._accuracy = max(tolerance, min(_FIRST, change))
         return None
 
     def _expected_change(self, before: float) -> float:

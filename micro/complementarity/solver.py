@@ -196,6 +196,9 @@ def _solve_on(problem: CellProblem, place: Place, start: Array | None) -> Contac
     shape, few = problem.interference.shape, not isinstance(place[0], slice)
     part = on_place(problem, place)
     known = None if start is None else start[place].copy()  # the search overwrites it
+    if known is not None and known.any() and not (few or part.unloaded):
+        # under a hardness a far smaller contact may not bear the load: coarser grids find a larger
+        known = part.admissible(known)
     if known is None or not known.any():
         known = _even_pressure(part) if few else nested_start(part)
     solution = solve(part, known)

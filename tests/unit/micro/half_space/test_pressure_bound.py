@@ -116,3 +116,18 @@ def test_a_plane_clear_of_all_cells_carries_no_force():
     search = ActiveSet(problem, start)
     assert (interference + search.motion[0]).max() < 0.0
     assert search.residual > 0.5
+
+
+@pytest.mark.parametrize("seed", [8, 9])
+def test_a_far_larger_force_is_not_started_from_a_contact_that_cannot_bear_it(seed):
+    spectrum = Spectrum(hurst=0.8, waves=(4, 32), rms_slope=0.1, seed=seed)
+    surface = synthesise(spectrum, grid=(128, 128), lengths=(1.0, 1.0))
+    model = HalfSpaceModel(surface, contact_modulus=E_STAR, periodic=True, hardness=100.0)
+    little, nothing = model.solve_force(0.5), model.solve_force(2.0)
+    state = model.solve_force(2.0, start=little.guess)
+    assert little.in_contact.sum() * 100.0 * surface.spacing[0] ** 2 < 2.0
+    assert state.force == pytest.approx(2.0, rel=1e-12)
+    # the residual bounds the error of the approach
+    assert state.approach == pytest.approx(nothing.approach, rel=2e-8)
+    # 1.0 times on both; 1.7 times with the pressures of the smaller force spread over all cells
+    assert state.iterations <= 1.25 * nothing.iterations
