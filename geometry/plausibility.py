@@ -16,6 +16,10 @@ STEEPEST, STEEPEST_FINITE = 2.0, 0.8
 are taken into account on. Heights in µm that are taken for mm make a surface a thousand times as
 steep. At 0.8 the two orders of finite slopes change the force by as much as they err."""
 
+MAPS = ": are they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'"
+SPECTRA = ": the spectrum needs a smaller amplitude, or fewer waves"
+"""What may be wrong with the heights of maps and of spectra that are too steep."""
+
 
 def reading_notes(grid: tuple[int, int], lengths: tuple[float, float]) -> list[str]:
     """Return a note where a map has square cells on its sides if x and y are swapped, and only so.
@@ -47,20 +51,21 @@ def rms_gradient(surface: Surface) -> float:
     return float(kept["rms_gradient"])
 
 
-def check_slopes(surface: Surface) -> None:
+def check_slopes(surface: Surface, advice: str = MAPS) -> None:
     """Refuse heights that are steeper than any rough surface, wherever they come from.
 
     Args:
         surface: The surface, prepared; of two rough sides each, and the sum of their heights.
+        advice: What may be wrong with them, at the end of a sentence.
 
     Raises:
-        InputError: Asks for the unit of the heights.
+        InputError: Gives the advice.
     """
     gradient = rms_gradient(surface)
     if gradient > STEEPEST * (1.0 + 1e-9):
         raise InputError(
-            f"the rms gradient of the heights is {gradient:.3g}, no rough surface is so steep: are "
-            "they in µm? Then say height_unit = 'um'; if a map has spikes, outliers = 'remove'",
+            f"the rms gradient of the heights is {gradient:.3g}, no rough surface is so steep"
+            f"{advice}",
             allowed=f"rms gradients up to {STEEPEST:g}",
         )
 

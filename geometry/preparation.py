@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from geometry.filters import filled, regridded, smoothed, spikes
-from geometry.plausibility import check_slopes
+from geometry.plausibility import MAPS, check_slopes
 from geometry.surface import Surface
 from support.arrays import Array, Flags
 from support.checks import cell_counts
@@ -79,12 +79,13 @@ class Preparation:
     resample: tuple[Heights, Heights] | None = None
 
 
-def prepared(surface: Surface, steps: Preparation) -> Surface:
+def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surface:
     """Remove the form of a surface, filter it and put it on another grid.
 
     Args:
         surface: The surface; its source then says what was done.
         steps: What is done; `completed` does what comes before the form.
+        advice: What may be wrong where it is too steep, see `check_slopes`.
 
     Raises:
         InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
@@ -108,7 +109,7 @@ def prepared(surface: Surface, steps: Preparation) -> Surface:
         done.append(f"resampled from {surface.grid[0]} × {surface.grid[1]} heights")
     if done:
         surface = replace(surface, heights=h, source=", ".join((surface.source, *done)))
-    check_slopes(surface)
+    check_slopes(surface, advice)
     return surface
 
 

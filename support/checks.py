@@ -55,6 +55,21 @@ def path_of(value: Any) -> Path:
     return Path(value)
 
 
+def check_file(path: Path, file: str | None = None) -> None:
+    """Refuse what is no regular file: pipes and devices may never end.
+
+    Args:
+        path: Its name.
+        file: What the error calls it; nothing when not given.
+
+    Raises:
+        InputError: When there is nothing of this name, or a folder.
+    """
+    if not path.is_file():
+        problem = "is a folder" if path.is_dir() else "there is no such file"
+        raise InputError(problem, allowed="a file" if path.is_dir() else None, file=file)
+
+
 def positive_lengths(value: Any, what: str) -> tuple[float, float]:
     """Return two positive, finite side lengths as floats.
 

@@ -18,6 +18,7 @@ from geometry.preparation import Preparation, completed, prepared
 from geometry.surface import Surface
 from support.checks import (
     cell_counts,
+    check_file,
     check_scale,
     is_level,
     path_of,
@@ -66,8 +67,7 @@ def read_surface(
     """
     file, preparation = path_of(path), Preparation(**steps)
     try:
-        if not file.is_file():  # pipes and devices are refused too: they may never end
-            raise InputError("there is no such file")
+        check_file(file)
         content, sides = _laid_out(_content(file, channel), lengths, grid, preparation)
         unit = _unit(content, height_unit)
         return _surface(str(file), content, sides, unit, preparation, periodic)

@@ -16,6 +16,7 @@ from macro import compat
 from macro.mesh.checks import check_cells, check_connected
 from macro.mesh.tagged import TaggedMesh
 from macro.mesh.xdmf import read_xdmf
+from support.checks import check_file
 from support.collective import on_root
 from support.errors import InputError
 
@@ -53,8 +54,7 @@ def read_mesh(path: str | Path, comm: Any, *, unit: float = 1.0) -> TaggedMesh:
             file=str(path),
             allowed=".msh of gmsh, .xdmf of dolfinx",
         )
-    if not on_root(comm, path.is_file):
-        raise InputError("there is no such file", file=str(path))
+    on_root(comm, lambda: check_file(path, str(path)))
     try:
         tagged = reader(path, comm)
         tagged.mesh.geometry.x[:] *= unit

@@ -51,11 +51,13 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
     which, parts = choice.part or slurm_part()
-    if not choice.overwrite:
-        on_root(comm, lambda: refuse_other_kind(folder, cases=True))
-    with locked(folder / JOURNAL / part_name((which, parts)), comm):
+    own = folder / JOURNAL / part_name((which, parts))
+    # --overwrite removes the cases of all parts, of which none may be running
+    with locked(folder, comm, shared=not choice.overwrite), locked(own, comm):
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
+        else:
+            on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
         ranks = parts * place_in(comm)[1]
         console.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
@@ -216,8 +218,8 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     if options:
         raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
-    on_root(comm, lambda: refuse_other_kind(folder, cases=True))
     with locked(folder, comm):
+        on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         with following(comm) as (begun, ended):
 
             def observe(one: Configuration, result: CaseResult) -> None:

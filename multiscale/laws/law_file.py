@@ -23,6 +23,7 @@ from multiscale.laws.rows import LawRows, PlanePath
 from multiscale.laws.transmissivity import Transmissivity
 from multiscale.removed import refuse_removed_laws
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
+from support.checks import check_file
 from support.errors import InputError
 from support.packages import optional_packages
 from support.whole_files import write_bytes
@@ -139,8 +140,8 @@ def read_laws(path: str | Path | BinaryIO) -> LawTable:
 
     path = Path(path) if isinstance(path, str) else path
     name = str(path) if isinstance(path, Path) else None
-    if isinstance(path, Path) and not path.is_file():  # reading a pipe would wait for its writer
-        raise InputError("is not a readable law file: there is no such file", file=name)
+    if isinstance(path, Path):
+        check_file(path, name)
     try:
         content = path.read_bytes() if isinstance(path, Path) else path.read()
         check_hdf5(content)

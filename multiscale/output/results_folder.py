@@ -62,12 +62,13 @@ def folder_name(scene: str, overrides: Sequence[str] = (), ending: str = "") -> 
 
 
 @contextmanager
-def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
+def locked(folder: Path, comm: Any, *, shared: bool = False) -> Iterator[FolderLock]:
     """Hold the lock on a folder, by rank 0 for all.
 
     Args:
         folder: The folder; made when missing.
         comm: MPI communicator, or None.
+        shared: Whether others that share the folder may hold it too, as the parts of a sweep do.
 
     Yields:
         The lock, for rank 0 to use.
@@ -78,7 +79,7 @@ def locked(folder: Path, comm: Any) -> Iterator[FolderLock]:
     Note:
         Collective.
     """
-    lock = FolderLock(folder)
+    lock = FolderLock(folder, shared=shared)
     on_root(comm, lock.hold)
     try:
         yield lock
@@ -96,10 +97,12 @@ class FolderLock:
 
     Args:
         folder: The folder.
+        shared: Whether others that share the folder may hold it at the same time.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self._folder, self._locked = folder, folder
+        self._way = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
         self._handle: int | None = None
         self._made: list[Path] = []
 
@@ -130,8 +133,9 @@ class FolderLock:
 
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
-        if self._locked != self._folder and self._is_held():
-            with suppress(OSError):  # in a folder that became read-only the file stays
+        if self._locked != self._folder and self._handle is not None and self._is_held():
+            with suppress(OSError):  # others share the file, or the folder became read-only
+                fcntl.flock(self._handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 self._locked.unlink(missing_ok=True)
         self._close()
         with suppress(OSError):  # results are there, or a folder is gone
@@ -151,7 +155,7 @@ class FolderLock:
         for path, flags in ((self._folder, os.O_RDONLY), (self._folder / _NAME, _READ_OR_MAKE)):
             handle = os.open(path, flags, 0o666)
             try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(handle, self._way | fcntl.LOCK_NB)
             except OSError as error:
                 os.close(handle)
                 if error.errno not in _NO_LOCKS:

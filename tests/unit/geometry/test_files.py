@@ -117,7 +117,7 @@ def test_unreadable_content_names_the_file_and_the_fault(tmp_path, name, text, m
 def test_missing_files_and_folders(tmp_path):
     with pytest.raises(InputError, match=r"gone\.npy: there is no such file"):
         read_surface(tmp_path / "gone.npy", lengths=SIDES)
-    with pytest.raises(InputError, match="there is no such file"):
+    with pytest.raises(InputError, match=rf"{tmp_path}: is a folder \(allowed: a file\)"):
         read_surface(tmp_path, lengths=SIDES)
 
 

@@ -198,6 +198,9 @@ def test_paths_and_units_are_checked(tmp_path):
         read_mesh(tmp_path / "part.stl", COMM)
     with pytest.raises(InputError, match="there is no such file"):
         read_mesh(tmp_path / "part.msh", COMM)
+    (tmp_path / "folder.msh").mkdir()
+    with pytest.raises(InputError, match=r"folder\.msh: is a folder"):
+        read_mesh(tmp_path / "folder.msh", COMM)
     with pytest.raises(InputError, match="0: the unit of a mesh is no length"):
         read_mesh(tmp_path / "part.msh", COMM, unit=0)
 

@@ -29,14 +29,39 @@ def test_two_runs_do_not_share_a_folder(tmp_path):
     assert not (tmp_path / "out").exists()  # neither wrote anything
 
 
-@pytest.mark.parametrize("command", ["laws", "surface", "run", "compare"])
-def test_no_command_writes_where_a_run_does(tmp_path, capsys, command):
+VARY = ("--vary", "surface.spectrum.seed=0..3")
+WRITING = (("laws",), ("surface",), ("run",), ("compare",), ("sweep", *VARY))
+
+
+def refused(words, folder, capsys):
+    """Tell whether a command on the paper's scene is refused as another one writes there."""
+    name, *more = words
+    small = ("--set", "surface.grid=[32, 32]")
+    code = main([name, str(PAPER), "--out", str(folder), *more, *small])
+    return code == 2 and "another run is writing to this folder" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", WRITING)
+def test_no_command_writes_where_a_run_does(tmp_path, capsys, words):
     out = tmp_path / "out"
     lock = FolderLock(out)
     lock.hold()
-    assert main([command, str(PAPER), "--out", str(out), "--set", "surface.grid=[32, 32]"]) == 2
-    assert "another run is writing to this folder" in capsys.readouterr().err
+    assert refused(words, out, capsys)
     assert not list(out.iterdir())
+    lock.release()
+
+
+@pytest.mark.parametrize("words", [*WRITING[:-1], ("sweep", *VARY, "--overwrite")])
+def test_no_command_but_other_parts_writes_where_a_sweep_does(tmp_path, capsys, words):
+    """--overwrite removes the cases of parts that are running."""
+    out = tmp_path / "out"
+    lock = FolderLock(out, shared=True)
+    lock.hold()
+    (out / "result").touch()
+    assert refused(words, out, capsys)
+    other = FolderLock(out, shared=True)
+    other.hold()
+    other.release()
     lock.release()
 
 
@@ -71,6 +96,18 @@ def test_a_file_is_locked_where_folders_cannot_be(tmp_path):
     other.hold()
     other.release()
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.usefixtures("network")
+def test_the_first_to_leave_a_shared_folder_leaves_it_locked(tmp_path):
+    one, other = (FolderLock(tmp_path, shared=True) for _ in range(2))
+    one.hold()
+    other.hold()
+    one.release()
+    with pytest.raises(InputError, match="another run is writing to this folder"):
+        FolderLock(tmp_path).hold()
+    other.release()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.usefixtures("network")
