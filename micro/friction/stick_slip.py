@@ -23,10 +23,12 @@ from support.arrays import Array
 from support.errors import NotConverged
 
 _MOST_STEPS, _MOST_ITERATIONS, _MOST_HALVINGS = 200, 100, 12
-_DECREASE, _MOST_RISE = 0.9, 1.5
-"""Residuals after a step, relative to that before, above which the gradient takes over: of a step
-that raises the energy, and of one that lowers it. Steps that come closer halve the residual; with
-0.9 for both, one of five load steps on a periodic surface took the gradient without need."""
+_DECREASE, _MOST_RISE, _ENERGY = 0.9, 1.5, 1e-13
+"""Residuals after a step above which the gradient takes over: of a step that raises the energy,
+relative to the least so far, lest steps go round in circles; of one that lowers it, relative to
+that before. Steps that come closer halve the residual; with 0.9 for both, one of five load steps on
+a periodic surface took the gradient without need. Relative rises of the energy that may be
+rounding follow."""
 _GRADIENT_STEPS = 8
 """Steps along the gradient in a row."""
 _MOST_MOTIONS, _ROUNDING = 20, 1e-14
@@ -104,7 +106,7 @@ class StickSlip:
         self.problem = problem
         self._set = np.zeros(len(problem.bound), bool)
         self._cautious = False  # since a step has raised the energy
-        self._scale = 0.0
+        self._scale, self._least = 0.0, np.inf
         tractions = problem.admissible(start)
         if tractions is None:
             tractions = problem.admissible(np.zeros_like(start))
@@ -141,12 +143,16 @@ class StickSlip:
     def step(self) -> None:
         """Solve with the cells that seem to slip, or move along the gradient where that fails."""
         old, residual, energy = self.traction, self.residual, self._energy
+        self._least = min(self._least, residual)
         change = self._newton_change()
         moved = self.problem.admissible(old + change)
         if moved is not None:
             self._accept(moved)
-            falls = self.residual <= _DECREASE * residual
-            if self.residual <= self.problem.tolerance or (falls and not self._cautious):
+            rises = self._energy > energy + _ENERGY * abs(energy)
+            falls = self.residual <= _DECREASE * (self._least if rises else residual)
+            if self.residual <= self.problem.tolerance or (
+                falls and not (rises and self._cautious)
+            ):
                 return
             if self._energy < energy and self.residual <= _MOST_RISE * residual:
                 return

@@ -26,8 +26,9 @@ from micro.boundary_elements.half_space_grid import Cells
 from micro.friction.tangential_grid import BodyGrid, TangentialGrid
 from support.arrays import Array, Flags
 
-AT_BOUND = 1e-12
-"""Tractions below the bound by no more than this share of it lie on it."""
+AT_BOUND = 1e-10
+"""Tractions below the bound by no more than this share of it lie on it. `admissible` takes some of
+them back by the square of the angle that they have turned by."""
 _MOST_STEPS, _MOST_HALVINGS = 100, 30
 _ENOUGH = 1e-13
 """Residual of the shear force, relative to the largest that friction transmits."""

@@ -83,6 +83,26 @@ def test_its_compliance_is_symmetric():
     assert works[0] == pytest.approx(works[1], rel=1e-12)
 
 
+def test_shear_forces_move_an_oblong_grid_as_sums_over_squares_say():
+    half_space = OppositeHalfSpace(face_of(2).pointwise, (1.0, 0.4), half_space_of(COMPLIANCE), 0.0)
+    nx, ny = half_space.spread(np.zeros(len(half_space._sampling.weight))).shape
+    assert nx > ny
+    side = half_space._side
+    kernels = cerruti_kernels((nx, ny), (side, side), NU) * COMPLIANCE / side**2
+    xx, yy, mixed = kernels
+    along = np.random.default_rng(5).normal(size=(2, nx, ny))
+    expected = np.zeros_like(along)
+    for i, j in np.ndindex(nx, ny):
+        di, dj = np.arange(nx)[:, None] - i, np.arange(ny)[None, :] - j
+        place, sign = (np.abs(di), np.abs(dj)), np.sign(di) * np.sign(dj)
+        x, y = along[:, i, j]
+        expected += [
+            xx[place] * x + sign * mixed[place] * y,
+            sign * mixed[place] * x + yy[place] * y,
+        ]
+    assert half_space.moved_along(along) == pytest.approx(expected, rel=1e-11, abs=1e-13)
+
+
 @pytest.mark.parametrize(("stiffness", "allowed"), [(500.0, 2.5e-3), (5e4, 0.03)])
 def test_rigid_body_on_springs_against_a_dense_matrix(stiffness, allowed):
     """The stiffer the springs, the more the pressures rise towards the edges, beyond 8 cells."""

@@ -1,5 +1,7 @@
 """The tractions of one step against a slow oracle, and what has none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,41 @@ def test_a_prescribed_force_is_met_and_its_shift_gives_it(seed, part):
     solution = solve_tractions(made, np.zeros((2, 24)))
     assert solution.traction.sum(axis=1) == pytest.approx(made.force, abs=1e-11)
     assert solution.traction == pytest.approx(oracle(made, matrix, solution.motion), abs=2e-6)
+
+
+@pytest.mark.parametrize("force", [None, (0.3, 0.2)])
+def test_tractions_do_not_depend_on_the_unit_of_length(force):
+    made, _ = problem(1, force=force)
+    small = replace(made, bound=1e-4 * made.bound, shift=1e-4 * made.shift)
+    if force:
+        small = replace(small, force=1e-4 * made.force)
+    wide, narrow = (solve_tractions(one, np.zeros((2, 24))) for one in (made, small))
+    assert narrow.traction == pytest.approx(1e-4 * wide.traction, abs=1e-13)
+    assert np.array_equal(narrow.slipping, wide.slipping)
+
+
+@pytest.mark.parametrize(
+    ("seed", "force", "loaded"),
+    [(2, (0.3, 0.2), True), (6, (0.3, 0.2), False), (10, (0.6, -0.5), None)],
+    ids=["went round in circles", "just below the bound", "energy within rounding"],
+)
+def test_a_force_is_found_back_and_forth(seed, force, loaded):
+    """Three ways in which the search once ended without convergence."""
+    made, matrix = problem(seed, force=force)
+    start = solve_tractions(made, np.zeros((2, 24))).traction if loaded else np.zeros((2, 24))
+    if loaded is not None:
+        made = replace(made, shift=0.2 * made.shift, force=-0.3 * made.force)
+    solution = solve_tractions(made, start)
+    assert solution.residual <= 1e-10
+    assert solution.traction == pytest.approx(oracle(made, matrix, solution.motion), abs=2e-6)
+
+
+def test_cells_that_slip_back_stick_at_once():
+    """Tractions that may only turn as long as slip points along them need few products."""
+    made, _ = problem(3)
+    loaded = solve_tractions(made, np.zeros((2, 24)))
+    back = solve_tractions(replace(made, shift=0.2 * made.shift), loaded.traction)
+    assert back.products <= 30  # 17; 131 where cells at the bound stay on it
 
 
 def test_the_start_does_not_count():
