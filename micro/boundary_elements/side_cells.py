@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, ClassVar, Self, TypeAlias
 
 import numpy as np
@@ -21,15 +21,16 @@ from scipy import fft
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from micro.boundary_elements.grid_compliance import CellGrid
-from micro.boundary_elements.half_space_grid import many
+from micro.boundary_elements.half_space_grid import many, symmetric
 from support.arrays import Array, Indices
 from support.cores import blocks, in_threads
 
 Waves = NDArray[np.complex128]
 Means: TypeAlias = Any  # Array on few rows, scipy.sparse.csr_array otherwise
 
-_LINES = 2**20
-"""Numbers that the lines between rows of cells hold at most: all that are cached, or at a time."""
+_LINES = 2**22
+"""Numbers that the lines between rows of cells hold at most: all that are cached, 33 MB of 160²
+cells, or at a time."""
 _MANY = 2**16
 """Cells that gain by threads."""
 _BLOCK = 2**17
@@ -45,7 +46,8 @@ class _SidePair:
     """Two opposite sides, and rows of cells along them, continued by zeros to twice the length.
 
     Args:
-        means: Means over the rows' cells of values at the nodes of both sides, shape (rows, 2 a).
+        means: Means over the rows' cells of values at the a nodes of either side, whose first is
+            the mean over the outermost row of what varies there alone, shape (rows, 2 a).
         loads: Its transpose.
         kernels: For each wave what loads at the nodes do at the nodes, (waves, a or 3 a, a).
         place: Places of the cells in a row, counted from the first of them, shape (cells,).
@@ -70,24 +72,23 @@ class _SidePair:
         length, rows, cells = sides.lengths[axis], grid[axis], grid[1 - axis]
         step, period = length / rows, 2 * cells
         nodes = _nodes(length, rows, stress=stress)
+        means, combined = _means(sides, axis, rows, nodes)
         parts = []
         # waves on twice the length of a side that cells take for the same, some running backwards
         for shift in (-period, 0, period):
             waves = np.arange(cells + 1) + shift
+            of_nodes = (sides.stresses if stress else sides.compliance)(axis, nodes, np.abs(waves))
+            kernels = combined @ of_nodes @ combined.T
             if stress:
-                kernels = sides.stresses(axis, nodes, np.abs(waves))
                 kernels[2] *= np.sign(waves)[:, None, None]
-                kernel = np.concatenate(kernels, axis=1)
-            else:
-                kernel = sides.compliance(axis, nodes, np.abs(waves))
-            parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernel)
-        means = _means(sides, axis, rows, nodes)
+                kernels = np.concatenate(kernels, axis=1)
+            parts.append((step * np.sinc(waves / period) ** 2)[:, None, None] * kernels)
         return cls(means, _transposed(means), np.sum(parts, axis=0), np.arange(cells))
 
     def turned(self, sides: FreeSides, *, stress: bool) -> _SidePair:
         """Return the sides across y of a square from those across x: waves do the same there."""
         rows = len(self.place)
-        means = _means(sides, 1, rows, _nodes(sides.lengths[1], rows, stress=stress))
+        means, _ = _means(sides, 1, rows, _nodes(sides.lengths[1], rows, stress=stress))
         if np.array_equal(_full(means), _full(self.means)):
             return self
         return _SidePair(means, _transposed(means), self.kernels, self.place)
@@ -137,26 +138,38 @@ class _SidePair:
 
     def between(self, row: Indices, cell: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
-        apart = np.abs(cell[:, None] - cell)
         if self.means.shape[0] ** 2 * len(self.kernels) <= _LINES:
-            lines = _all_lines(self)
-            return lines.take(apart + lines.shape[2] * (row[:, None] * len(lines) + row))
+            return symmetric(len(row), partial(self._block, _all_lines(self), row, cell))
         used, row = np.unique(row, return_inverse=True)
-        matrix = np.empty(apart.shape)
+        matrix = np.empty((len(row), len(row)))
         step = max(1, _LINES // (len(used) * len(self.kernels)))
         for first in range(0, len(used), step):  # some rows at a time, for the memory
             some = np.flatnonzero((row >= first) & (row < first + step))
             lines = self.lines_between(used[first : first + step], used)
-            matrix[some] = lines[apart[some], row[some][:, None] - first, row]
+            apart = np.abs(cell[some, None] - cell)
+            matrix[some] = lines[row[some, None] - first, row, apart]
         return matrix
 
+    @staticmethod
+    def _block(lines: Array, row: Indices, cell: Indices, some: slice, others: slice) -> Array:
+        """Return the displacements of some cells by pressures on others, by all lines."""
+        place = row[some, None] * len(lines) + row[others]
+        place *= lines.shape[2]
+        place += np.abs(cell[some, None] - cell[others])
+        return lines.take(place)
+
     def lines_between(self, rows: Indices, others: Indices) -> Array:
-        """Return displacements along rows by a unit pressure in others, (cells, r, o)."""
-        means = _full(self.means)
+        """Return displacements along rows by a unit pressure in others, shape (r, o, cells)."""
+        means, count = _full(self.means), len(self.kernels)
         pairs = zip(np.split(means[rows], 2, axis=1), np.split(means[others], 2, axis=1),
                     strict=True)  # fmt: skip
         waves = sum(one @ self.kernels @ other.T for one, other in pairs)
-        return fft.irfft(waves, 2 * len(self.kernels) - 2, axis=0)[: self.place[-1] + 1]
+        # waves are cosines: a product is quicker than their transform
+        apart = np.arange(self.place[-1] + 1)
+        cosines = np.cos(np.pi / (count - 1) * (np.multiply.outer(np.arange(count), apart)))
+        cosines *= np.where(np.arange(count) % (count - 1), 1.0, 0.5)[:, None] / (count - 1)
+        lines = waves.reshape(count, -1).T @ cosines
+        return np.asarray(lines.reshape(len(rows), len(others), -1))
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
@@ -179,11 +192,11 @@ class _SidePair:
         return self.on_cells(_multiplied(self.kernels.transpose(0, 2, 1), waves))[:, 0]
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=8)
 def _all_lines(pair: _SidePair) -> Array:
     """Return the lines between all rows, (rows, rows, cells); cached for other surfaces, too."""
     rows = np.arange(pair.means.shape[0])
-    return np.ascontiguousarray(pair.lines_between(rows, rows).transpose(1, 2, 0))
+    return pair.lines_between(rows, rows)
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
@@ -193,13 +206,31 @@ def _nodes(length: float, rows: int, *, stress: bool) -> Array:
     return distance_nodes(length / rows / (256.0 if stress else 16.0), length)
 
 
-def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> Means:
-    """Return means over rows of cells of values at the nodes of both sides, (rows, 2 a)."""
+def _means(sides: FreeSides, axis: int, rows: int, nodes: Array) -> tuple[Means, Array]:
+    """Return means over rows of cells of values near both sides, and the values by the nodes'.
+
+    Nodes that matter in the outermost row alone do so by their mean, which is one value for all.
+
+    Args:
+        sides: The free sides.
+        axis: 0 for the sides across x, 1 across y.
+        rows: Number of rows.
+        nodes: Distances of the nodes from a side [mm].
+
+    Returns:
+        Shapes (rows, 2 a) and (a, nodes).
+    """
     length = sides.lengths[axis]
     lower = means_over(nodes, np.linspace(0.0, length, rows + 1))
+    outermost, inner = lower[[0]].toarray(), lower[1:].toarray().any(axis=0)
+    near = int(np.argmax(inner)) if inner.any() else len(nodes)
+    combined = np.eye(len(nodes))[near - 1 :]
+    combined[0, :near] = outermost[0, :near]
+    first = scipy.sparse.csr_array(([1.0], ([0], [0])), shape=(rows, 1))
+    lower = scipy.sparse.csr_array(scipy.sparse.hstack([first, lower[:, near:]]))
     low, high = (float(there) for there in sides.pair(axis))
     both = scipy.sparse.csr_array(scipy.sparse.hstack([low * lower, high * lower[::-1]]))
-    return both.toarray() if rows <= 128 else both  # full matrices are quicker
+    return both.toarray() if rows <= 128 else both, combined  # full matrices are quicker
 
 
 def _full(means: Means) -> Array:
