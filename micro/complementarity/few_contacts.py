@@ -50,9 +50,8 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
     if start is not None:
         pressure[some] = start.pressure.ravel()[few.cells[some]]
         few.learn(pressure)
-    accuracy = max(tolerance, _FIRST)
+    accuracy, compliance = max(tolerance, _FIRST), few.compliance(pressure)
     for _ in range(_MOST_SOLUTIONS):
-        compliance = few.compliance(pressure)
         part = problem.among(few.cells[some], compliance.among(some))
         try:
             found = solve(replace(part, tolerance=accuracy), pressure[some][:, None])
@@ -63,7 +62,8 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
         pressure[some] = found.pressure.ravel()
         known = compliance.displacement_by_added(pressure)
         few.learn(pressure)
-        change = few.compliance(pressure).displacement_by_added(pressure) - known
+        compliance = few.compliance(pressure)
+        change = compliance.displacement_by_added(pressure) - known
         changes = np.abs(np.broadcast_to(change, pressure.shape)[pressure > 0.0])
         changed = float(changes.max(initial=0.0)) / largest
         if accuracy <= tolerance and changed <= max(_CONVERGED, 10.0 * tolerance):
