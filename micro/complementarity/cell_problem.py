@@ -106,6 +106,12 @@ class CellProblem:
         """Whether no free motion has a load: the approach is prescribed and the tilt is free."""
         return self.motions.turns and not self.motions.loads.any()
 
+    @property
+    def has_no_gap(self) -> bool:
+        """Whether no pressures hold a period at a prescribed approach, as it leaves no gap."""
+        prescribed = self.compliance.periodic and not self.motions.count
+        return prescribed and not self.bound.is_finite and float(self.interference.mean()) >= 0.0
+
     def yielding(self, pressure: Array) -> Flags:
         """Return which pressures / E*, within the bounds, are the hardness."""
         return self.bound.reached(pressure)

@@ -17,7 +17,9 @@ import numpy as np
 
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.few_contacts import solved_on_few
+from micro.complementarity.full_contact import solved_by_force
 from micro.complementarity.solver import penetrates_outside, solve_on_surface
+from micro.complementarity.tangent import approach_stiffness
 from support.arrays import Array, Flags
 from support.errors import NotConverged
 
@@ -47,6 +49,8 @@ _NOISE = 2.0
 """Change of a residual over the step above which the step was not its cause."""
 _DEPENDENT = 1e-2
 """Changes that differ less in direction, times their length, are taken for one."""
+_NEARLY_FULL = 0.9
+"""Share of the cells that touch above which the approach of a period may have turned back."""
 
 
 class AndersonMixing:
@@ -117,6 +121,7 @@ def solve_contact(
     Raises:
         NotConverged: When the contact conditions or the loads cannot be met, or displacements by
             finite slopes do not agree with the pressures.
+        BeyondFullContactError: When a period has no gap left at the approach.
     """
     compliance = problem.compliance
     if same_slopes and start is not None and start.by_slopes is not None:
@@ -130,7 +135,34 @@ def solve_contact(
         start = found
     if not compliance.slopes:
         return solve_on_surface(problem, start)
+    if compliance.periodic and not problem.motions.count:
+        return _solved_on_period(problem, start)
     return _solved(_SlopeIteration(problem, start))
+
+
+def _solved_on_period(problem: CellProblem, start: ContactPressures | None) -> ContactPressures:
+    """Solve the contact of a period at a prescribed approach."""
+    try:
+        found = _solved(_SlopeIteration(problem, start))
+    except NotConverged:
+        if problem.bound.is_finite:  # then no approach closes all gaps
+            raise
+    else:
+        if problem.bound.is_finite or _rises(problem, found):
+            return found
+    tolerance = max(_CONVERGED, 10.0 * problem.tolerance)
+    return solved_by_force(
+        problem, start, lambda under, near: _solved(_SlopeIteration(under, near)), tolerance
+    )
+
+
+def _rises(problem: CellProblem, solution: ContactPressures) -> bool:
+    """Return whether the force of a period at an approach rises with it."""
+    if np.count_nonzero(solution.pressure) <= _NEARLY_FULL * solution.pressure.size:
+        return True
+    assert solution.by_slopes is not None
+    lowered = problem.lowered_by(solution.by_slopes)
+    return approach_stiffness(lowered, solution.pressure)[0] > 0.0
 
 
 def _solved(iteration: _SlopeIteration) -> ContactPressures:
@@ -143,12 +175,7 @@ def _solved(iteration: _SlopeIteration) -> ContactPressures:
         if residual is not None:
             by_slopes = iteration.displaced
             return solution._replace(iterations=used, by_slopes=by_slopes, residual=residual)
-    raise NotConverged(
-        "the displacements by finite slopes",
-        reason=f"they still change by {iteration.change:.1e} of the displacement",
-        iterations=used,
-        remedy="set micro.finite_slopes = false, or smooth the surface",
-    )
+    raise iteration.not_converged(used)
 
 
 class _SlopeIteration:
@@ -182,9 +209,20 @@ class _SlopeIteration:
 
     def next_solution(self) -> ContactPressures:
         """Solve the contact with the displacements by slopes as they are, from the last one."""
-        problem = replace(self._problem, tolerance=self._accuracy)
-        self._start = solve_on_surface(problem.lowered_by(self.displaced), self._start)
+        problem = replace(self._problem, tolerance=self._accuracy).lowered_by(self.displaced)
+        if problem.has_no_gap:
+            raise self.not_converged(0)
+        self._start = solve_on_surface(problem, self._start)
         return self._start
+
+    def not_converged(self, iterations: int) -> NotConverged:
+        """Return the error that tells the last change, after so many iterations."""
+        return NotConverged(
+            "the displacements by finite slopes",
+            reason=f"they still change by {self.change:.1e} of the displacement",
+            iterations=iterations,
+            remedy="set micro.finite_slopes = false, or smooth the surface",
+        )
 
     def judged(self, solution: ContactPressures) -> float | None:
         """Return the residual of a solution that has converged; otherwise prepare the next one.
@@ -220,8 +258,8 @@ class _SlopeIteration:
         )
         self._accuracy = tolerance
         if self._ahead > least:
-            change = min(_AGAIN * self._ahead, _PART * self.change)
-            self._accuracy = max(tolerance, min(_FIRST, change))
+            enough = min(_AGAIN * self._ahead, _PART * self.change)
+            self._accuracy = max(tolerance, min(_FIRST, enough))
         return None
 
     def _expected_change(self, before: float) -> float:

@@ -24,6 +24,7 @@ from micro.boundary_elements.grid_compliance import BodyTerm, Compliance
 from micro.boundary_elements.side_cells import SideTerm
 from micro.complementarity.cell_fields import PressureBound
 from micro.complementarity.cell_problem import CellProblem, ContactPressures
+from micro.complementarity.full_contact import BeyondFullContactError
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.solver import touches_few_cells
@@ -56,7 +57,10 @@ class HalfSpaceModel:
         contact_modulus: E* [MPa].
         periodic: Whether surface and pressures continue periodically. The mean displacement of
             a periodic half-space is not determined: displacements, and so the approach, count
-            from the mean of the displaced surface, with finite slopes from the flat body's.
+            from the mean of the displaced surface, with finite slopes from the flat body's. With
+            these the plane goes back shortly before full contact as the force rises, since a
+            surface in full contact is stiffer than a smooth body of its volume: an approach then
+            has the smaller of two forces.
         tolerance: Largest residual of a solution, which bounds the error of the force: the force
             is exact for a surface whose heights differ from these by at most the residual times the
             largest interference. On a random surface of 256² cells the force erred by 5e-10 with
@@ -217,8 +221,8 @@ class HalfSpaceModel:
                 (nx, ny) [mm]; nothing when not given.
 
         Raises:
-            InputError: Also when a periodic surface is pressed to full contact or by a tilted
-                plane.
+            InputError: Also when a periodic surface is pressed to an approach in full contact, by a
+                tilted plane or, with finite slopes, by a mean pressure of Young's modulus.
         """
         patches, means = checked_patches(self.surface, patches, mean_heights)
         surface, modulus = self.surface, self.contact_modulus
@@ -380,8 +384,12 @@ class HalfSpaceModel:
             nearby = () if displaced is not None else self._nearby(start)
             first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
         problem = replace(problem, tolerance=max(tolerance, self.tolerance))
-        with blas_threads(1):  # all cores are taken by threads of ours
-            solved = solve_contact(problem, first, same_slopes=same_slopes)
+        try:
+            with blas_threads(1):  # all cores are taken by threads of ours
+                solved = solve_contact(problem, first, same_slopes=same_slopes)
+        except BeyondFullContactError as error:
+            assert control.approach is not None
+            raise _no_gap_left(control.approach, error.beyond) from None
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
 
@@ -442,8 +450,19 @@ class HalfSpaceModel:
             problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
             raise InputError(problem, value=value, allowed="tilt (0, 0)")
         mean = float(interference.mean())
-        # under a hardness no approach closes all gaps
-        if control.approach is not None and mean >= 0.0 and self.hardness is None:
-            allowed = f"< {control.approach - mean:.6g} mm; beyond it give the force"
-            problem = "a periodic surface has no gap left at this approach"
-            raise InputError(problem, value=control.approach, allowed=allowed)
+        # under a hardness no approach closes all gaps, and finite slopes change the last one
+        bounded = self.hardness is None and not self.slopes
+        if control.approach is not None and mean >= 0.0 and bounded:
+            raise _no_gap_left(control.approach, mean)
+        young = min((one.material.young_modulus for one in self.slopes), default=np.inf)
+        mean = 0.0 if control.force is None else control.force / self.surface.area
+        if mean >= young:
+            problem = "finite slopes end where the mean pressure is the Young's modulus"
+            raise InputError(problem, value=control.force, allowed=f"a pressure < {young:.6g} MPa")
+
+
+def _no_gap_left(approach: float, beyond: float) -> InputError:
+    """Return the error of a period at an approach beyond the last one by so much [mm]."""
+    allowed = f"< {approach - beyond:.6g} mm; beyond it give the force"
+    problem = "a periodic surface has no gap left at this approach"
+    return InputError(problem, value=approach, allowed=allowed)

@@ -90,7 +90,8 @@ def stiffness(model: ModelOfCells, state: ContactState, *, turns: bool) -> Stiff
     largest = float(model.interference(state.plane, state.earlier_depth).max())
     if not _yields_anew(model, state, largest):
         value, used = elastic_stiffness(model, state, turns=turns)
-        return Stiffness(value if np.isfinite(value) else None, used)
+        # the approach of a period near full contact may turn back, with finite slopes
+        return Stiffness(value if value > 0.0 or not state.force else None, used)
     rates: dict[float, float] = {}
     tilt, used = None if turns else state.tilt, 0
     here = start = replace(state.guess, plastic_depth=state.earlier_depth)

@@ -5,10 +5,10 @@ Theory: docs/theory.md, section 10.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import scipy
@@ -16,16 +16,13 @@ from numpy.typing import NDArray
 
 from multiscale.laws.interpolation import rising_curves
 from multiscale.laws.patch_law import PatchLaw
-from multiscale.laws.periodic_sample import PeriodicSample, SampleRow
+from multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow
 from multiscale.laws.refinement import refined
 from multiscale.laws.rows import SolvedRows
 from support.collective import shared
 
 Array = NDArray[np.float64]
-
-FULL_CONTACT = 0.01
-"""Compliance of a law in full contact, relative to its mean one up to there. The interface itself
-has none left; without any, the pressure would be no function of closure."""
+T = TypeVar("T", float, NDArray[np.float64])
 
 _ROWS_TOGETHER = 2
 """Rows of a sample that one rank solves in sequence, each starting from the one before, so that
@@ -54,7 +51,8 @@ class PeriodicSamples:
 
     The rows' parameter t runs from first touch, 0, to full contact, 1: the separation is
     g = (1 − t)² of that at first touch. Towards full contact the pressure of a wave rises as √g
-    (Westergaard 1939), and so linearly in t.
+    (Westergaard 1939), and so linearly in t. With finite slopes the law goes on a little, to a
+    separation of −(1 − t)² of that.
 
     Args:
         samples: The samples.
@@ -84,10 +82,17 @@ class PeriodicSamples:
         return max(sample.first_touch for sample in self.samples)
 
     @cached_property
-    def full_contact(self) -> list[float]:
-        """Mean pressures that just close the samples [MPa]; collective."""
+    def closed(self) -> list[Closed]:
+        """Where the laws of the samples end; collective."""
         samples = self.samples
-        return shared(self.comm, len(samples), lambda k: samples[k].full_contact_pressure())
+        return shared(self.comm, len(samples), lambda k: samples[k].closed)
+
+    @cached_property
+    def nearest(self) -> float:
+        """Least separation of the law, where the first of the samples ends [mm]; collective."""
+        if not any(sample.model.slopes for sample in self.samples):
+            return 0.0
+        return max(closed.separation for closed in self.closed)
 
     def law(
         self, limit: Limit, tolerance: float, most_rows: int, before: PatchLaw | None = None
@@ -107,7 +112,7 @@ class PeriodicSamples:
         end, start, kept = self.end(limit), 0.0, SolvedRows.none()
         if before is not None and not before.is_open:
             kept = self._without_full_contact(before)
-            start = self._parameter(max(self.reference - float(kept.closure[-1]), 0.0))
+            start = self._parameter(self._within(self.reference - float(kept.closure[-1])))
             compliance = float((kept.approach[-1] - kept.closure[-1]) / kept.pressure[-1])
         else:
             last = self.rows(np.array([end]), 0.0)[:, 0]
@@ -124,7 +129,8 @@ class PeriodicSamples:
         )
         new = made.rows[:, 0]
         rising, change = (kept.joined(new[1:]) if len(kept) else new).rising()
-        if max(start, end) == 1.0 and not any(sample.yields for sample in self.samples):
+        ends = not self._separation(max(start, end)) > 0.0 and max(start, end) == self._last
+        if ends and not any(sample.yields for sample in self.samples):
             rising = self._in_full_contact(rising, limit, compliance)
         more = made.of_law(0) | {"repaired": change, "sample_area": area}
         if before is not None:
@@ -136,8 +142,9 @@ class PeriodicSamples:
     def _without_full_contact(self, law: PatchLaw) -> SolvedRows:
         """Return the rows of a law of these samples that were solved, on their own reference."""
         rows = law.shifted(self.reference - law.initial_separation).rows
-        # beyond the reference the rows of full contact follow, which go on straight
-        rows = rows[rows.closure <= self.reference * (1.0 + _ROUNDING)]
+        # beyond the last one the rows of full contact follow, which go on straight
+        last = self.reference - self._within(self.reference - float(rows.closure[-1]))
+        rows = rows[rows.closure <= last + self.reference * _ROUNDING]
         outside = {"outside_range": rows.pressure >= law.warning_pressure}
         return SolvedRows(**dict(rows.columns()) | outside)
 
@@ -147,12 +154,12 @@ class PeriodicSamples:
         Args:
             limit: What that row reaches.
         """
-        by_closure = self._parameter(max(self.reference - limit.closure, 0.0))
+        by_closure = self._parameter(self._within(self.reference - limit.closure))
         if not np.isfinite(limit.pressure):
             return by_closure
         samples, pressure = self.samples, limit.pressure
         under = shared(self.comm, len(samples), lambda k: samples[k].separation_under(pressure))
-        low, high = self._parameter(max(under)), self._parameter(min(under))
+        low, high = (self._parameter(self._within(end)) for end in (max(under), min(under)))
 
         @cache
         def excess(parameter: float) -> float:
@@ -163,8 +170,21 @@ class PeriodicSamples:
             high = min(high, (1.0 + _CLOSE) * found)
         return min(by_closure, high)
 
+    def _within(self, separation: float) -> float:
+        """Return a separation, no less than the least one; collective."""
+        return separation if separation > 0.0 else max(separation, self.nearest)
+
+    @property
+    def _last(self) -> float:
+        """The parameter of the least separation; collective."""
+        return self._parameter(self.nearest)
+
     def _parameter(self, separation: float) -> float:
-        return 1.0 - float(np.sqrt(separation / self.first_touch))
+        root = float(np.sqrt(abs(separation) / self.first_touch))
+        return 1.0 - root if separation > 0.0 else 1.0 + root
+
+    def _separation(self, parameter: T) -> T:
+        return self.first_touch * ((1.0 - parameter) * abs(1.0 - parameter))
 
     def rows(self, parameters: Array, compliance: float) -> SolvedRows:
         """Return rows of the mean law, columns of shape (m, 1); collective.
@@ -173,7 +193,7 @@ class PeriodicSamples:
             parameters: Values of t, increasing, shape (m,).
             compliance: Λ of the rows' approach, s = c + Λ p [mm/MPa].
         """
-        separations = self.first_touch * (1.0 - parameters) ** 2
+        separations = self._separation(parameters)
         found = self._solve(separations)
         shares = self.shares
 
@@ -193,7 +213,7 @@ class PeriodicSamples:
             pressure=pressure,
             contact_area_fraction=mean("contact_area_fraction"),
             contacts=np.sum([[row.contacts for row in rows] for rows in found], axis=0),
-            unresolved_displacement=np.zeros(len(pressure)),
+            unresolved_displacement=np.maximum(-separations, 0.0),  # of what has no gap left
             pressure_scatter=scatter,
             outside_range=np.any([[row.outside_range for row in rows] for rows in found], axis=0),
         )
@@ -205,11 +225,13 @@ class PeriodicSamples:
         count = len(separations) if quick else _ROWS_TOGETHER
         parts = [separations[k : k + count] for k in range(0, len(separations), count)]
         tasks = len(self.samples) * len(parts)
-        full = self.full_contact if separations[-1] == 0.0 else [np.inf] * len(self.samples)
+        within: Sequence[Closed | None] = [None] * len(self.samples)
+        if not separations[-1] > 0.0:
+            within = self.closed
 
         def solve(task: int) -> list[SampleRow]:
             sample, part = divmod(task, len(parts))
-            return self.samples[sample].rows(parts[part], full[sample])
+            return self.samples[sample].rows(parts[part], within[sample])
 
         def solved(done: int) -> None:
             if self.observe is not None:
@@ -228,7 +250,7 @@ class PeriodicSamples:
         """Return the rows of a law with others in full contact, up to a limit."""
         last, least = rows[-1:], FULL_CONTACT * compliance
         full = float(last.pressure[0])
-        pressure = min(limit.pressure, full + (limit.closure - self.reference) / least)
+        pressure = min(limit.pressure, full + (limit.closure - float(last.closure[0])) / least)
         if not pressure > full:
             return rows
         more = np.linspace(0.0, pressure - full, _FULL_ROWS + 1)[1:]
@@ -238,6 +260,7 @@ class PeriodicSamples:
             approach=last.approach + (least + compliance) * more,
             closure=last.closure + least * more,
             pressure=full + more,
-            unresolved_displacement=least * more,
+            contact_area_fraction=np.ones(_FULL_ROWS),
+            unresolved_displacement=last.unresolved_displacement + least * more,
         )
         return rows.joined(beyond)

@@ -6,15 +6,31 @@ Theory: docs/theory.md, section 10.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from geometry import Control
+from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, Start, press_along
 
 Array = NDArray[np.float64]
+
+FULL_CONTACT = 0.01
+"""Compliance of a law in full contact, relative to its mean one up to there. The interface itself
+has none left; without any, the pressure would be no function of closure."""
+
+_NEARLY_FULL = 0.9
+"""Contact area fraction from which on the law of a sample with finite slopes may have ended."""
+_ROUNDING = 1e-12
+"""Separations that differ by no more, over the largest, are one."""
+_MOST = 0.9
+"""Largest mean pressure under which finite slopes are solved for, over the Young's modulus."""
+_PART = 2e-3
+"""Error of the mean pressure where such a law ends, over that which closes the flat sample."""
 
 
 class SampleRow(NamedTuple):
@@ -31,6 +47,18 @@ class SampleRow(NamedTuple):
     contact_area_fraction: float = 0.0
     contacts: int = 0
     outside_range: bool = False
+
+
+class Closed(NamedTuple):
+    """Where the law of a sample ends.
+
+    Attributes:
+        separation: The mean separation of the undeformed planes [mm].
+        row: What the sample gives there.
+    """
+
+    separation: float
+    row: SampleRow
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,15 +106,46 @@ class PeriodicSample:
         """Whether its pressures are bounded by a hardness; then no load closes all gaps."""
         return self.model.hardness is not None
 
-    def full_contact_pressure(self) -> float:
-        """Return the mean pressure that just closes the sample [MPa].
+    @cached_property
+    def closed(self) -> Closed:
+        """Where the law of the sample ends.
+
+        It is full contact, at a separation of 0. Under a hardness the plane is at the mean plane
+        there. Of a sample with finite slopes the separation falls as long as the pressure rises
+        until shortly before full contact, when it is a little below 0; its law ends where the
+        compliance is a hundredth of the mean one.
+        """
+        model = self.model
+        if self.yields:
+            state = model.press(Control(approach=self.reference))
+            return Closed(0.0, self._row(state))
+        if not model.slopes:
+            return Closed(0.0, SampleRow(self._flattening_pressure(), 1.0, 1))
+        flat = PeriodicSample(replace(model, slopes=()))
+        young = min(one.material.young_modulus for one in model.slopes)
+        most = min(flat.closed.row.pressure, _MOST * young)
+        least = FULL_CONTACT * self.first_touch / most
+        states: dict[float, ContactState] = {}
+
+        def above(pressure: float) -> float:
+            """Return the separation, and what the law in full contact would take off it."""
+            near = min(states, key=lambda known: abs(known - pressure), default=None)
+            start = None if near is None else states[near].guess
+            control = Control(force=pressure * self.area)
+            states[pressure] = self._rough_model.press(control, start=start)
+            return least * pressure - states[pressure].approach
+
+        options = {"xatol": _PART * most}
+        end = minimize_scalar(above, bounds=(0.0, most), method="bounded", options=options).x
+        return Closed(self.reference - states[end].approach, self._row(states[end]))
+
+    def _flattening_pressure(self) -> float:
+        """Return the mean pressure that just closes a sample of small slopes [MPa].
 
         In full contact pressures differ from their mean by what flattens the sample, whatever the
-        mean. Under a hardness it is the mean pressure at a separation of 0.
+        mean.
         """
         surface = self.model.surface
-        if self.yields:
-            return self.model.press(Control(approach=self.reference)).force / self.area
         slopes = np.gradient(surface.heights, *surface.spacing)
         pressure = self.model.contact_modulus * float(np.sqrt(np.mean(np.square(slopes))))
         while True:
@@ -96,43 +155,55 @@ class PeriodicSample:
                 return float(cells.mean() - cells.min())
 
     def separation_under(self, pressure: float) -> float:
-        """Return the mean separation under a mean pressure [mm]; exactly 0 in full contact.
+        """Return the mean separation under a mean pressure [mm], no less than that of `closed`.
 
         Args:
             pressure: The mean pressure [MPa].
         """
-        if self.model.hardness is not None and pressure >= self.model.hardness:
+        model = self.model
+        if model.hardness is not None and pressure >= model.hardness:
             return 0.0
+        if any(pressure >= _MOST * one.material.young_modulus for one in model.slopes):
+            return self.closed.separation
         state = self._rough_model.press(Control(force=pressure * self.area))
         if not self.yields and state.pressures.min() > 0.0:  # what is left is rounding
-            return 0.0
+            return self.closed.separation if model.slopes else 0.0
+        nearly = bool(model.slopes) and state.contact_area_fraction > _NEARLY_FULL
+        if nearly and pressure >= self.closed.row.pressure:
+            return self.closed.separation
         if self.quick:
             self._starts[state.approach] = state.guess
-        return max(self.reference - state.approach, 0.0)
+        separation = self.reference - state.approach
+        return separation if model.slopes else max(separation, 0.0)
 
-    def rows(self, separations: Array, full: float) -> list[SampleRow]:
+    def rows(self, separations: Array, closed: Closed | None) -> list[SampleRow]:
         """Return rows at separations, each solved from those next to it.
 
         Args:
             separations: Mean separations, falling [mm].
-            full: Mean pressure that just closes the sample, for a separation of 0 [MPa].
+            closed: Where its law ends; None where no separation is that small.
         """
+        end = -np.inf
+        if closed is not None and not self.yields:
+            end = closed.separation + _ROUNDING * self.reference
         approaches = {
             separation: float(self.reference - separation)
             for separation in separations.tolist()
-            if separation < self.first_touch and (separation > 0.0 or self.yields)
+            if end < separation < self.first_touch
         }
         states = press_along(self._rough_model, list(approaches.values()), known=self._starts)
         if self.quick:
             self._starts.update((state.approach, state.guess) for state in states)
-        found = {
-            separation: SampleRow(
-                pressure=state.mean_pressure,
-                contact_area_fraction=state.contact_area_fraction,
-                contacts=state.contacts,
-                outside_range=bool(state.warning),
-            )
-            for separation, state in zip(approaches, states, strict=True)
-        }
-        closed = {0.0: SampleRow(full, 1.0, 1)}
-        return [(found.get(one) or closed.get(one) or SampleRow()) for one in separations.tolist()]
+        found = {one: self._row(state) for one, state in zip(approaches, states, strict=True)}
+        if closed is not None:
+            found |= {one: closed.row for one in separations.tolist() if one <= end}
+        return [found.get(one, SampleRow()) for one in separations.tolist()]
+
+    @staticmethod
+    def _row(state: ContactState) -> SampleRow:
+        return SampleRow(
+            pressure=state.mean_pressure,
+            contact_area_fraction=state.contact_area_fraction,
+            contacts=state.contacts,
+            outside_range=bool(state.warning),
+        )

@@ -25,6 +25,8 @@ BALANCE = 1e-3
 64² cells (half-space and cube, level and free planes) no bound was broken; work and energy differed
 by 6e-5, 6e-4 and 1e-3 at rms gradients of 0.2, 0.4 and 0.8, whose second order is no gradient of an
 energy, and by 5e-6 without finite slopes, which the trapezoidal rule leaves."""
+_ROUNDING = 1e-6
+"""Changes of the force, over the largest, that count as none."""
 
 
 def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
@@ -32,9 +34,11 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
 
     Up to the first load step it is the energy that is stored by then, elastic and plastic. Between
     load steps it is that of the trapezoidal rule, with its end correction where the stiffness is
-    known and the slopes stay or have no moment. Where nothing yields anew after cells have yielded,
-    the load may have turned back at the step before, whose stiffness is then that of the other
-    side: instead, the forces are a parabola with the stiffness of this step.
+    known and the slopes stay or have no moment: by stiffnesses or, where it is smaller, by their
+    inverses, since stiffnesses grow without bound towards full contact of a period. Where nothing
+    yields anew after cells have yielded, the load may have turned back at the step before, whose
+    stiffness is then that of the other side: instead, the forces are a parabola with the stiffness
+    of this step.
 
     Args:
         step: A load step.
@@ -50,10 +54,14 @@ def with_work(step: LoadStep, before: LoadStep | None) -> LoadStep:
     turning = np.abs(motion[1:]) @ (np.abs(load[1:]) + np.abs(ahead[1:]))
     stiffness, earlier = step.stiffness_N_per_mm, before.stiffness_N_per_mm
     if earlier is not None and stiffness is not None and turning <= 1e-6 * abs(work):
-        bent = 0.5 * motion[0] * (earlier - stiffness)
+        rise = float(ahead[0] - load[0])
         if before.plastic_work_mJ and not step.stiffness_error_N_per_mm:
-            bent = ahead[0] - load[0] - motion[0] * stiffness
-        work += motion[0] * bent / 6.0
+            bent = motion[0] * (rise - motion[0] * stiffness)
+        else:
+            bent = 0.5 * motion[0] ** 2 * (earlier - stiffness)
+            if earlier > 0.0 and stiffness > 0.0:
+                bent = min(bent, 0.5 * rise**2 * (1.0 / stiffness - 1.0 / earlier), key=abs)
+        work += bent / 6.0
     return replace(step, work_mJ=(before.work_mJ or 0.0) + work)
 
 
@@ -65,6 +73,7 @@ def missing_energy(steps: Sequence[LoadStep]) -> float:
     """
     worst = largest = 0.0
     known = [step for step in steps if step.elastic_energy_mJ is not None]
+    softer = _softer_body(known)
     for before, step in pairwise(known):
         motion = _motion(step) - _motion(before)
         stored = [
@@ -73,8 +82,23 @@ def missing_energy(steps: Sequence[LoadStep]) -> float:
         ]
         rise, largest = stored[1] - stored[0], max(largest, *stored)
         bounds = sorted((float(_load(before) @ motion), float(_load(step) @ motion)))
-        worst = max(worst, bounds[0] - rise, rise - bounds[1])
+        slack = 0.5 * softer * (step.force_N - before.force_N) ** 2
+        worst = max(worst, bounds[0] - rise - slack, rise - bounds[1] - slack)
     return worst / largest if largest else 0.0
+
+
+def _softer_body(steps: Sequence[LoadStep]) -> float:
+    """Return the compliance of a body with which no approach falls as the force rises [mm/N].
+
+    That of a period in full contact does, with finite slopes. Its energy is convex together with
+    that of a smooth body below it.
+    """
+    most, least = 0.0, _ROUNDING * max((step.force_N for step in steps), default=0.0)
+    for before, step in pairwise(steps):
+        moved, rise = step.approach_mm - before.approach_mm, step.force_N - before.force_N
+        if abs(rise) > least:
+            most = max(most, -moved / rise)
+    return most
 
 
 def _motion(step: LoadStep) -> Array:

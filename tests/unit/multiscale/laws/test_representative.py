@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from helpers.along import respond
 
-from geometry import Control, InputError, Regions, Spectrum, Surface, synthesise
-from micro import HalfSpaceModel
+from geometry import Control, InputError, Material, Regions, Spectrum, Surface, synthesise
+from micro import FiniteSlopes, HalfSpaceModel
 from multiscale.exports.export import export_texts
 from multiscale.laws.law_file import law_bytes, read_laws
 from multiscale.laws.law_table import LawTable
@@ -135,6 +135,60 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     assert law.range[1] - closed == pytest.approx(0.01 * (closed - law.first_touch), rel=1e-6)
     # and so do the tangents beyond the last row
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
+    """There is a force at each approach; the last one is less than that of full contact."""
+    young, nu = 4000.0, 0.3
+    modulus, given = young / (1.0 - nu**2), []
+    for seed in range(count):
+        spectrum = Spectrum(hurst=0.8, waves=(1, 4), rms_slope=0.2, seed=seed)
+        sample = synthesise(spectrum, grid=(24, 24), lengths=(1.0, 1.0))
+        given.append(replace(sample, periodic=True))
+
+    def model_of(surface):
+        material = Material(young_modulus=young, poisson_ratio=nu)
+        slopes = FiniteSlopes(surface, material, periodic=True)
+        return HalfSpaceModel(surface, contact_modulus=modulus, periodic=True, slopes=(slopes,))
+
+    law = representative_law(given, modulus, largest_pressure=0.8 * young, make_model=model_of)
+    rows, closed = law.rows, law.initial_separation
+    assert law.is_function and (rows.contact_area_fraction[-4:] == 1.0).all()
+    last = len(rows) - 5
+    models = [model_of(surface) for surface in given]
+    for row in (last // 2, last - 2, last - 1):
+        lower = closed - np.array(
+            [one.reference_height - one.surface.mean_height for one in models]
+        )
+        states = [
+            one.solve(rows.closure[row] - below) for one, below in zip(models, lower, strict=True)
+        ]
+        mean = np.mean([state.mean_pressure for state in states])
+        assert rows.pressure[row] == pytest.approx(mean, rel=3e-4)  # 5e-4 of 3e-3, times 30
+    assert rows.closure[last] > closed  # heights are compressed, too
+    assert 0.9 < rows.contact_area_fraction[last] < 1.0
+    assert law.at(rows.closure).separation.min() > -1e-12 * closed
+    if count == 1:
+        approaches = [
+            models[0].press(Control(force=factor * rows.pressure[last])).approach
+            for factor in (0.97, 1.0, 1.15)
+        ]
+        assert (
+            approaches[0]
+            < approaches[1]
+            == pytest.approx(
+                rows.closure[last],
+                rel=3e-5,  # slopes of rows change by 1.5e-5 at the end
+            )
+        )
+        # the compliance has fallen to a hundredth or less: the rest is less than 2 % of that
+        assert max(approaches) - approaches[1] < 3e-3 * 0.15 * closed
+    longer = representative_law(
+        given, modulus, largest_pressure=1.6 * young, make_model=model_of, before=law
+    )
+    assert longer.rows.pressure[: last + 1] == pytest.approx(rows.pressure[: last + 1], rel=1e-12)
+    assert longer.rows.pressure[-1] == pytest.approx(1.6 * young, rel=1e-9)
 
 
 def test_a_law_that_ends_before_first_touch_is_open():

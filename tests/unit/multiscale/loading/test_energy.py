@@ -1,0 +1,52 @@
+"""Work and energies of a period with finite slopes through full contact."""
+
+import pytest
+
+from multiscale import Scene, run
+from multiscale.loading.energy import BALANCE, missing_energy
+from multiscale.readable import Caution
+
+YOUNG = 4000.0
+
+
+def through_full_contact(steps, largest):
+    """Return a run whose mean pressure rises to a share of Young's modulus."""
+    spectrum = {"hurst": 0.87, "waves": [2, 5], "rms_slope": 0.2, "seed": 3}
+    return run(
+        Scene.from_dict(
+            {
+                "surface": {
+                    "spectrum": spectrum,
+                    "grid": [40, 40],
+                    "lengths": [0.02, 0.02],
+                    "periodic": True,
+                },
+                "block": {"young_modulus": YOUNG, "poisson_ratio": 0.3},
+                "coupling": {"kind": "analytic"},
+                "load": {"pressure": largest * YOUNG, "steps": steps},
+                "output": {"figures": False, "report": False, "check": "none"},
+            }
+        )
+    )
+
+
+@pytest.mark.parametrize(("steps", "largest"), [(8, 0.75), (10, 0.24), (6, 0.24)])
+def test_work_is_what_is_stored_where_the_approach_turns_back(steps, largest):
+    """The stiffness grows without bound there; the trapezoidal rule errs by up to 0.6 %."""
+    history = through_full_contact(steps, largest)
+    energies = [step.elastic_energy_mJ for step in history.steps]
+    for step in history.steps:
+        assert step.work_mJ == pytest.approx(step.elastic_energy_mJ, abs=0.01 * max(energies))
+    assert energies[-1] < max(energies)  # the plane goes back under its force
+    assert missing_energy(history.steps) < BALANCE
+    assert not [note for note in history.notes if isinstance(note, Caution) and "energ" in note]
+
+
+def test_no_stiffness_is_stated_from_where_the_approach_turns_back():
+    steps = through_full_contact(8, 0.75).steps
+    approaches = [step.approach_mm for step in steps]
+    turn = approaches.index(max(approaches))
+    stated = [step.stiffness_N_per_mm for step in steps]
+    assert 0 < turn < len(steps) - 1
+    assert all(value is not None and value > 0.0 for value in stated[:turn])
+    assert not any(stated[turn + 1 :])
