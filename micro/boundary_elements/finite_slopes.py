@@ -81,19 +81,15 @@ class _Orders(NamedTuple):
         fields: Pressures and stresses, shape (4, sx, sy).
         works: What the form of first order multiplies them by, with heights from the top.
         value: Value of the form of second order.
-        pushed: What the form of first order multiplies pressures by, shape (sx, sy).
-        first: What it takes stresses off with, shape (3, sx, sy).
-        second: What the form of second order multiplies stresses by, shape (3, sx, sy).
-        bent: Twice what it multiplies curvatures by, shape (3, sx, sy).
+        first: What the form of first order multiplies pressures and stresses by, (4, sx, sy).
+        second: What that of second order multiplies stresses and curvatures by, (6, sx, sy).
     """
 
     fields: Array
     works: Array
     value: float
-    pushed: Array
     first: Array
     second: Array
-    bent: Array
 
 
 class FiniteSlopes:
@@ -166,8 +162,8 @@ class FiniteSlopes:
         """
         orders = self._orders(self.coarsened(pressure))
         share = second_share(float(np.vdot(orders.fields, orders.works)), orders.value)
-        weights = share * orders.second - orders.first
-        moved = self._moved(orders.pushed[None], weights[None], share * orders.bent)
+        pushed, second = orders.first[:1], share * orders.second
+        moved = self._moved(pushed, (orders.first[1:] + second[:3])[None], second[3:])
         return self.refined(moved[0])
 
     def coarsened(self, field: Array) -> Array:
@@ -190,9 +186,10 @@ class FiniteSlopes:
             order, with heights from the top.
         """
         orders = self._orders(loaded)
-        pushed = np.stack([orders.pushed, np.zeros_like(orders.pushed)])
-        moved = self._moved(pushed, np.stack([-orders.first, orders.second]), orders.bent)
-        return moved, orders.fields, orders.works
+        pushed = np.zeros((2, *orders.first.shape[1:]))
+        pushed[0] = orders.first[0]
+        weights = np.stack([orders.first[1:], orders.second[:3]])
+        return self._moved(pushed, weights, orders.second[3:]), orders.fields, orders.works
 
     def _orders(self, loaded: Array) -> _Orders:
         """Return the parts of both orders by pressures on the coarse cells, shape (cx, cy)."""
@@ -200,16 +197,14 @@ class FiniteSlopes:
         loaded = self._waves.alone(loaded)
         directed, curvatures = self._directed(loaded)
         stresses = self._stresses(loaded, directed)
-        strains = self._strains(stresses)
-        value, second = self._second(stresses, curvatures)
+        (value, second), half_bent = self._second(stresses, curvatures), 0.5 * below**2 * stresses
+        parts = np.concatenate([loaded[None] / modulus, -_TWICE_SHEAR * self._strains(stresses)])
         return _Orders(
             fields=np.concatenate([loaded[None], stresses]),
-            works=below * np.concatenate([loaded[None] / modulus, -_TWICE_SHEAR * strains]),
+            works=below * parts,
             value=value,
-            pushed=self._heights * loaded / modulus,
-            first=self._heights * strains,
-            second=second,
-            bent=below**2 * stresses,
+            first=self._heights * parts,
+            second=np.concatenate([_TWICE_SHEAR * each for each in (second, half_bent)]),
         )
 
     def _moved(self, pushed: Array, weights: Array, bent: Array) -> Array:
@@ -218,20 +213,22 @@ class FiniteSlopes:
         Args:
             pushed: What pressures are multiplied by, shape (b, sx, sy).
             weights: What stresses are multiplied by, shape (b, 3, sx, sy).
-            bent: Twice what the last form multiplies curvatures by, shape (3, sx, sy); the others
-                have none.
+            bent: What the last form multiplies curvatures by, shape (3, sx, sy); the others have
+                none.
         """
         waves, nu, count = self._waves, self.material.poisson_ratio, len(weights)
         for term in self.edge_stresses:
-            pushed = pushed + term.adjoint(_TWICE_SHEAR * weights)
+            pushed = pushed + term.adjoint(weights)
         if self._periodic:
             means = weights.mean(axis=(-2, -1), keepdims=True)
             weights = weights - means
             pushed = pushed - self._held * (means[:, 0] + means[:, 1])
-        # the adjoint of the stresses: −2ν tr w − (1 − 2ν) k · w k/k²
-        pushed = pushed - 2.0 * nu * (weights[:, 0] + weights[:, 1])
-        tensors = (2.0 * nu - 1.0) * weights
-        fields = np.concatenate([tensors.reshape(-1, *bent.shape[1:]), bent])
+        # the adjoint of the stresses, −2ν tr w − (1 − 2ν) k · w k/k²; all is w_yy but the waves of
+        # w_xx − w_yy and w_xy
+        pushed = pushed - 2.0 * nu * weights[:, 0] - weights[:, 1]
+        weights[:, 0] -= weights[:, 1]
+        waved = (2.0 * nu - 1.0) * weights[:, ::2]
+        fields = np.concatenate([waved.reshape(-1, *bent.shape[1:]), bent])
         moved = waves.changed(fields, self._displaced, count, inside=True)
         moved += pushed[:, : moved.shape[1], : moved.shape[2]]
         return moved
@@ -328,10 +325,10 @@ class FiniteSlopes:
     def _strained(self, waves: Spectrum, here: slice) -> Spectrum:
         """Return the waves of strains by tractions ∂_α (h σ_αβ), by those of moments h σ_αβ."""
         nu, shear = self.material.poisson_ratio, self.material.shear_modulus
-        along_x, along_y, across = directions = self._waves.directions[:, :, here]
+        along_x, along_y, across = self._waves.directions[:, :, here]
         xx, yy, xy = waves
-        both = nu * _lengthwise(waves, directions)
         crossed = across * xy
+        both = nu * (along_x * xx + along_y * yy + 2.0 * crossed)
         parts = np.empty_like(waves)
         parts[0] = along_x * (xx - both) + crossed
         parts[1] = along_y * (yy - both) + crossed
@@ -342,13 +339,17 @@ class FiniteSlopes:
     def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
         """Return the waves of the displacements by those of tensors, of which one is added last.
 
-        Each tensor t contributes k · t k/k², the one that is added (1 − ν) |k|/(2 G) times that.
+        Tensors t are given by t_xx − t_yy and t_xy + t_yx, and contribute k · t k/k² less t_yy. The
+        last one is whole, and contributes (1 − ν)/G |k| times k · t k/k² to the one before it.
         """
         stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
-        waves[-6:-3] += 0.5 / stiffness * self._waves.wave_number[:, here] * waves[-3:]
-        directions = self._waves.directions[:, :, here]
-        tensors = waves[:-3].reshape(-1, 3, *waves.shape[1:])
-        return np.stack([_lengthwise(tensor, directions) for tensor in tensors])
+        along, _, across = self._waves.directions[:, :, here]
+        xx, yy, xy = waves[-3:] * (self._waves.wave_number[:, here] / stiffness)
+        waves[-5] += xx - yy
+        waves[-4] += xy
+        moved = along * waves[:-3:2] + across * waves[1:-3:2]
+        moved[-1] += yy
+        return moved
 
     def _strains(self, stresses: Array) -> Array:
         """Return the strains xx, yy, xy by stresses in the plane alone."""
@@ -382,12 +383,6 @@ def coarse_grid(surface: Surface) -> tuple[int, int]:
 def _product(one: Array, other: Array) -> Array:
     """Return the double contraction of two symmetric tensors of components xx, yy, xy."""
     return np.asarray(one[0] * other[0] + one[1] * other[1] + 2.0 * one[2] * other[2])
-
-
-def _lengthwise(tensor: Spectrum, directions: Array) -> Spectrum:
-    """Return the component k · tensor k/k² of every wave."""
-    xx, yy, xy = directions
-    return np.asarray(xx * tensor[0] + yy * tensor[1] + 2.0 * xy * tensor[2])
 
 
 def second_share(first: float, second: float) -> float:
