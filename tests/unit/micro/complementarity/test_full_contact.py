@@ -30,7 +30,7 @@ def under(model, mean, start=None):
     return model.press(Control(force=mean * YOUNG * model.surface.area), start=start)
 
 
-@pytest.mark.parametrize("rms_slope", [0.05, 0.2, 0.4])
+@pytest.mark.parametrize("rms_slope", [pytest.param(0.05, marks=pytest.mark.long), 0.2, 0.4])
 def test_an_approach_has_one_force_from_any_start_and_with_other_rounding(rms_slope):
     model, other = model_of(rms_slope), model_of(rms_slope, noise=1e-15)
     closed = under(model, 0.5 + rms_slope)

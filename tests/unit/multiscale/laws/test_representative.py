@@ -137,7 +137,7 @@ def test_full_contact_goes_on_with_a_hundredth_of_the_compliance():
     assert law.stiffness(1.001 * law.range[1]) == pytest.approx(100 * full / closed, rel=0.1)
 
 
-@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("count", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_with_finite_slopes_a_law_ends_where_the_approach_turns_back(count):
     """There is a force at each approach; the last one is less than that of full contact."""
     young, nu = 4000.0, 0.3
