@@ -202,6 +202,23 @@ def copied(array: Any, out: Any = None) -> Any:
     return out
 
 
+def scaled(array: Any, factor: float, out: Any) -> Any:
+    """Return an array of two axes times a factor, on all cores, in the precision of the result.
+
+    Args:
+        array: Shape (nx, ny).
+        factor: The factor.
+        out: Overwritten by the result.
+    """
+    rows = blocks(len(array), BLOCK // (array.itemsize * array.shape[1]))
+
+    def work(some: slice) -> None:
+        np.multiply(array[some], factor, out=out[some], dtype=float, casting="same_kind")
+
+    in_threads(work, rows)
+    return out
+
+
 @cache
 def _pool(count: int) -> ThreadPoolExecutor:
     """Return threads, which are started once: that takes as long as a small transform."""

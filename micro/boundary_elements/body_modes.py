@@ -177,6 +177,11 @@ class ModesOnCells:
         x, y = self.means_x[:, rows], self.means_y[:, columns]
         return ModesOnCells(self.matrix, x, y, self.widths_x[rows], self.widths_y[columns])
 
+    @property
+    def single(self) -> ModesOnCells:
+        """Itself: a few modes take no time, in whichever precision the pressures are."""
+        return self
+
 
 class BodyStresses:
     """Stresses in its top that a finite body adds to those of the half-space, as means over cells.

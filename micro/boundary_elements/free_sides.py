@@ -131,8 +131,8 @@ class FreeSides:
         waves = np.arange(int(np.ceil(8.0 * period / widths.min())))  # 8 on the narrowest patch
         nodes = distance_nodes(float(np.diff(across).min()) / 256.0, length)
         compliance = self.compliance(axis, nodes, waves)
-        near = means_over(nodes, across).toarray()
-        far = means_over(nodes, length - across[::-1]).toarray()[::-1]
+        near = means_over(nodes, across)
+        far = means_over(nodes, length - across[::-1])[::-1]
         lines = sum(
             float(there) * (means @ compliance @ (means * np.diff(across)[:, None]).T)
             for means, there in zip((near, far), self.pair(axis), strict=True)
@@ -187,7 +187,7 @@ def values_at(nodes: Array, distances: Array) -> scipy.sparse.csr_array:
     return scipy.sparse.csr_array((entries.ravel(), (rows, columns.ravel())), shape=shape)
 
 
-def means_over(nodes: Array, borders: Array) -> scipy.sparse.csr_array:
+def means_over(nodes: Array, borders: Array) -> Array:
     """Return the means of the interpolation over intervals, shape (intervals, nodes).
 
     Args:
@@ -201,7 +201,7 @@ def means_over(nodes: Array, borders: Array) -> scipy.sparse.csr_array:
     sums = scipy.sparse.csr_array(
         (weights / np.diff(borders)[owner], (owner, np.arange(points.size)))
     )
-    return scipy.sparse.csr_array(sums @ values_at(nodes, points))
+    return np.asarray((sums @ values_at(nodes, points)).toarray())
 
 
 def gauss_points(ticks: Array, count: int) -> tuple[Array, Array]:

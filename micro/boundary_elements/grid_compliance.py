@@ -24,7 +24,7 @@ from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from support.arrays import Array, Indices
-from support.cores import copied
+from support.cores import copied, scaled
 from support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
@@ -61,6 +61,11 @@ class ComplianceTerm(Protocol):
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
         """Return the same for some of these rows and columns, by ascending indices."""
+        ...
+
+    @property
+    def single(self) -> Self:
+        """The same for pressures in single precision."""
         ...
 
 
@@ -109,19 +114,27 @@ class BodyTerm(Protocol):
 class GridCompliance:
     """Compliance of nx × ny cells under pressures that are uniform on each.
 
-    Displacements are evaluated in double precision. Corrections only have to reduce an error that
-    is then evaluated anew, and use the half-space's products in single precision.
+    Displacements are evaluated in double precision, or in single precision where that is enough.
+    Corrections only have to reduce an error that is then evaluated anew, and use single precision.
 
     Args:
         half_space: The half-space.
         terms: What else adds to the compliance.
+        rough: Whether displacements in single precision are enough.
 
     Attributes:
         products: Products with pressures so far.
     """
 
-    def __init__(self, half_space: HalfSpaceGrid, terms: Sequence[ComplianceTerm] = ()) -> None:
-        self._half_space, self._terms = half_space, tuple(terms)
+    def __init__(
+        self,
+        half_space: HalfSpaceGrid,
+        terms: Sequence[ComplianceTerm] = (),
+        *,
+        rough: bool = False,
+    ) -> None:
+        self._half_space, self._terms, self._rough = half_space, tuple(terms), rough
+        self._single = [term.single for term in self._terms]
         self._last: tuple[Cells, list[ComplianceTerm], Indices, tuple[int, int]] | None = None
         self.products = 0
 
@@ -133,6 +146,13 @@ class GridCompliance:
             out: Where the displacement is put; new memory if not given.
         """
         self.products += 1
+        if self._rough:
+            scale = _largest(pressure)
+            loaded = scaled(pressure, 1.0 / scale, np.empty(pressure.shape, np.float32))
+            found = self._half_space.rough_compliance(copied(loaded))
+            for term in self._single:
+                found += term.displacement(loaded)
+            return scaled(found, scale, np.empty_like(pressure) if out is None else out)
         moved: Array = copied(pressure, out)
         self._half_space.compliance(moved)
         for term in self._terms:
@@ -150,10 +170,11 @@ class GridCompliance:
         moved = self._half_space.rough_compliance.on_cells(cells, pressure)
         if self._terms:
             terms, place, shape = self._among(cells)
-            some = np.zeros(shape)
-            some.ravel()[place] = pressure
+            scale = _largest(pressure)
+            some: Any = np.zeros(shape, np.float32)
+            some.ravel()[place] = pressure / scale
             for term in terms:
-                moved += term.displacement(some).ravel()[place]
+                moved += scale * term.displacement(some).ravel()[place]
         return moved
 
     def inverse_on(self, cells: Cells) -> ContactInverse:
@@ -181,10 +202,15 @@ class GridCompliance:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
         if self._last is None or self._last[0] is not cells:
             columns, column = np.unique(cells.column, return_inverse=True)
-            terms = [term.among(cells.rows, columns) for term in self._terms]
+            terms = [term.among(cells.rows, columns) for term in self._single]
             place = cells.row * len(columns) + column.ravel()
             self._last = cells, terms, place, (len(cells.rows), len(columns))
         return self._last[1:]
+
+
+def _largest(pressure: Array) -> float:
+    """Return the largest size of some pressures, or 1: single precision ends at 1e-38."""
+    return max(float(pressure.max(initial=0.0)), -float(pressure.min(initial=0.0))) or 1.0
 
 
 @dataclass(kw_only=True, eq=False)
@@ -225,7 +251,13 @@ class Compliance:
         return other
 
     def on_grid(
-        self, grid: Grid, spacing: Pair, corner: Pair = (0.0, 0.0), *, coarse: bool = False
+        self,
+        grid: Grid,
+        spacing: Pair,
+        corner: Pair = (0.0, 0.0),
+        *,
+        coarse: bool = False,
+        rough: bool = False,
     ) -> GridCompliance:
         """Return the compliance of cells of the surface.
 
@@ -235,10 +267,11 @@ class Compliance:
             corner: Corner of the first cell on the surface [mm].
             coarse: Whether these are no cells of the surface but coarser ones, where terms may be
                 left out.
+            rough: Whether displacements in single precision are enough.
         """
         cells = CellGrid((grid[0], grid[1]), spacing, corner, coarse)
         terms = [on_cells for _, on_cells in self._terms_on(cells)]
-        return GridCompliance(self.half_space(cells.counts, spacing), terms)
+        return GridCompliance(self.half_space(cells.counts, spacing), terms, rough=rough)
 
     @property
     def lifts(self) -> bool:

@@ -25,7 +25,7 @@ def by_two(sides, axis, across, along, rows, columns):
     near = values_at(nodes, across), means_over(nodes, rows)
     far = values_at(nodes, length - across), means_over(nodes, length - rows[::-1])[::-1]
     lines = sum(
-        seen.toarray() @ compliance @ (loaded.toarray() * np.diff(rows)[:, None]).T
+        seen.toarray() @ compliance @ (loaded * np.diff(rows)[:, None]).T
         for seen, loaded in (near, far)
     )
     phase = np.cos(
