@@ -61,7 +61,7 @@ class RememberedSlopes:
         """Work out the orders for pressures as another memory did, see `learnt`; bit for bit."""
         self._forget()
         for pressure in learnt:
-            self._remember(pressure)
+            self._remember(pressure, self._loaded(pressure))
 
     def learn(self, pressure: Array, rest: float) -> bool:
         """Work out the orders for pressures that are not known.
@@ -79,7 +79,7 @@ class RememberedSlopes:
             return False
         if self._known == _MOST:
             self._forget()
-        self._remember(pressure)
+        self._remember(pressure, loaded)
         return True
 
     def columns(self, pressure: Array) -> tuple[Array, Array]:
@@ -141,14 +141,19 @@ class RememberedSlopes:
         """Return products of pressures with directions or displacements by them, shape (m,)."""
         return np.asarray(self._few[what, : self._known] @ pressure / self._per_coarse)
 
-    def _remember(self, pressure: Array) -> None:
-        """Work out the orders for the direction that pressures on the few cells add."""
+    def _remember(self, pressure: Array, loaded: Array) -> None:
+        """Work out the orders for the direction that pressures on the few cells add.
+
+        Args:
+            pressure: The pressures, shape (n,) [MPa].
+            loaded: The same on the coarse cells, flat.
+        """
         slopes, last, end = self._slopes, self._known, self._known + 1
         self.learnt.append(pressure.copy())
         if last == self._few.shape[1]:
             self._coarse, self._few = _lengthened(self._coarse), _lengthened(self._few)
             self._columns = _lengthened(self._columns)
-        directions, loaded = self._coarse[0], self._loaded(pressure)
+        directions = self._coarse[0]
         for _ in range(2):  # orthogonal to rounding
             loaded = loaded - (directions[:last] @ loaded) @ directions[:last]
         directions[last] = loaded / np.linalg.norm(loaded)

@@ -8,6 +8,7 @@ from helpers.dense_contact import dense_contact, matrix_of
 
 from geometry import Control, Material, Spectrum, synthesise
 from micro import BodyModes, FiniteSlopes, FreeSides, HalfSpaceModel
+from micro.boundary_elements import side_cells
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix
 from micro.boundary_elements.grid_compliance import Compliance
 from micro.boundary_elements.half_space_grid import Cells
@@ -50,18 +51,20 @@ def few(monkeypatch):
     return counted
 
 
+@pytest.mark.parametrize("lines", [2**22, 1000], ids=["all lines", "some rows at a time"])
 @pytest.mark.parametrize(
     "terms",
     [[], [SideTerm(SIDES)], [SideTerm(CORNER)], [body()], [SideTerm(SIDES), body(1)]],
     ids=["half-space", "sides", "two sides", "body", "all"],
 )
-def test_matrix_is_that_of_the_products(terms):
+def test_matrix_is_that_of_the_products(terms, lines, monkeypatch):
+    monkeypatch.setattr(side_cells, "_LINES", lines)
     dice = np.random.default_rng(3)
-    cells = np.sort(dice.choice(np.prod(GRID), 60, replace=False))
+    cells = dice.choice(np.prod(GRID), 150, replace=False)
     compliance = Compliance(periodic=False, modulus=E_STAR, terms=terms)
     whole = matrix_of(compliance.on_grid(GRID, SPACING), GRID)
     part = compliance.matrix_on(cells, GRID, SPACING)
-    pressure = dice.random((60, 1))
+    pressure = dice.random((150, 1))
     expected = whole[np.ix_(cells, cells)] @ pressure
     assert part.displacement(pressure) == pytest.approx(expected, rel=1e-12)
     assert compliance.matrix_on(cells, GRID, SPACING) is part  # made once
