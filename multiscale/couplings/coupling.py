@@ -250,6 +250,7 @@ class Coupling(SceneParts, ABC):
         yield from self.contact_warnings()
         yield from validity.of_output(self, cells=self.shows_cells)
         if self.has_body:
+            yield from validity.compressibility(self)
             yield from self.body_warnings()
         if self.decision is not None and self.decision.warning:
             yield self.decision.warning

@@ -107,6 +107,21 @@ def proportions(parts: SceneParts) -> Iterator[str]:
         )
 
 
+def compressibility(parts: SceneParts) -> Iterator[str]:
+    """Yield a warning where a body takes long because hardly anything changes its volume."""
+    usual, most = 0.45, 0.49
+    for facts in filter(None, (parts.body, parts.counter)):
+        nu = facts.poisson_ratio
+        if nu > most:
+            times = math.sqrt((1.0 - 2.0 * usual) / (1.0 - 2.0 * nu))
+            stiffer = (1.0 - most**2) / (1.0 - nu**2) - 1.0
+            yield (
+                f"a Poisson's ratio of {nu:g} takes up to {times:.2g} times the iterations of "
+                f"{usual:g}, which grow as (1 − 2ν)^-½ in nearly incompressible bodies; with "
+                f"{most:g} the contact modulus is {100.0 * stiffer:.2g} % smaller"
+            )
+
+
 def locking(
     poisson_ratio: float, degree: int, what: str = "block", take: str = ""
 ) -> Iterator[str]:
