@@ -162,7 +162,10 @@ class Motions:
         longest = np.abs(self.along_x).max(axis=1) * np.abs(self.along_y).max(axis=1)
         upper = bound.of(cells)
         start = np.minimum(pressure.ravel()[cells], upper)
-        values = _Scaled(start, self.modes_of(cells), loads, upper).solution(longest, acting)
+        if self.turns:
+            values = _Scaled(start, self.modes_of(cells), loads, upper).solution(longest, acting)
+        else:
+            values = _scaled_to_load(start, upper, float(loads[0]), acting)
         if values is None:
             return None
         scaled = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
@@ -192,6 +195,36 @@ class Motions:
         sums = np.append(0.0, np.cumsum(moving[:-1] * np.diff(shifts[order])))
         shift = float(np.interp(load, sums, shifts[order]))
         return np.clip(wanted + shift, 0.0, upper)
+
+
+def _scaled_to_load(start: Array, upper: Array | float, load: float, acting: float) -> Array | None:
+    """Return the pressures min(t p⁰, H) that sum up to a load; None where the bounds are less.
+
+    Their sum is linear in t between the values of it at which a cell reaches its bound.
+
+    Args:
+        start: Pressures p⁰ > 0 within the bounds, shape (n,).
+        upper: The bounds H; a number, or shape (n,).
+        load: The load.
+        acting: Sum of the pressures of all other cells.
+    """
+    order = np.argsort(upper / start)
+    ascending, bounds = start[order], np.broadcast_to(upper, start.shape)[order]
+    scaled = np.cumsum(ascending[::-1])[::-1]  # what is left to scale when a cell reaches its bound
+    bounded = np.append(0.0, np.cumsum(bounds))
+    reached = int(np.searchsorted(bounds / ascending * scaled + bounded[:-1], load))
+    off = load - bounded[reached]
+    if reached == start.size:
+        met = off <= _ENOUGH * (acting + bounded[-1])
+        return np.array(np.broadcast_to(upper, start.shape)) if met else None
+    if load < -_ENOUGH * acting:
+        return None
+    return _bounded(max(off / scaled[reached], np.exp(-_FARTHEST)) * start, upper)
+
+
+def _bounded(pressure: Array, upper: Array | float) -> Array:
+    """Return pressures within their bound, equal to it where they differ by rounding."""
+    return np.where(pressure < (1.0 - _AT_BOUND) * upper, pressure, upper)
 
 
 class _Scaled(NamedTuple):
@@ -229,8 +262,7 @@ class _Scaled(NamedTuple):
 
     def at(self, exponents: Array) -> Array:
         """Return the pressures for multipliers μ."""
-        pressure = self.start * np.exp(exponents @ self.modes)
-        return np.where(pressure < (1.0 - _AT_BOUND) * self.upper, pressure, self.upper)
+        return _bounded(self.start * np.exp(exponents @ self.modes), self.upper)
 
     def _step(self, exponents: Array, off: Array, weights: Array) -> Array | None:
         """Return the multipliers after a Newton step, shortened where it goes too far."""

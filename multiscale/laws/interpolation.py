@@ -181,6 +181,8 @@ class LawCurves:
 
     def _pieces(self, begin: Array, law: Indices | int, values: Array) -> Indices:
         """Return the last pieces of laws that begin at values or below, in their shape."""
+        if len(self.first) == 2:
+            return np.searchsorted(begin, values, side="right") - 1
         low, high = (np.broadcast_to(self.first[law + i], values.shape) for i in (0, 1))
         while np.any(high - low > 1):
             middle = (low + high) // 2

@@ -62,6 +62,25 @@ def test_scaled_pressures_keeps_the_upper_bound(pressure, share):
     assert np.array_equal(found > 0.0, pressure > 0.0)
 
 
+@pytest.mark.parametrize("share", [1e-7, 0.9, 1.5])
+def test_approach_alone_scales_what_is_below_its_bound(pressure, share):
+    """Bounds differ from cell to cell, and one has none; some pressures stay as they are."""
+    upper = 0.4 + DICE.random(GRID)
+    fixed = (pressure > 0.0) & (DICE.random(GRID) > 0.8)
+    scaled = (pressure > 0.0) & ~fixed
+    load = pressure[fixed].sum() + share * upper[scaled].sum()
+    upper.ravel()[np.flatnonzero(scaled)[3]] = np.inf
+    found = approach(GRID, load).scaled_to_loads(pressure, PressureBound(upper), fixed)
+    assert found.sum() == pytest.approx(load, rel=1e-14)  # rounding
+    assert np.array_equal(found[~scaled], pressure[~scaled])
+    below = scaled & (found < upper)
+    factor = found[below] / np.minimum(pressure, upper)[below]
+    assert factor == pytest.approx(factor[0], rel=1e-14)
+    bounded = scaled & ~below
+    assert np.all(factor[0] * np.minimum(pressure, upper)[bounded] >= upper[bounded] * (1 - 1e-13))
+    assert bounded.any() == (share > 0.5)
+
+
 def test_loads_beyond_reach_are_told(pressure):
     full = np.ones(GRID)
     assert turning(X, Y, 72.001).scaled_to_loads(full, PressureBound(1.0)) is None
