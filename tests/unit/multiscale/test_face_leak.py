@@ -37,7 +37,7 @@ def scene(box, leak=OIL, **changes):
     spectrum = {"hurst": 0.8, "waves": [2, 8], "rms_height": "1 um", "seed": 2}
     body = {"mesh": str(box), "contact": "top", "supports": SUPPORTS}
     data = {
-        "surface": {"spectrum": spectrum, "grid": [48, 48], "lengths": ["0.5 mm", "0.5 mm"]},
+        "surface": {"spectrum": spectrum, "grid": [32, 32], "lengths": ["0.5 mm", "0.5 mm"]},
         "body": body | {"young_modulus": "4 GPa", "poisson_ratio": 0.3},
         "law": {"kind": "representative"},
         "load": {"force": "600 N", "steps": 2},
@@ -87,7 +87,7 @@ def test_an_evenly_pressed_box_leaks_as_its_sample(box, laws, edges, axis, tmp_p
         assert leak.rate == pytest.approx(expected, rel=2e-3)
         assert abs(leak.rate - expected) <= causes["rows"] + 1e-6 * expected
         assert causes["mesh"] < 1e-6 * expected  # the separation is the same everywhere
-        half = gaps(model.resampled((24, 24)), step.mean_separation_mm)
+        half = gaps(model.resampled((16, 16)), step.mean_separation_mm)
         coarse = gap_flow(half, (0.5, 0.5), axis=axis, periodic=True).transmissivity
         error = expected * abs(coarse / flow.transmissivity - 1.0)
         assert causes["grid"] == pytest.approx(error, abs=0.01 * expected)
@@ -120,7 +120,7 @@ def test_transmissivity_grows_as_the_separation_where_nothing_touches(box, laws)
     separation = np.array([np.mean(flow.separation[-8:-6])])
     for values, one in (
         (flow.at(separation), model),
-        (flow.varied("grid", separation), model.resampled((24, 24))),
+        (flow.varied("grid", separation), model.resampled((16, 16))),
     ):
         gap = gaps(one, float(separation[0]))
         expected = [
@@ -191,7 +191,7 @@ def test_the_scatter_of_samples_is_that_at_equal_pressures(box):
     done.close()
     turned = replace(model.surface, heights=1.1 * model.surface.heights.T)
     models = [model, replace(model, surface=turned)]
-    models = [one.resampled((24, 24)) for one in models]
+    models = [one.resampled((16, 16)) for one in models]
     reference = models[1].reference_height - turned.mean_height
     law = np.linspace(0.1, 1.0, 20) * reference, np.linspace(300.0, 0.0, 20)
     flow = sample_transmissivity(models, lambda separation: np.interp(separation, *law))

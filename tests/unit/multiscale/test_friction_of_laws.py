@@ -17,14 +17,14 @@ LOAD = {
     "shear": [["0.4 um", "0 um"], ["-0.4 um", "0.1 um"], ["0.4 um", "0 um"]],
     "shear_steps": 2,
 }
-CUBE = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [4, 4, 3]}
+CUBE = {"young_modulus": 4000.0, "poisson_ratio": 0.15, "cells": [3, 3, 2]}
 SLAB = CUBE | {"lengths": [5.0, 4.0], "height": 2.0}
 
 
 def scene(kind="consistent", *, load=LOAD, friction=MU, **sections):
     spectrum = {"hurst": 0.8, "waves": [2, 6], "rms_height": "1 um", "seed": 3}
     data = {
-        "surface": {"spectrum": spectrum, "grid": [24, 24], "lengths": [1.0, 1.0]},
+        "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
         "friction": {"coefficient": friction},
         "load": load,
         "output": {"check": "none", "figures": False, "report": False},

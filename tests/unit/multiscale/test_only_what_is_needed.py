@@ -24,7 +24,7 @@ FINITE_ELEMENTS = ("dolfinx", "petsc4py", "macro", "gmsh")
 PICTURES = ("matplotlib",)
 
 
-def data(kind="analytic", model="half-space", grid=32, **sections):
+def data(kind="analytic", model="half-space", grid=16, **sections):
     spectrum = {"hurst": 0.95, "waves": [2, 6], "rms_slope": 0.2, "seed": 1}
     return {
         "surface": {"spectrum": spectrum, "grid": [grid, grid], "lengths": [1.0, 1.0]},
@@ -44,8 +44,8 @@ COMMANDS = {
     "accuracy": ("run", data() | {"accuracy": 0.1}),
     "conductance": ("run", data(conductance={"conductivity": ["50 W/m/K"]})),
     "concurrent": ("run", data("concurrent", **TETRAHEDRA)),
-    "hexahedra": ("run", data("isolated", **HEXAHEDRA)),
-    "tetrahedra": ("run", data("isolated", **TETRAHEDRA)),
+    "hexahedra": ("run", data("isolated", patches={"grid": [2, 1]}, **HEXAHEDRA)),
+    "tetrahedra": ("run", data("isolated", patches={"grid": [2, 1]}, **TETRAHEDRA)),
     "surface": ("surface", data()),
 }
 """What one process is asked for in turn. Modules stay: what comes later may load more, not less."""

@@ -14,9 +14,10 @@ from multiscale.cli.command_line import SturdyStream, sturdy_streams
 
 PAPER = str(Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml")
 SMALL = [
-    "--set", "surface.grid=[32, 32]", "coupling.kind=analytic", "micro.model=half-space",
+    "--set", "surface.grid=[24, 24]", "coupling.kind=analytic", "micro.model=half-space",
     "load.steps=2", "output.figures=false",
 ]  # fmt: skip
+PLAN = ["plan", PAPER, *SMALL]
 COMMAND = [sys.executable, "-m", "patchlaw"]
 
 
@@ -72,7 +73,7 @@ def test_run_whose_reader_has_enough_comes_to_its_end(root, tmp_path):
 @pytest.mark.parametrize(
     ("words", "encoding"),
     [
-        (["plan", PAPER], "ascii"), (["plan", PAPER], "latin-1"),
+        (PLAN, "ascii"), (PLAN, "latin-1"),
         (["run", "--help"], "ascii"), (["run", "missing_µ.toml"], "ascii"),
     ],
 )  # fmt: skip
@@ -80,7 +81,7 @@ def test_terminals_without_greek_letters(root, words, encoding):
     done = shell(root, words, "", encoding, PYTHONIOENCODING=encoding)
     assert done.returncode == (2 if words[0] == "run" and "--help" not in words else 0)
     assert "Traceback" not in done.stderr
-    times = r"256 \xd7 256" if encoding == "ascii" else "256 × 256"  # latin-1 has it
+    times = r"24 \xd7 24" if encoding == "ascii" else "24 × 24"  # latin-1 has it
     assert (times in done.stdout) == (words[0] == "plan")
 
 
@@ -94,12 +95,12 @@ def test_what_has_no_code_is_escaped():
 
 
 def test_optimised_python_runs_and_explains_commands(root):
-    code = f"from multiscale.cli import main; main(['plan', {PAPER!r}]); main(['doctor', '--help'])"
+    code = f"from multiscale.cli import main; main({PLAN!r}); main(['doctor', '--help'])"
     done = subprocess.run(
         [sys.executable, "-OO", "-c", code], cwd=root, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert "256 × 256" in done.stdout and "usage: patchlaw doctor" in done.stdout
+    assert "24 × 24" in done.stdout and "usage: patchlaw doctor" in done.stdout
 
 
 @pytest.mark.parametrize("seconds", [0.15, 0.4])

@@ -18,7 +18,7 @@ SCENE = {
         "poisson_ratio": 0.3,
         "height": "10 mm",
         "lengths": ["10 mm", "10 mm"],
-        "cells": [4, 4, 3],
+        "cells": [3, 3, 2],
     },
     "law": {"kind": "representative", "seeds": [1, 2]},
     "load": {"force": "2 kN", "steps": 1},

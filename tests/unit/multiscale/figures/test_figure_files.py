@@ -1,6 +1,7 @@
 """Figures are drawn once, by another process where one can, with room for every label."""
 
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -63,15 +64,28 @@ def test_an_error_while_drawing_is_told(process):
     assert set(process.draw(surface_drawing()).result().files) == {"s.png"}
 
 
+def has_ended(status):
+    """Tell whether a process is gone, or waits to be collected by the system."""
+    try:
+        return "State:\tZ" in status.read_text()
+    except OSError:
+        return True
+
+
 @pytest.mark.parametrize(
-    ("kill", "before"),
+    ("kill", "before", "end"),
     [
-        ("kill", ""),  # the first process, which is forked
+        ("kill", "", "process.close()"),  # the first process, which is forked
         # all of them, and PETSc handles signals
-        ("killpg", "from mpi4py import MPI\nfrom petsc4py import PETSc"),
+        (
+            "killpg",
+            "from mpi4py import MPI\nfrom petsc4py import PETSc",
+            "os.kill(os.getpid(), signal.SIGKILL)",
+        ),
     ],
 )
-def test_figures_are_drawn_here_where_a_process_has_ended(before, kill):
+def test_processes_that_have_ended_are_done_without_and_others_end_with_this_one(before, kill, end):
+    """Figures are drawn here then; the processes of a killed one and closed ones end as well."""
     script = (
         f"{before}\n"
         "import os, signal\n"
@@ -83,35 +97,6 @@ def test_figures_are_drawn_here_where_a_process_has_ended(before, kill):
         "drawn = [process.draw(surface_drawing(name=name)) for name in 'abc']\n"
         "print(*(name for one in drawn for name in one.result().files))\n"
         "process.close()\n"
-    ).replace("helpers_here", Path(__file__).stem)
-    paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-    ended = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60,
-        env=os.environ | {"PYTHONPATH": paths},
-    )  # fmt: skip
-    assert (ended.returncode, ended.stdout) == (0, "a.png b.png c.png\n"), ended.stderr
-
-
-def test_a_process_that_is_closed_draws_no_more(process):
-    begun = process.draw(surface_drawing())
-    process.close()
-    assert isinstance(begun, Future) and (begun.cancelled() or begun.result() == Pictures({}))
-
-
-def has_ended(status):
-    """Tell whether a process is gone, or waits to be collected by the system."""
-    try:
-        return "State:\tZ" in status.read_text()
-    except OSError:
-        return True
-
-
-@pytest.mark.parametrize("end", ["os.kill(os.getpid(), signal.SIGKILL)", "process.close()"])
-def test_the_processes_end_with_a_killed_one_and_when_they_are_closed(end):
-    script = (
-        "import os, signal\n"
-        "from multiscale.figures.files import FigureProcess\n"
-        "from helpers_here import surface_drawing\n"
         "process = FigureProcess(2)\n"
         "for _ in range(2): process.draw(surface_drawing()).result()\n"
         "first = process._process.pid\n"
@@ -120,16 +105,25 @@ def test_the_processes_end_with_a_killed_one_and_when_they_are_closed(end):
         f"{end}\n"
     ).replace("helpers_here", Path(__file__).stem)
     paths = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
-    shown = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True,
+    ended = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=60,
         env=os.environ | {"PYTHONPATH": paths},
     )  # fmt: skip
-    statuses = [Path(f"/proc/{int(number)}/status") for number in shown.stdout.split()]
+    assert ended.returncode == (0 if "close" in end else -signal.SIGKILL), ended.stderr
+    drawn, processes = ended.stdout.splitlines()
+    assert drawn == "a.png b.png c.png", ended.stderr
+    statuses = [Path(f"/proc/{int(number)}/status") for number in processes.split()]
     assert len(statuses) == 2
     until = time.monotonic() + 60.0
     while time.monotonic() < until and not all(map(has_ended, statuses)):
         time.sleep(0.05)
     assert all(map(has_ended, statuses))
+
+
+def test_a_process_that_is_closed_draws_no_more(process):
+    begun = process.draw(surface_drawing())
+    process.close()
+    assert isinstance(begun, Future) and (begun.cancelled() or begun.result() == Pictures({}))
 
 
 @pytest.mark.parametrize(

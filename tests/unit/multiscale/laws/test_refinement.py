@@ -141,7 +141,7 @@ def test_tolerance_that_is_missed_is_said(tolerance, missed):
                 "surface": {"spectrum": spectrum, "grid": [16, 16], "lengths": [1.0, 1.0]},
                 "block": {"young_modulus": 4000.0, "poisson_ratio": 0.3, "cells": [4, 4, 4]},
                 "patches": {"grid": [2, 2]},
-                "micro": {"model": "elliptic"},
+                "micro": {"model": "circular-independent"},
                 "coupling": {"table_tolerance": tolerance},
                 "load": {"approach": 0.01, "steps": 1},
             }

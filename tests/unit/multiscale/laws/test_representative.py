@@ -20,7 +20,7 @@ MODULUS = 4000.0
 
 def sample(seed, slope=0.1):
     spectrum = Spectrum(hurst=0.8, waves=(2, 6), rms_slope=slope, seed=seed)
-    return synthesise(spectrum, grid=(24, 24), lengths=(1.0, 1.0))
+    return synthesise(spectrum, grid=(18, 18), lengths=(1.0, 1.0))
 
 
 SAMPLES = [sample(1), sample(2), sample(3, slope=0.07)]

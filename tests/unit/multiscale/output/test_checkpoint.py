@@ -28,7 +28,7 @@ from support.errors import InputError, NotConverged, NotWritten
 
 PAPER = Path(__file__).parents[4] / "demos" / "scenes" / "paper.toml"
 ALONE = {"coupling": {"kind": "analytic"}, "micro": {"model": "half-space"}}
-CUBE = {"block": {"cells": [4, 4, 3]}, "patches": {"grid": [2, 2]}}
+CUBE = {"block": {"cells": [3, 3, 2]}, "patches": {"grid": [2, 2]}}
 FORCE = {"force": ["3 N", "1 N", "2 N"], "steps": 1, "tilt": "free"}
 COUPLINGS = {
     "half-space": ALONE,
