@@ -49,8 +49,9 @@ _NOISE = 2.0
 """Change of a residual over the step above which the step was not its cause."""
 _DEPENDENT = 1e-2
 """Changes that differ less in direction, times their length, are taken for one."""
-_NEARLY_FULL = 0.9
-"""Share of the cells that touch above which the approach of a period may have turned back."""
+_NEARLY_FULL = 0.8
+"""Share of the cells that touch above which the approach of a period may have turned back. It did
+from 0.89 on, in the median from 0.97, on 145 periods of rms gradients of 0.05 to 0.5."""
 
 
 class AndersonMixing:

@@ -23,8 +23,9 @@ FULL_CONTACT = 0.01
 """Compliance of a law in full contact, relative to its mean one up to there. The interface itself
 has none left; without any, the pressure would be no function of closure."""
 
-_NEARLY_FULL = 0.9
-"""Contact area fraction from which on the law of a sample with finite slopes may have ended."""
+_NEARLY_FULL = 0.8
+"""Contact area fraction from which on the law of a sample with finite slopes may have ended; the
+least one where the approach turned back was 0.89."""
 _ROUNDING = 1e-12
 """Separations that differ by no more, over the largest, are one."""
 _MOST = 0.9
