@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections import Counter
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -28,6 +29,22 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 os.environ["PATCHLAW_CACHE"] = "off"
 SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
 """Where the compliance of a body is itself what is tested."""
+
+
+LONGEST = (
+    "house/test_wheel.py", "house/test_demos.py", "parallel/test_scene_bodies.py",
+    "house/test_my_surface.py", "house/test_style.py", "parallel/test_choice_ranks.py",
+    "parallel/test_resume.py", "verification/test_finite_slopes_periodic.py",
+    "parallel/test_four_ranks.py", "parallel/test_memory_ranks.py", "parallel/test_faults.py",
+)  # fmt: skip
+"""Files of half a minute and more, begun first, so that no worker waits for one at the end."""
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take longest, then with those of most tests."""
+    tests = Counter(item.path for item in items)
+    first = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: (first.get(item.path, len(first)), -tests[item.path]))
 
 
 def pytest_collection_finish():
