@@ -65,7 +65,7 @@ def test_force_of_the_whole_surface(name, count):
 def test_stated_error_bounds_the_force_between_rows():
     """On fresh surfaces the stated error is what extra contact problems find, or a little more."""
     rng, ratios = np.random.default_rng(2026), []
-    for _ in range(12):
+    for _ in range(8):
         spectrum = Spectrum(
             hurst=rng.uniform(0.5, 0.95),
             waves=(2, int(rng.choice([8, 10, 20]))),
@@ -76,7 +76,9 @@ def test_stated_error_bounds_the_force_between_rows():
         count, end = int(rng.choice([1, 4, 8])), rng.uniform(4e-3, 9e-3)
         patches = PatchGrid(grid=(count, count), lengths=surface.lengths)
         model, means, table = table_of(surface, patches, end=end, tolerance=3e-3)
-        approach = end * np.sort(np.append(rng.uniform(0.1, 1.0, 30) ** 2, rng.uniform(size=20)))
+        approach = (
+            end * np.sort(np.append(rng.uniform(0.1, 1.0, 30) ** 2, rng.uniform(size=20)))[::2]
+        )
         forces = respond(model, [*approach, end], patches=patches, mean_heights=means).force
         made = [macro_force(table, np.full(patches.count, each)) for each in approach]
         # errors of smaller loads are relative to 3 % of the largest

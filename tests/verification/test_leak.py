@@ -78,7 +78,7 @@ def test_a_smooth_constriction_converges_quadratically():
 def test_a_slit_in_a_wall_resists_as_its_conformal_map_says(opening):
     """One constriction between two wide parts, under a wall of one cell: linear in the cells."""
     errors = []
-    for across in (64, 128, 256):
+    for across in (48, 96, 192):
         along, slit = 3 * across + 1, int(opening * across)
         gap = np.ones((along, across))
         gap[along // 2] = 0.0
@@ -94,7 +94,7 @@ def test_a_slit_in_a_wall_resists_as_its_conformal_map_says(opening):
 
 def test_shallow_roughness_of_any_stretch():
     """To second order in σ/h: at h = 20 σ the flow factor differs from 1 by some 10⁻³."""
-    for stretch in (1.0 / 3.0, 1.0, 3.0):
+    for stretch in (1.0 / 3.0, 3.0):
         expected = slight_roughness(20.0, stretch) - 1.0
         found = flow_factor(20.0, stretch, linear=False) - 1.0
         # three to eight cells on a correlation length across, and the scatter of three surfaces

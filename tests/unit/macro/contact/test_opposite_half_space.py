@@ -264,7 +264,7 @@ def rigid_square_on_springs(nu, compliance, n=24):
     return pressure.mean(), traction[0].mean()
 
 
-@pytest.mark.parametrize(("nu", "opposite"), [(0.0, 1e-3), (0.3, 1e-3), (0.49, 1e-3), (0.3, 0.02)])
+@pytest.mark.parametrize(("nu", "opposite"), [(0.0, 1e-3), (0.49, 1e-3), (0.3, 0.02)])
 def test_a_rigid_body_shears_a_half_space_as_dense_matrices_say(nu, opposite):
     control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
     state, stiffness = rubbed(face_of(8), control, nu=nu, opposite=opposite)
@@ -297,7 +297,7 @@ def test_with_friction_too_a_body_is_solved_for_a_few_times(ratio):
 def test_sliding_on_a_half_space_far_softer_than_springs_is_that_of_a_punch_without_springs():
     """Stiff springs close by less and less of the approach: forces grow as the half-space's."""
     scaled = []
-    for softer in (1e3, 1e4):  # than springs under the whole face
+    for softer in (300.0, 1e3):  # than springs under the whole face
         control = Control(approach=APPROACH, shear=ShearControl(shift=(SHIFT, 0.0)))
         state, _ = rubbed(face_of(1), control, opposite=softer / STIFF, friction=0.3)
         scaled.append(softer * np.array([state.force, state.shear.force[0]]))
