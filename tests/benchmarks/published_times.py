@@ -280,7 +280,7 @@ TABLES: dict[str, tuple[list[str], Callable[..., list[list[str]]]]] = {
         ],
         peers_large,
     ),
-    "laws": (["8 load steps, 128² heights", "CPU time [s]", "ratio"], laws),
+    "laws": (["8 load steps, mostly 128² heights", "CPU time [s]", "ratio"], laws),
     "couplings": (["", "16 patches", "256 patches"], couplings),
     "slopes": (["heights", "with the body", "with finite slopes, too"], slopes),
     "shear": (["boundary", "ν", "shear over normal"], shear),
