@@ -39,7 +39,7 @@ PIXELS, SAMPLE, CELLS = (64, 32, 32) if choice.quick else (256, 160, 128)  # alo
 SHORT, EDGE = (0.15, 8.0) if choice.quick else (0.05, 2.0)  # cut-off, edges of the pad [mm]
 MATERIALS = {"lining": (1000.0, 0.25), "back plate": (210e3, 0.3)}  # E [MPa] and ν
 FORCE, PRESSURE = 8e3, 1.73  # on the pad [N], its mean [MPa]
-ROWS = {"coupling.table_tolerance": 1e-2 if choice.quick else 1e-3}
+ROWS = {"coupling.table_tolerance": 1e-2} if choice.quick else {}
 say = partial(print, flush=True) if COMM.rank == 0 else (lambda text: None)
 
 # %% [markdown]

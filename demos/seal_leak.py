@@ -33,8 +33,8 @@ choice.out.mkdir(parents=True, exist_ok=True)
 BODIES = Path(__file__).parent / "bodies"
 HEIGHTS = {"0.05 um": BLUE, "0.1 um": GREEN, "0.2 um": VERMILLION}
 SIZE, STEPS = ("1.25", 2) if choice.quick else ("0.5", 9)
-SMALL = {"surface.grid": [32, 32], "surface.spectrum.waves": [2, 8]}
-SMALL = SMALL | {"coupling.table_tolerance": 1e-2} if choice.quick else {}
+FEW = {"surface.grid": [32, 32], "surface.spectrum.waves": [2, 8], "coupling.table_tolerance": 1e-2}
+SMALL = FEW if choice.quick else {}
 
 # %%
 mesh = choice.out / "seal_ring.msh"

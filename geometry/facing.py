@@ -100,7 +100,7 @@ def facing(first: Surface, second: Surface) -> Surface:
         source=f"{first.source}; facing {second.source}",
         notes=(*first.notes, *(f"counter-surface: {note}" for note in second.notes)),
     )
-    check_slopes(both, " as both sides together")
+    check_slopes(both, ": these are both sides together")
     return both
 
 

@@ -2,8 +2,8 @@
 
 The mean pressure of a period displaces no cell of a half-space. Near full contact the force
 therefore rises steeply with the approach, and in full contact no approach determines it. Finite
-slopes turn the curve over: summits under the mean pressure are compressed as the body is, and what
-they are flattened by falls by as much. From an approach shortly before full contact on, the largest
+slopes turn the curve over: the mean pressure compresses the heights as it does the body, so that
+less of them remains to be flattened. From an approach shortly before full contact on, the largest
 of all, the plane goes back as the force rises: a surface in full contact is stiffer than a smooth
 body of its volume, from whose surface the approach counts.
 
