@@ -6,7 +6,7 @@ from macro.bodies import MeshedBody as MeshedBody
 from macro.compat import vector_space as vector_space
 from macro.compliance.face_compliance import FaceCompliance as FaceCompliance
 from macro.compliance.face_compliance import face_compliance as face_compliance
-from macro.compliance.face_tractions import face_tractions as face_tractions
+from macro.compliance.face_compliance import face_tractions as face_tractions
 from macro.contact.contact_problem import ContactProblem as ContactProblem
 from macro.contact.face_equilibrium import FaceEquilibrium as FaceEquilibrium
 from macro.contact.face_pair import FacePair as FacePair

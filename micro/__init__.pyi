@@ -32,7 +32,7 @@ from micro.by_name import micro_model as micro_model
 from micro.closed_forms.hertz import HertzContact as HertzContact
 from micro.closed_forms.love import influence_matrix as influence_matrix
 from micro.friction.friction_model import FrictionModel as FrictionModel
-from micro.half_space.contact_spots import find_spots as find_spots
+from micro.half_space.cell_sums import find_spots as find_spots
 from micro.half_space.model import HalfSpaceModel as HalfSpaceModel
 from micro.model import MicroModel as MicroModel
 from micro.model import Stiffness as Stiffness

@@ -3,9 +3,10 @@
 The block is solved for even and odd modes of pressure separately, which its two vertical planes of
 symmetry decouple. Under a pressure that is even along an axis, the displacement component along
 that axis is odd along it, and the other components are even; under an odd pressure it is the other
-way round.
+way round. Tractions along the top load the block with the same parities: one solution of each
+serves all three directions.
 
-Theory: section 6 of ``docs/theory.md``.
+Theory: sections 6 and 15 of ``docs/theory.md``.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from support.errors import InputError
 
 if TYPE_CHECKING:
     from macro.bodies import Sides
+
 
 Parity = tuple[int, int]
 """Parity of a pressure along x and along y: 0 even, 1 odd."""
@@ -320,3 +322,52 @@ def stresses_in_face(material: Material, strains: Sequence[Array], area: float |
     if area is not None:
         stresses[:2] -= nu / (1.0 - nu) * (np.eye(len(xx)) / area)
     return stresses
+
+
+def face_tractions(
+    lengths: tuple[float, float],
+    height: float,
+    material: Material,
+    sides: Sides,
+    count: int,
+    comm: Any,
+) -> Array:
+    """Solve for the displacements of a block's top by every mode of traction, or read them.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the block's top, all of which the modes cover [mm].
+        height: Height of the block [mm].
+        material: Elastic constants.
+        sides: Support of the block's sides.
+        count: Modes K along a side of the top, at least 2.
+        comm: MPI communicator; None for this process alone.
+
+    Returns:
+        Displacements along x, along y and downwards by tractions likewise, in modes: symmetric,
+        shape (3, 3, K², K²) [mm/N]; the same on every rank and for every number of ranks.
+
+    Note:
+        Collective. The ranks share the parities.
+    """
+
+    def compute() -> dict[str, Array]:
+        lines = block_lines(lengths, height, count)
+
+        def block(parity: Parity) -> ParityBlock:
+            return ParityBlock(
+                lines=lines, height=height, material=material, sides=sides, parity=parity
+            )
+
+        parts = shared(comm, 4, lambda index: block(PARITIES[index]).traction_response())
+        total = np.zeros((3, 3, *4 * (count,)))
+        for parity, response in zip(PARITIES, parts, strict=True):
+            odd = [block(parity).parity_of(axis) for axis in range(3)]
+            for seen, row in enumerate(response):
+                for by, part in enumerate(row):
+                    (a, b), (c, d) = odd[seen], odd[by]
+                    total[seen, by, a::2, b::2, c::2, d::2] = part
+        total = total.reshape(3, 3, count**2, count**2) / (lengths[0] * lengths[1]) ** 2
+        return {"tractions": 0.5 * (total + total.transpose(1, 0, 3, 2))}
+
+    block_key = (lengths, height, material, sides, count)
+    return cached("tractions", block_key, compute, comm)["tractions"]

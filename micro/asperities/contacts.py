@@ -32,8 +32,8 @@ from micro.asperities.summit_problem import (
     active_set,
     check_pairs,
     solve,
+    truncated_newton,
 )
-from micro.asperities.truncated_newton import truncated_newton
 from support.arrays import Array
 
 T = TypeVar("T")

@@ -14,7 +14,7 @@ over the four cells below, and 1 at most, so that those of a lone contact fall w
 cells. On the way back every cell takes what it does not know from the next coarser grid.
 
 A cell that bears its load on a spring of its own, in series with the half-space, moves more than
-the surface does. Its weight on the finest grid is less than 1 (`micro.friction.free_inverse`).
+the surface does. Its weight on the finest grid is less than 1 (`micro.friction.stick_slip`).
 
 Theory: docs/theory.md, section 4.
 """

@@ -3,9 +3,9 @@
     FrictionModel                  load steps, dissipation, stiffness     `friction_model`
       └ solve_tractions            which cells slip, and where to         `stick_slip`
           └ ContactCells           their tractions                        `micro.complementarity`
-              ├ FreeInverse        their preconditioner                   `free_inverse`
+              ├ FreeInverse        their preconditioner                   `stick_slip`
               └ TangentialGrid     tangential compliance                  `tangential_grid`
 
-They solve a `TractionProblem` (`traction_problem`). `goodman` measures what is neglected for bodies
-of different elasticity.
+They solve a `TractionProblem` (`traction_problem`). `CrossCompliance` in `tangential_grid` is what
+Goodman's assumption neglects for bodies of different elasticity, and `coupled` takes into account.
 """

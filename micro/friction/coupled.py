@@ -1,9 +1,9 @@
 """Contact and friction that see each other: pressures and tractions in turn until they agree.
 
 Pressures displace the surface sideways, which shears the contact, and tractions displace it across,
-which changes the pressures. Both displacements are those of `micro.friction.goodman`. Each problem
-is solved for what the other one displaced; the displacements across are extrapolated from the last
-few passes.
+which changes the pressures. Both displacements are those of `micro.friction.tangential_grid`. Each
+problem is solved for what the other one displaced; the displacements across are extrapolated from
+the last few passes.
 
 Theory: docs/theory.md, section 15.
 """

@@ -1,8 +1,8 @@
 """Friction of a rough surface on a half-space: shear step by step, under given pressures.
 
 Pressures come from the normal contact, which shear leaves as it is: exactly so for like
-half-spaces, and by Goodman's assumption for others (`micro.friction.goodman`), unless both are
-solved in turn (`micro.friction.coupled`). A load step follows the slip of the one before. Cells
+half-spaces, and by Goodman's assumption for others (`micro.friction.tangential_grid`), unless both
+are solved in turn (`micro.friction.coupled`). A load step follows the slip of the one before. Cells
 that touch anew begin without traction: before they touched, they followed the body that they are
 on.
 
@@ -22,9 +22,13 @@ from geometry.shear_state import ShearControl, ShearState
 from micro.boundary_elements.half_space_grid import Cells
 from micro.boundary_elements.traction_modes import TractionModes, TractionsOnCells
 from micro.complementarity.cell_fields import Box, box_around
-from micro.friction.goodman import CrossCompliance
 from micro.friction.stick_slip import FreeTractions, solve_tractions
-from micro.friction.tangential_grid import BodyGrid, TangentialGrid, tangential_grid
+from micro.friction.tangential_grid import (
+    BodyGrid,
+    CrossCompliance,
+    TangentialGrid,
+    tangential_grid,
+)
 from micro.friction.traction_problem import TractionProblem
 from support.arrays import Array, Flags
 from support.cores import blas_threads

@@ -1,13 +1,16 @@
 """The style of all figures: palette, sizes, fonts, and how they are written.
 
 Functions that draw are decorated by ``@styled()``; scripts call `use_style` once. All figures are
-made by `new_figure`, in one of two widths, and written by `save`.
+made by `new_figure`, in one of two widths, and written by `save`. PNG files are written without the
+filters of rows, which take longer than compression and make files of figures no smaller.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import struct
+import zlib
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, ContextDecorator
 from io import BytesIO
 from pathlib import Path
@@ -15,12 +18,13 @@ from typing import Any, cast
 
 import numpy as np
 from matplotlib import colormaps, cycler, rc_context, rcParams
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
+from numpy.typing import NDArray
 
 from multiscale.figures.plain_axes import PlainAxes
-from multiscale.figures.png import png_of
 from multiscale.readable import number, power_of_ten, usual_unit
 
 BLUE, VERMILLION, GREEN, ORANGE = "#0072b2", "#d55e00", "#009e73", "#e69f00"
@@ -320,3 +324,39 @@ def add_legend(figure: Figure) -> None:
     first = figure.axes[0]
     if len(first.get_legend_handles_labels()[0]) > 1:
         first.legend()
+
+
+_LEVEL = 3
+"""Level of compression; 6, the usual one, takes twice as long for a tenth of the size."""
+_METRE = 39.37  # inches
+
+
+def png_of(figure: Any, dots_per_inch: int) -> bytes:
+    """Draw a figure; return the content of its PNG file.
+
+    Args:
+        figure: A figure of matplotlib, which keeps the resolution.
+        dots_per_inch: Resolution.
+
+    Source: PNG specification, third edition (W3C 2025), sections 5 and 11.
+    """
+    figure.set_dpi(dots_per_inch)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunks(np.asarray(canvas.buffer_rgba()), dots_per_inch))
+
+
+def _chunks(pixels: NDArray[np.uint8], dots_per_inch: int) -> Iterator[bytes]:
+    """Yield the chunks of a file of pixels, shape (height, width, 4)."""
+    height, width, _ = pixels.shape
+    rows = np.zeros((height, 1 + 3 * width), np.uint8)  # each begins with its filter, none
+    rows[:, 1:].reshape(height, width, 3)[:] = pixels[..., :3]
+    per_metre = round(dots_per_inch * _METRE)
+    for name, content in (
+        (b"IHDR", struct.pack(">2I5B", width, height, 8, 2, 0, 0, 0)),  # 8 bits of red, green, blue
+        (b"pHYs", struct.pack(">2IB", per_metre, per_metre, 1)),
+        (b"IDAT", zlib.compress(rows.tobytes(), _LEVEL)),
+        (b"IEND", b""),
+    ):
+        check = struct.pack(">I", zlib.crc32(name + content))
+        yield struct.pack(">I", len(content)) + name + content + check

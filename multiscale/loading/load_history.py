@@ -13,8 +13,15 @@ import numpy as np
 from geometry import Control
 from geometry.shear_state import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
-from multiscale.loading.shear_path import ShearPath
-from multiscale.loading.stages import Leg, Quantity, Repeats, Stage, legs_of, stated_shears
+from multiscale.loading.stages import (
+    Leg,
+    Quantity,
+    Repeats,
+    ShearPath,
+    Stage,
+    legs_of,
+    stated_shears,
+)
 from support.errors import InputError
 from support.fields import KEY, Limits, Slope, Unit, check_limits
 from support.quantities import example

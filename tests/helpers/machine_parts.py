@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from geometry.meshes.gmsh_session import gmsh_session
+from geometry.meshes.gmsh_block import gmsh_session
 from macro import Material, MeshedBody, Support
 from macro.mesh.from_file import read_mesh
 from support.collective import on_root

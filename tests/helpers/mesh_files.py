@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import numpy as np
 from dolfinx import mesh as dmesh
 
-from geometry.meshes.gmsh_session import gmsh_session
+from geometry.meshes.gmsh_block import gmsh_session
 from macro.mesh.tagged import TaggedMesh
 
 KINDS = {2: 3, 3: 4, 4: 4, 5: 8, 6: 6, 9: 6, 11: 10}

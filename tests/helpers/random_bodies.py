@@ -12,8 +12,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from geometry.meshes.gmsh_block import gmsh_session
 from geometry.meshes.gmsh_file import MeshArrays, read_gmsh_file
-from geometry.meshes.gmsh_session import gmsh_session
 from geometry.rigid_plane import Control
 from macro import (
     LawContactProblem,

@@ -9,7 +9,7 @@ from dolfinx import mesh as dmesh
 from scipy.spatial import cKDTree
 
 from geometry import RefinedShape
-from geometry.meshes.gmsh_session import gmsh_session
+from geometry.meshes.gmsh_block import gmsh_session
 from macro import TaggedMesh
 from macro.mesh.block import move_onto
 from support.collective import on_root

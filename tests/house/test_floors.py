@@ -27,7 +27,7 @@ FLOORS = {
     "geometry": [
         "interpolant legendre_modes materials",
         "face_frame filters spring_bed surface",
-        "patches sliders spectrum statistics summits zero",
+        "patches sliders spectrum statistics zero",
         "plausibility shear_state",
         "facing preparation rigid_plane",
         "files",

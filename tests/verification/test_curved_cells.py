@@ -8,7 +8,7 @@ from helpers.user_problems import BOTTOM, TOP, PowerLaw, box, clamped, elastic, 
 from mpi4py import MPI
 
 from geometry import Control
-from geometry.meshes.gmsh_session import gmsh_session
+from geometry.meshes.gmsh_block import gmsh_session
 from macro import ContactProblem, Interface, compat, write_mesh
 from macro.mesh.from_file import read_mesh
 from macro.mesh.tagged import planar_face, surface_area

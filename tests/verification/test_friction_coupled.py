@@ -18,8 +18,7 @@ from geometry.shear_state import ShearControl, ShearState
 from micro import FrictionModel, HalfSpaceModel
 from micro.boundary_elements.half_space_grid import HalfSpaceGrid
 from micro.friction.coupled import press_coupled
-from micro.friction.goodman import CrossCompliance
-from micro.friction.tangential_grid import cerruti_kernels
+from micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
 
 APPROACH, RADIUS = 1e-3, 0.4
 PRESSED = Control(approach=APPROACH, shear=ShearControl(shift=(0.0, 0.0)))

@@ -3,7 +3,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from geometry import Asperities, InputError, Spectrum, Surface, find_asperities, synthesise
-from geometry.summits import grid_maxima, slopes_and_curvatures
+from geometry.asperities import grid_maxima, slopes_and_curvatures
 
 
 def sampled(function, grid=(24, 30), lengths=(1.2, 1.5), periodic=False):

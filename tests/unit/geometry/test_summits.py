@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from geometry import Surface
-from geometry.summits import coincident, constrained_summits, grid_maxima
+from geometry.asperities import coincident, constrained_summits, grid_maxima
 
 N = 20
 

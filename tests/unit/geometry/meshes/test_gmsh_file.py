@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.mesh_files import gmsh_boxes, write_boxes, write_msh2
 
+from geometry.meshes.gmsh_block import gmsh_session
 from geometry.meshes.gmsh_file import read_gmsh_file
-from geometry.meshes.gmsh_session import gmsh_session
 from support.errors import InputError
 
 CUBE = np.array([(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)], float)

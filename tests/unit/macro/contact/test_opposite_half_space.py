@@ -12,8 +12,7 @@ from macro import LawContactProblem, LoadedFace
 from macro.contact.opposite_half_space import OppositeHalfSpace
 from macro.mesh.contact_face import top_facets
 from micro import influence_matrix
-from micro.friction.goodman import CrossCompliance
-from micro.friction.tangential_grid import cerruti_kernels
+from micro.friction.tangential_grid import CrossCompliance, cerruti_kernels
 from support.errors import NotConverged
 
 COMPLIANCE = 1e-3  # (1 − ν²)/E of the half-space [1/MPa]

@@ -6,8 +6,13 @@ from helpers.asperity_states import places
 
 from geometry import NotConverged
 from micro.asperities.hertz_pairs import HertzPairs
-from micro.asperities.summit_problem import TOLERANCE, SummitProblem, active_set, damped_step
-from micro.asperities.truncated_newton import truncated_newton
+from micro.asperities.summit_problem import (
+    TOLERANCE,
+    SummitProblem,
+    active_set,
+    damped_step,
+    truncated_newton,
+)
 from micro.closed_forms.hertz import shape_factors
 
 

@@ -6,8 +6,7 @@ import pytest
 from geometry.legendre_modes import mode_means
 from geometry.materials import Material, MaterialPair
 from micro.boundary_elements.traction_modes import TractionModes, half_space_traction_modes
-from micro.friction.goodman import CrossCompliance
-from micro.friction.tangential_grid import tangential_grid
+from micro.friction.tangential_grid import CrossCompliance, tangential_grid
 from support.errors import InputError
 
 LENGTHS, GRID, COUNT = (1.0, 0.7), (96, 64), 3

@@ -5,7 +5,7 @@ import pytest
 
 from micro.boundary_elements.extension import Extension
 from micro.boundary_elements.half_space_grid import Cells
-from micro.friction.free_inverse import FreeInverse, across
+from micro.friction.stick_slip import FreeInverse, across
 from micro.friction.tangential_grid import TangentialGrid
 
 GRID = 16, 14

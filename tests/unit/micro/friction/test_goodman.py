@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import dblquad
 
 from geometry.materials import Material, MaterialPair
-from micro.friction.goodman import CrossCompliance
+from micro.friction.tangential_grid import CrossCompliance
 
 GRID, SPACING = (8, 6), (0.13, 0.21)
 SOFT = Material(young_modulus=1300.0, poisson_ratio=0.12)

@@ -10,7 +10,7 @@ from PIL import Image
 
 from multiscale.figures import style
 from multiscale.figures.plain_axes import PlainAxes
-from multiscale.figures.png import png_of
+from multiscale.figures.style import png_of
 
 
 def drawn(axes_class, draw):
