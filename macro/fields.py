@@ -1,11 +1,16 @@
-"""Writes displacements, stresses and contact pressures of a body for ParaView.
+"""Writes displacements, stresses and contact pressures of bodies for ParaView.
+
+They are those of bodies that were pressed as meshes, whose displacements are kept. Elsewhere a body
+with a flat top is meshed after the load, and loaded by the contact pressures: by those of the cells
+or asperities, summed over the facets of the mesh, or with laws by the means of the patches.
 
 Theory: docs/theory.md, section 11.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
@@ -15,8 +20,10 @@ from dolfinx import fem, io
 from numpy.typing import NDArray
 
 from geometry.materials import von_mises
+from geometry.patches import PatchGrid
 from macro import compat
 from macro.contact.face_equilibrium import FaceEquilibrium
+from macro.contact.face_pair import FacePair
 from macro.contact.loaded_face import LoadedFace, Outline
 from macro.contact.unilateral_problem import UnilateralContactProblem
 from macro.elastic_body import ElasticBody
@@ -79,6 +86,69 @@ def write_fields(path: Path | str, face: LoadedFace, steps: Iterable[FieldStep])
 
     with compat.vtx_writer(str(Path(path).with_suffix(".bp"))) as write_vtx:
         _write_xdmf(str(path), body.mesh.mesh, functions())
+
+
+def write_solved(
+    path: Path, whole: LoadedFace | FacePair, parts: PatchGrid, states: Mapping[int, Array]
+) -> None:
+    """Write the fields of bodies under pressures of parts of their contact face.
+
+    Args:
+        path: File to write, ending in ``.xdmf``.
+        whole: The contact face of the body, or of both; their files are named as `write_displaced`
+            does.
+        parts: The N parts.
+        states: Pressures by number of the load step, shape (N,) each [MPa].
+
+    Note:
+        Collective.
+    """
+
+    def solved(face: LoadedFace) -> Iterator[FieldStep]:
+        for number, pressure in sorted(states.items()):
+            solution = face.body.solve(face.load(pressure))
+            yield FieldStep(number, solution.x.array[: face.body.owned_dofs].copy(), pressure)
+
+    for name, one in _files(path, whole):
+        face = replace(one, patches=parts)
+        write_fields(name, face, solved(face))
+
+
+def write_displaced(
+    path: Path,
+    face: LoadedFace | FacePair,
+    states: Mapping[int, tuple[Array, float]],
+    pressures: Callable[[int, bool], Pressures],
+    further: Callable[[int], Sequence[Any]] = lambda number: (),
+) -> None:
+    """Write the fields of bodies whose displacements are known.
+
+    Args:
+        path: File to write, ending in ``.xdmf``; that of the counter-body begins with ``counter_``.
+        face: The contact face of the body, or of both.
+        states: By number of the load step this rank's displacements [mm], and the position among
+            the states of the bodies' loads.
+        pressures: What is shown as pressure, by load step and whether it is on the counter-body.
+        further: Other functions on the mesh of the first body, by load step.
+
+    Note:
+        Collective.
+    """
+
+    def halves(counter: bool) -> Iterator[FieldStep]:
+        for number, (moved, loads) in sorted(states.items()):
+            own = face.body.split(moved)[counter] if isinstance(face, FacePair) else moved
+            more = () if counter else further(number)
+            yield FieldStep(number, own, pressures(number, counter), loads, more)
+
+    for counter, (name, one) in enumerate(_files(path, face)):
+        write_fields(name, one, halves(bool(counter)))
+
+
+def _files(path: Path, face: LoadedFace | FacePair) -> Iterator[tuple[Path, LoadedFace]]:
+    """Yield the contact faces of the body and the counter-body with the files of their fields."""
+    names = path, path.with_name(f"counter_{path.name}")
+    yield from zip(names, face.sides, strict=False)
 
 
 def write_rough_fields(

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import ufl
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro import compat
@@ -18,9 +17,8 @@ from macro.contact.contact_forces import ContactForces, ContactTangent
 from macro.contact.interface import Interface
 from macro.elastic_body import rigid_body_modes
 from macro.linear_solvers.node_matrices import free_unknowns
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _INNER = 1e-3
 """Share of the inner forces J u that residuals are compared with where contact forces are less: of

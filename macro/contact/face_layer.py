@@ -18,7 +18,6 @@ from functools import cached_property
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
@@ -26,9 +25,7 @@ from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.node_matrices import Stiffened, joined_diagonal, springs_at
 from macro.linear_solvers.options import conjugate_gradients, shell
-
-Array = NDArray[np.float64]
-Flags = NDArray[np.bool_]
+from support.arrays import Array, Flags
 
 _OFF = 0.005
 """Change of a pressure, relative to that where most of the force is, from which laws are solved for

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from geometry.rigid_plane import Control, PlaneLevers
@@ -18,11 +17,9 @@ from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from macro.contact.face_equilibrium import FaceShear
 from macro.contact.sampling import Sampling
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.collective import together
 from support.errors import InputError, NotConverged
-
-Indices = NDArray[np.intp]
 
 _HELD = ShearControl(shift=(0.0, 0.0))
 _SAME_PLACE = 1e-6

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
@@ -16,9 +15,8 @@ from macro.contact.face_layer import FaceLayer
 from macro.contact.initial_guess import DisplacementBasis
 from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
+from support.arrays import Array
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
 
 NEAR = 3e-3
 """Residual over the contact forces from which Newton's method goes on alone. With 0.01 three rings

@@ -13,14 +13,12 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from macro.contact.equations import Equilibrium
 from macro.contact.lines import Lines, law_lines
 from macro.contact.sampling import Sampling
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _ROUNDING = 1e-7
 """Smallest part of a displacement that must be new to the basis; less only adds rounding."""

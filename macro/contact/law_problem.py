@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
 from geometry.materials import Material
@@ -33,11 +32,9 @@ from macro.contact.pressed_plane import ContactLaw, ContactLaws
 from macro.contact.sampling import Sampling
 from macro.linear_solvers.options import UNSYMMETRIC
 from macro.linear_solvers.solvers import solve_linear
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.collective import together
 from support.errors import InputError
-
-Indices = NDArray[np.intp]
 
 _ROUGHLY = 1e-3
 """Relative residual of the displacements under a uniform pressure, the first initial guess."""

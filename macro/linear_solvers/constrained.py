@@ -20,10 +20,8 @@ from macro.linear_solvers.node_matrices import (
     nodes_beside,
 )
 from macro.linear_solvers.options import PREFIX, conjugate_gradients, reason_name, shell
+from support.arrays import Array, Indices
 from support.errors import NotConverged
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 TOLERANCE = 1e-10
 """Tolerance of contact: residual and complementarity relative to the contact forces.

@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from petsc4py import PETSc
 from scipy.linalg import block_diag
 
@@ -28,8 +27,7 @@ from macro.linear_solvers.selection import (
     quadratic_options,
 )
 from macro.linear_solvers.solvers import CoarserGrid, LinearSolver, linear_solver
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 
 def joint_solver(bodies: Sequence[Any], stiffness: PETSc.Mat, stiffened: Stiffened) -> LinearSolver:

@@ -25,9 +25,8 @@ from macro.linear_solvers.multigrid_products import galerkin
 from macro.linear_solvers.node_matrices import distributed, for_displacements
 from macro.linear_solvers.solvers import CoarserGrid
 from macro.mesh.block import BlockMesh
+from support.arrays import Array, Indices
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Kept = tuple[Indices, Indices, Indices]
 
 _SLACK = 1.5

@@ -13,8 +13,7 @@ from scipy.sparse import csr_matrix
 
 from macro import compat
 from macro.linear_solvers.options import shell
-
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 
 def node_submatrix(matrix: PETSc.Mat, rows: Indices, columns: Indices) -> csr_matrix:
@@ -192,9 +191,6 @@ def for_displacements(
         )
     matrix.assemble()
     return matrix, coarse
-
-
-Array = NDArray[np.float64]
 
 
 def springs_at(points: PETSc.Mat, slope: Array) -> PETSc.Mat:

@@ -81,6 +81,7 @@ from macro.linear_solvers.solvers import (
     linear_solver,
     pointwise,
 )
+from support.arrays import Array
 
 COMPRESSIBLE = 0.45
 """Largest Poisson's ratio at which multigrid is used without a lattice."""
@@ -323,7 +324,6 @@ def smoothing(poisson_ratio: float, *, hexahedral: bool) -> Mapping[str, object]
     }
 
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int32]
 
 

@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
-from numpy.typing import NDArray
 from petsc4py import PETSc
 
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 _ENOUGH = 18
 """Iterations to `_SMALL` up to which nothing is gained."""

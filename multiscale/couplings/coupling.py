@@ -22,7 +22,6 @@ from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
-from multiscale.bodies.fields import write_solved
 from multiscale.clock import Clock
 from multiscale.couplings import describe, validity
 from multiscale.inputs.bodies import SceneBody
@@ -486,7 +485,9 @@ class Coupling(SceneParts, ABC):
         if self.solver.on_mesh:
             self.solver.write_fields(path, states)
         else:
-            write_solved(path, self.bodies, self.field_parts, states)
+            from macro.fields import write_solved
+
+            write_solved(path, self.bodies.contact_face(), self.field_parts, states)
 
     # --- for the record
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from geometry import Control, PatchGrid, ShearControl
 from micro.model import Stiffness
-from multiscale.bodies.fields import write_displaced
 from multiscale.law_solvers.law_solver import LawSolver
 from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
@@ -110,13 +109,12 @@ class EmbeddedLaws(LawSolver):
 
     def write_fields(self, path: Path, states: Mapping[int, Any]) -> None:
         """Write the fields of the body; where laws hold at points it alone has the pressures."""
+        from macro.fields import write_displaced
+
         of_patches = isinstance(self.table.patches, PatchGrid)
 
         def pressures(number: int, counter: bool) -> Any:
-            shown = states[number][1]
-            if of_patches:
-                return shown
-            return None if counter else shown
+            return states[number][1] if of_patches or not counter else None
 
         moved = {number: state[0] for number, state in states.items()}
         write_displaced(path, self.face, moved, pressures, lambda number: states[number][2])

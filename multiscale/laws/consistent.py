@@ -20,9 +20,9 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, ROW_ERROR, Refined, refined
 from multiscale.laws.rows import PlanePath, SolvedRows
 from multiscale.readable import Observer
+from support.arrays import Array
 from support.collective import on_root_alone, shared
 
-Array = NDArray[np.float64]
 Displacements = Callable[[Array], Array]
 """From pressures of N patches at m load steps to their mean displacements, [MPa] to [mm]."""
 

@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from multiscale.laws.rows import LawRows
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
+from support.arrays import Array, Indices
 
 _LEAST_SLOPE = 1e-6
 """Slope of the closure over the approach that is treated as the end of its rise."""

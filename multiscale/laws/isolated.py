@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import PatchGrid
 from micro import MicroModel, press_along, stacked
@@ -20,9 +19,8 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import MOST_ROWS, refined
 from multiscale.laws.rows import SolvedRows
 from multiscale.readable import Observer
+from support.arrays import Array
 from support.collective import shared
-
-Array = NDArray[np.float64]
 
 _MOST_TRIALS = 40
 """Contact problems at most in search of the approach that gives a closure."""

@@ -9,18 +9,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import PatchGrid, Regions
 from geometry.zero import FIRST_TOUCH
 from multiscale.laws.patch_law import PatchLaw, PatchLaws
 from multiscale.laws.rows import PlanePath
 from multiscale.readable import Caution, Detail, column, number, percent, quantity
+from support.arrays import Indices
 from support.displayed import Displayed, Table, of_columns, spread
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 PATCH_FACTOR = 20.0
 """Tolerance of a patch's pressure, relative to the tolerance of the force."""

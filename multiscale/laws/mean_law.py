@@ -19,9 +19,9 @@ from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.periodic_sample import FULL_CONTACT, Closed, PeriodicSample, SampleRow
 from multiscale.laws.refinement import refined
 from multiscale.laws.rows import SolvedRows
+from support.arrays import Array
 from support.collective import shared
 
-Array = NDArray[np.float64]
 T = TypeVar("T", float, NDArray[np.float64])
 
 _ROWS_TOGETHER = 2

@@ -11,18 +11,16 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from geometry.spring_bed import SpringBed, springs_of
 from multiscale.laws.interpolation import LawCurves, LawPoint
 from multiscale.laws.rows import LawRows, SolvedRows
 from multiscale.laws.transmissivity import Transmissivity
 from multiscale.readable import column, span
+from support.arrays import Array, Indices
 from support.displayed import Displayed, Table, of_columns, spread
 from support.errors import InputError
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 _ROUNDING = 1e-12
 """Share of the end of a table by which a converged closure may exceed it."""

@@ -10,14 +10,12 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from geometry import Control
 from geometry.contact_state import ContactState
 from micro import HalfSpaceModel, Start, press_along
-
-Array = NDArray[np.float64]
+from support.arrays import Array
 
 FULL_CONTACT = 0.01
 """Compliance of a law in full contact, relative to its mean one up to there. The interface itself

@@ -25,9 +25,8 @@ from numpy.typing import NDArray
 from multiscale.laws.interpolation import LawCurves, LawPoint, Tangent
 from multiscale.laws.law_table import PATCH_FACTOR
 from multiscale.laws.rows import SolvedRows
+from support.arrays import Array, Indices
 
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Curves = Callable[[SolvedRows], LawCurves]
 """From columns of rows, shape (m, K), to the laws through each of them."""
 

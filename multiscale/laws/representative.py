@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from geometry import Regions, Surface
 from micro import HalfSpaceModel
@@ -23,7 +22,6 @@ from multiscale.readable import Observer
 from support.checks import of_kind
 from support.errors import InputError
 
-Array = NDArray[np.float64]
 MakeModel = Callable[[Surface], HalfSpaceModel]
 
 

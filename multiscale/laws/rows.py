@@ -13,9 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from support.arrays import Array
 from support.errors import InputError
-
-Array = NDArray[np.float64]
 
 _NOISE = 1e-3
 """Fall of a closure, relative to the range of closures, that counts as noise."""

@@ -157,7 +157,7 @@ def test_fields_are_those_of_the_patch_pressures(monkeypatch):
         for newton in ("full", "condensed")
     )
     written, fields = [], []
-    monkeypatch.setattr("macro.write_fields", lambda path, *what: written.append(what))
+    monkeypatch.setattr("macro.fields.write_fields", lambda path, *what: written.append(what))
     for whole in (full, condensed):
         list(whole.load_steps())
         whole.observers.fields.write(Path("fields.xdmf"), whole.steps, finished=whole.finished)

@@ -484,10 +484,10 @@ def test_fields_cut_short_in_silence_are_told(tmp_path, monkeypatch, name):
         write(path, *arguments)
         os.truncate(path.with_name(name), path.with_name(name).stat().st_size // 2)
 
-    import macro
+    from macro import fields as macro_fields
 
-    write = macro.write_fields
-    monkeypatch.setattr(macro, "write_fields", cut)
+    write = macro_fields.write_fields
+    monkeypatch.setattr(macro_fields, "write_fields", cut)
     fields = {"output": {"fields": True}}
     run = Run(scene({"coupling": {"kind": "concurrent"}, "block": {"cells": [6, 6, 4]}} | fields))
     next(run.load_steps())
