@@ -10,6 +10,10 @@ from micro.asperities.model import MODELS as MODELS
 from micro.asperities.model import AsperityModel as AsperityModel
 from micro.boundary_elements.body_modes import BodyModes as BodyModes
 from micro.boundary_elements.body_modes import BodyStresses as BodyStresses
+from micro.boundary_elements.body_modes import TractionModes as TractionModes
+from micro.boundary_elements.body_modes import (
+    half_space_traction_modes as half_space_traction_modes,
+)
 from micro.boundary_elements.finite_slopes import FiniteSlopes as FiniteSlopes
 from micro.boundary_elements.finite_slopes import SurfaceStress as SurfaceStress
 from micro.boundary_elements.finite_slopes import coarse_grid as coarse_grid
@@ -23,16 +27,12 @@ from micro.boundary_elements.rectangle_modes import side_modes as side_modes
 from micro.boundary_elements.rectangle_modes import side_stress_modes as side_stress_modes
 from micro.boundary_elements.side_cells import SideStresses as SideStresses
 from micro.boundary_elements.side_cells import side_stresses as side_stresses
-from micro.boundary_elements.traction_modes import TractionModes as TractionModes
-from micro.boundary_elements.traction_modes import (
-    half_space_traction_modes as half_space_traction_modes,
-)
 from micro.by_name import MODEL_NAMES as MODEL_NAMES
 from micro.by_name import micro_model as micro_model
 from micro.closed_forms.hertz import HertzContact as HertzContact
 from micro.closed_forms.love import influence_matrix as influence_matrix
 from micro.friction.friction_model import FrictionModel as FrictionModel
-from micro.half_space.cell_sums import find_spots as find_spots
+from micro.half_space.contact_spots import find_spots as find_spots
 from micro.half_space.model import HalfSpaceModel as HalfSpaceModel
 from micro.model import MicroModel as MicroModel
 from micro.model import Stiffness as Stiffness

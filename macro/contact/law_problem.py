@@ -24,8 +24,7 @@ from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_layer import FaceLayer
 from macro.contact.face_sliders import SliderMemory
-from macro.contact.first_steps import FirstSteps
-from macro.contact.initial_guess import DisplacementBasis
+from macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
 from macro.contact.pressed_plane import ContactLaw, ContactLaws

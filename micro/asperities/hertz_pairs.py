@@ -32,8 +32,7 @@ import scipy
 from micro.asperities.patch_sums import EllipticContacts
 from micro.asperities.summit_problem import InteractionDisplacement
 from micro.boundary_elements.body_modes import BodyPoints
-from micro.closed_forms.hertz import ShapeFactors
-from micro.closed_forms.hertz_field import circular_field, elliptic_field
+from micro.closed_forms.hertz import ShapeFactors, circular_field, elliptic_field
 from support.arrays import Array, Indices
 from support.cores import blocks
 

@@ -7,6 +7,5 @@
     finite slopes   `finite_slopes`         -                                -
 
 `grid_compliance` sums them on grids for the contact problem. `free_sides` rests on `quarter_space`,
-and `finite_slopes` on `waves`. `traction_modes` are modes of tractions along the face too;
-`face_modes` has what both kinds of modes have in common.
+and `finite_slopes` on `waves`. `body_modes` has the modes of tractions along the face too.
 """

@@ -2,9 +2,11 @@
 
 Pressures p have the moments b_n = ∫ p φ_n dA with the modes φ_n. They displace by Σ φ_m D_mn b_n,
 and add the stresses Σ φ_m S_mn b_n in the surface. Modes are products of Legendre modes along x and
-y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes.
+y (`geometry.legendre_modes`), so that all evaluations are thin products along the axes: mode
+k K + l varies as mode k along x and l along y. Matrices have the shape (K², K²). Those of tractions
+in all directions, along x, y and into the body, have the shape (3, 3, K², K²).
 
-Theory: docs/theory.md, section 6.
+Theory: docs/theory.md, sections 6 and 15.
 """
 
 from __future__ import annotations
@@ -16,11 +18,145 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry import PatchGrid
-from geometry.legendre_modes import mode_means, mode_values
-from micro.boundary_elements.face_modes import FaceModes
+from geometry.legendre_modes import mode_means, mode_values, modes_within
 from micro.boundary_elements.grid_compliance import CellGrid
+from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from support.arrays import Array, Indices
+from support.checks import positive_lengths
 from support.errors import InputError
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaceModes:
+    """Compliance of the top of a body in its Legendre modes.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the top [mm].
+        matrix: Displacements in modes by the moments of pressures or tractions, symmetric [mm/N].
+        origin: Corner of the top, where the contact face does not start with it [mm].
+        rough: The same from a coarser discretisation, which shows the error; None where there is
+            none.
+
+    Attributes:
+        directions: Shape of the directions of displacements and of tractions; none of pressures.
+
+    Raises:
+        InputError: When a length is not positive, or the matrix not one of K² modes, not finite or
+            not symmetric.
+    """
+
+    directions: ClassVar[tuple[int, ...]] = ()
+
+    lengths: tuple[float, float]
+    matrix: Array
+    origin: tuple[float, float] = (0.0, 0.0)
+    rough: Array | None = None
+
+    def __post_init__(self) -> None:
+        matrix = np.asarray(self.matrix, float)
+        object.__setattr__(self, "matrix", matrix)
+        positive_lengths(self.lengths, "the top")
+        count = round(matrix.shape[-1] ** 0.5) if matrix.ndim else 0
+        if not count or matrix.shape != (*self.directions, count**2, count**2):
+            shape = ", ".join([*map(str, self.directions), "K²", "K²"])
+            problem = "the compliance is not one of K × K modes"
+            raise InputError(problem, value=matrix.shape, allowed=f"({shape}), K ≥ 1")
+        apart = float(np.abs(matrix - _transposed(matrix)).max())
+        if not apart <= 1e-9 * float(np.abs(matrix).max()):
+            problem = "the compliance is not finite and symmetric"
+            raise InputError(problem, value=apart, allowed="D = Dᵀ")
+
+    @property
+    def count(self) -> int:
+        """Modes K along a side."""
+        return _count(self.matrix)
+
+    def fewer(self, count: int) -> Self:
+        """Return the compliance of the first modes alone, which shows how well K modes resolve it.
+
+        Args:
+            count: Modes along a side, at most K.
+        """
+        if not 1 <= count <= self.count:
+            allowed = f"1 … {self.count}"
+            raise InputError("so many modes are not there", value=count, allowed=allowed)
+        first = _by_modes(self.matrix)[..., :count, :count, :count, :count]
+        return type(self)(self.lengths, _of_modes(first), self.origin)
+
+    def within(self, lengths: tuple[float, float]) -> Self:
+        """Return the compliance of a rectangle of the top, in modes of its own.
+
+        Args:
+            lengths: Sides of the rectangle, whose corner is the origin of the coordinates [mm].
+        """
+        if lengths == self.lengths and self.origin == (0.0, 0.0):
+            return self
+        change = modes_within(lengths, self.lengths, self.origin, self.count)
+
+        def changed(matrix: Array) -> Array:
+            found = change @ matrix @ change.T
+            return np.asarray(0.5 * (found + _transposed(found)))
+
+        rough = None if self.rough is None else changed(self.rough)
+        return type(self)(lengths, changed(self.matrix), rough=rough)
+
+    def plus(self, other: Self) -> Self:
+        """Return the compliance of this body and of another one on the same rectangle.
+
+        Args:
+            other: That of the other body, whose modes may be more or fewer.
+        """
+        rough = None
+        if self.rough is not None or other.rough is not None:
+            parts = (one.matrix if one.rough is None else one.rough for one in (self, other))
+            rough = _sum(*parts)
+        return type(self)(self.lengths, _sum(self.matrix, other.matrix), self.origin, rough)
+
+    def placed(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
+        """Return places counted from the corner of the top [mm]."""
+        return np.asarray(x, float) - self.origin[0], np.asarray(y, float) - self.origin[1]
+
+    def means(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return the means of the modes over cells, shapes (K, nx) and (K, ny).
+
+        Args:
+            x: Borders of the cells along x, counted from the corner of the top, (nx + 1,) [mm].
+            y: Borders along y, shape (ny + 1,) [mm].
+        """
+        length_x, length_y = self.lengths
+        return mode_means(x, length_x, self.count), mode_means(y, length_y, self.count)
+
+
+def _count(matrix: Array) -> int:
+    """Return the number of modes along a side."""
+    return round(matrix.shape[-1] ** 0.5)
+
+
+def _transposed(matrix: Array) -> Array:
+    """Return a compliance with displacements and tractions exchanged."""
+    swapped = matrix.swapaxes(-1, -2)
+    return swapped if matrix.ndim == 2 else swapped.swapaxes(0, 1)
+
+
+def _sum(one: Array, other: Array) -> Array:
+    """Return the sum of two compliances, of which one may have fewer modes."""
+    count = max(map(_count, (one, other)))
+    total = np.zeros((*one.shape[:-2], *4 * (count,)))
+    for part in (one, other):
+        few = _count(part)
+        total[..., :few, :few, :few, :few] += _by_modes(part)
+    return _of_modes(total)
+
+
+def _by_modes(matrix: Array) -> Array:
+    """Return a compliance with an axis for the modes along each side."""
+    return matrix.reshape(*matrix.shape[:-2], *4 * (_count(matrix),))
+
+
+def _of_modes(by_modes: Array) -> Array:
+    """Return the compliance of which `_by_modes` makes this."""
+    count = by_modes.shape[-1]
+    return by_modes.reshape(*by_modes.shape[:-4], *2 * (count**2,))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -237,3 +373,105 @@ class BodyStresses:
         moments = np.tensordot(amplitudes.reshape(len(fields), 3, -1), on.matrix, axes=2)
         loads_x, loads_y = on.means_x * on.widths_x, on.means_y * on.widths_y
         return np.asarray(loads_x.T @ moments.reshape(-1, *amplitudes.shape[2:]) @ loads_y)
+
+
+def half_space_traction_modes(
+    lengths: tuple[float, float], poisson_ratio: float, count: int
+) -> Array:
+    """Return the displacements of a half-space by modes of traction, in modes, for E* = 1.
+
+    Args:
+        lengths: Sides (Lx, Ly) of the rectangle [mm].
+        poisson_ratio: ν.
+        count: Modes K along a side; mode k K + l is k along x, l along y.
+
+    Returns:
+        Displacements along x, y and into the body by tractions likewise, as in
+        `micro.boundary_elements.rectangle_modes.half_space_modes`, shape (3, 3, K², K²) [1/mm].
+
+    Source:
+        Johnson, Contact Mechanics (1985), eqs. 3.19 and 3.75.
+    """
+    kappa = poisson_ratio / (1.0 - poisson_ratio)
+    beta = (1.0 - 2.0 * poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
+    total = np.zeros((3, 3, count**2, count**2))
+    total[2, 2] = half_space_modes(lengths, count)
+
+    def modes(powers: tuple[int, int]) -> Array:
+        return direction_modes(lengths, powers, count)
+
+    total[0, 0] = total[2, 2] + kappa * modes((2, 0))
+    total[1, 1] = total[2, 2] + kappa * modes((0, 2))
+    total[0, 1] = total[1, 0] = kappa * modes((1, 1))
+    total[2, 0], total[2, 1] = beta * modes((1, 0)), beta * modes((0, 1))
+    total[0, 2], total[1, 2] = -total[2, 0], -total[2, 1]
+    return total
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TractionModes(FaceModes):
+    """Compliance of the top of a body under tractions, in its Legendre modes; see `FaceModes`.
+
+    Its matrix has displacements along x, y and into the body by moments of tractions likewise.
+    """
+
+    directions: ClassVar[tuple[int, ...]] = (3, 3)
+
+    def on(self, borders_x: ArrayLike, borders_y: ArrayLike, *, modulus: float) -> TractionsOnCells:
+        """Return the compliance of cells of uniform tractions, by means over the cells.
+
+        Args:
+            borders_x: Borders of the cells along x, ascending within the top, (nx + 1,) [mm].
+            borders_y: Borders along y, shape (ny + 1,) [mm].
+            modulus: Unit of the tractions [MPa].
+        """
+        x, y = self.placed(borders_x, borders_y)
+        force = modulus * (x[1] - x[0]) * (y[1] - y[0])
+        return TractionsOnCells(self.matrix * force, *self.means(x, y))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TractionsOnCells:
+    """A compliance under tractions, in modes, on equal cells of a grid.
+
+    Args:
+        matrix: Displacements in modes by forces on cells, shape (3, 3, K², K²) [mm].
+        means_x: Means of the modes along x over the cells, shape (K, nx).
+        means_y: Means along y, shape (K, ny).
+    """
+
+    matrix: Array
+    means_x: Array
+    means_y: Array
+
+    def displacement(self, tractions: Array) -> Array:
+        """Return the displacements along the surface by tractions along it, shape (2, nx, ny) [mm].
+
+        Args:
+            tractions: In the unit chosen, shape (2, nx, ny).
+        """
+        return self._by(tractions, slice(0, 2), slice(0, 2))
+
+    def sideways(self, pressure: Array) -> Array:
+        """Return the displacements along the surface by pressures (nx, ny), (2, nx, ny) [mm]."""
+        return self._by(pressure[None], slice(0, 2), slice(2, 3))
+
+    def across(self, tractions: Array) -> Array:
+        """Return the displacements into the body by tractions (2, nx, ny), shape (nx, ny) [mm]."""
+        return self._by(tractions, slice(2, 3), slice(0, 2))[0]
+
+    def among(self, rows: Indices, columns: Indices) -> TractionsOnCells:
+        """Return the cells where some rows and columns of the grid cross.
+
+        Args:
+            rows: Indices of the rows, shape (r,).
+            columns: Indices of the columns, shape (c,).
+        """
+        return TractionsOnCells(self.matrix, self.means_x[:, rows], self.means_y[:, columns])
+
+    def _by(self, loads: Array, seen: slice, by: slice) -> Array:
+        moments = self.means_x @ loads @ self.means_y.T
+        flat = moments.reshape(len(loads), -1)
+        amplitudes = np.einsum("abmn,bn->am", self.matrix[seen, by], flat, optimize=True)
+        amplitudes = amplitudes.reshape(-1, *moments.shape[1:])
+        return np.asarray(self.means_x.T @ amplitudes @ self.means_y)

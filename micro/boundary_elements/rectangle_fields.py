@@ -42,8 +42,8 @@ import numpy as np
 
 from geometry.legendre_modes import gauss_rule, mode_values
 from geometry.materials import Material
+from micro.boundary_elements.body_modes import half_space_traction_modes
 from micro.boundary_elements.rectangle_modes import half_space_modes, half_space_stress_modes
-from micro.boundary_elements.traction_modes import half_space_traction_modes
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from geometry.materials import MaterialPair
 from geometry.shear_state import ShearControl, ShearState
+from micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
 from micro.boundary_elements.half_space_grid import Cells
-from micro.boundary_elements.traction_modes import TractionModes, TractionsOnCells
 from micro.complementarity.cell_fields import Box, box_around
 from micro.friction.stick_slip import FreeTractions, solve_tractions
 from micro.friction.tangential_grid import (

@@ -30,8 +30,8 @@ import numpy as np
 from scipy import fft
 
 from geometry.materials import MaterialPair
+from micro.boundary_elements.body_modes import TractionsOnCells
 from micro.boundary_elements.half_space_grid import Cells, Field, apart, fast_counts
-from micro.boundary_elements.traction_modes import TractionsOnCells
 from micro.closed_forms.love import corner_parts
 from support.arrays import Array, Indices
 from support.cores import BLOCK, blocks, cores, in_threads

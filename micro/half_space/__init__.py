@@ -3,5 +3,5 @@
 HalfSpaceModel           surface, E*, what the body adds       `model`
   └ solve_contact        the contact problem on the cells      `micro.complementarity`
 Stiffness                dF/dδ of a solution                   `stiffness`
-ContactState             spots, fields, sums over patches      `cell_sums`
+ContactState             spots, fields, sums over patches      `contact_spots`
 """

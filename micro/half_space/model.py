@@ -28,7 +28,7 @@ from micro.complementarity.full_contact import BeyondFullContactError
 from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.solver import touches_few_cells
-from micro.half_space.cell_sums import summed
+from micro.half_space.contact_spots import summed
 from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices

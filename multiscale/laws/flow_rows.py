@@ -16,7 +16,7 @@ import numpy as np
 from geometry import Control, PatchGrid
 from micro import HalfSpaceModel
 from multiscale.gap_flows import flow_solver, solved_gap_flow
-from multiscale.laws.transmissivity import Transmissivity
+from multiscale.laws.patch_law import Transmissivity
 from support.arrays import Array
 from support.collective import shared
 

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from geometry import PatchGrid, Regions
 from multiscale.laws.law_table import LawTable, part_key
-from multiscale.laws.patch_law import PatchLaw, repaired_law
+from multiscale.laws.patch_law import PatchLaw, Transmissivity, repaired_law
 from multiscale.laws.rows import LawRows, PlanePath
-from multiscale.laws.transmissivity import Transmissivity
 from multiscale.removed import refuse_removed_laws
 from support.checked_store import HDF5_HEAD, check_hdf5, checksum_hdf5
 from support.checks import check_file

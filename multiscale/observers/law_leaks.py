@@ -23,7 +23,7 @@ import numpy as np
 
 from micro.flow.gap_flow import cell_network
 from multiscale.couplings.coupling import Coupling
-from multiscale.laws.transmissivity import CAUSES, Transmissivity
+from multiscale.laws.patch_law import CAUSES, Transmissivity
 from multiscale.loading.leak import Leak
 from multiscale.loading.load_step import LoadStep
 from multiscale.measured_errors.samples import mean_error

@@ -5,7 +5,7 @@ import pytest
 
 from geometry.legendre_modes import mode_means
 from geometry.materials import Material, MaterialPair
-from micro.boundary_elements.traction_modes import TractionModes, half_space_traction_modes
+from micro.boundary_elements.body_modes import TractionModes, half_space_traction_modes
 from micro.friction.tangential_grid import CrossCompliance, tangential_grid
 from support.errors import InputError
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from micro import find_spots
-from micro.half_space.cell_sums import EDGE_EXCESS, true_area
+from micro.half_space.contact_spots import EDGE_EXCESS, true_area
 
 
 def pressure_map():

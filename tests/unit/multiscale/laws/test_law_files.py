@@ -9,9 +9,8 @@ import pytest
 from geometry.patches import PatchGrid
 from multiscale.laws.law_file import hdf5_bytes, read_laws, write_laws
 from multiscale.laws.law_table import LawTable
-from multiscale.laws.patch_law import PatchLaw
+from multiscale.laws.patch_law import PatchLaw, Transmissivity
 from multiscale.laws.rows import LawRows, PlanePath
-from multiscale.laws.transmissivity import Transmissivity
 from support.checked_store import checksum_hdf5
 from support.errors import InputError
 
