@@ -10,15 +10,14 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
 from geometry import PatchGrid, Regions, RigidPlane, Surface
-from micro import FiniteSlopes, HalfSpaceModel
+from micro import HalfSpaceModel
 from micro.closed_forms.hertz import crowned_peak
-from micro.friction.friction_model import FrictionModel
-from multiscale.bodies.bodies import SLOPES, on_body
 from multiscale.couplings import describe, validity
 from multiscale.couplings.coupling import Meshes
 from multiscale.couplings.law_coupling import LawCoupling, NewtonChoice
@@ -41,8 +40,8 @@ from multiscale.laws.representative import representative_laws
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import step_count
 from multiscale.machine import MemoryRequest
-from multiscale.measured_errors.contact import ErrorProbe, with_errors
-from multiscale.measured_errors.edges import edge_width
+from multiscale.measured_errors.contact import with_errors
+from multiscale.measured_errors.sample_cells import SampleCells
 from multiscale.measured_errors.samples import (
     CHECKS_OF_SAMPLE,
     COUPLED_ON_SAMPLE,
@@ -55,7 +54,6 @@ from multiscale.measured_errors.samples import (
 from multiscale.measured_errors.shear import path_of, with_shear_errors
 from multiscale.readable import Observer, number, times
 from support.arrays import Array
-from support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
     from macro import FacePair, LawContactProblem, LoadedFace
@@ -220,57 +218,21 @@ class RepresentativeCoupling(LawCoupling):
             "problem": problem,
             "face": solver.face,
             "state": state,
-            "problem_of": lambda face: self._problem(face, solver.table),
-            "laws": solver.table.laws,
+            "problem_with": self._problem,
+            "table": solver.table,
             "samples": self.samples,
-            "probe_of": self._probe_of,
-            "edge_width_of": self._edge_width_of,
+            "cells": self._cells,
             "comm": self.comm,
         }
         if self.scene.friction is None:
             return with_errors(step, LawErrorProbe(**known).measure(), by_force=by_force)
         from multiscale.measured_errors.shear_of_samples import LawShearProbe  # others do without
 
-        probe = LawShearProbe(
-            **known,
-            path=path_of([*past, step], self.load_history, every_load=True),
-            table=solver.table,
-            problem_with=self._problem,
-            friction_of=self._friction_of,
-        )
+        path = path_of([*past, step], self.load_history, every_load=True)
+        probe = LawShearProbe(**known, path=path)
         found, shear = probe.measure_both()
         step = with_errors(step, found, by_force=by_force)
         return with_shear_errors(step, shear, by_shift=probe.by_shift)
-
-    def _friction_of(self, region: RegionSamples, sample: Surface) -> FrictionModel:
-        """Return the friction of a sample's cells, whose pressures and tractions see each other."""
-        assert self.scene.friction is not None
-        return FrictionModel(
-            materials=region.materials,
-            coefficient=self.scene.friction.coefficient,
-            spacing=sample.spacing,
-            periodic=True,
-            coupled=True,
-        )
-
-    def _probe_of(self, region: RegionSamples, sample: Surface) -> ErrorProbe:
-        """Return what measures the errors of one sample."""
-        return ErrorProbe(
-            model=replace(self._model_of(region, sample), slopes=()),
-            on_body=on_body(None, region.materials, None),
-            order=SLOPES if self.finite_slopes else 0,
-        )
-
-    def _edge_width_of(self, region: RegionSamples, sample: Surface, pressure: float) -> float:
-        """Return the width along the edges of the face that the law of a sample errs by [mm]."""
-        block = self.scene.block
-        if block is not None and block.sides == "roller":  # mirrors are no edges
-            return 0.0
-        model, pair = replace(self._model_of(region, sample), slopes=()), region.materials
-        try:
-            return edge_width(model, pressure, pair.first)
-        except NotConverged:
-            return math.inf
 
     def error_notes(self, steps: Sequence[LoadStep]) -> Iterator[str]:
         """Yield what measured errors leave out."""
@@ -295,11 +257,8 @@ class RepresentativeCoupling(LawCoupling):
         else:
             pressure, closure = 2.0 * reached, None
             most = min(most, modulus)
-        models = {
-            id(one): self._model_of(region, one)
-            for region in self.samples
-            for one in region.surfaces
-        }
+        made_of = zip(self.rough_surfaces, chain(*self.periodic_models), strict=True)
+        models = {id(sample): model for sample, model in made_of}
         made = representative_laws(
             {region.name: region.surfaces for region in self.samples},
             modulus,
@@ -318,17 +277,21 @@ class RepresentativeCoupling(LawCoupling):
         return before if before is not None and ended else made
 
     @property
+    def _cells(self) -> SampleCells:
+        """The contact problems on the cells of the samples."""
+        block, friction = self.scene.block, self.scene.friction
+        return SampleCells(
+            model=self.micro,
+            finite_slopes=self.finite_slopes,
+            has_edges=block is None or block.sides != "roller",  # mirrors are no edges
+            coefficient=0.0 if friction is None else friction.coefficient,
+        )
+
+    @property
     def periodic_models(self) -> list[list[HalfSpaceModel]]:
         """The periodic models of all samples of every region."""
-        return [[self._model_of(region, one) for one in region.surfaces] for region in self.samples]
-
-    def _model_of(self, region: RegionSamples, sample: Surface) -> HalfSpaceModel:
-        """Return the periodic model of a sample, with the slopes of its body where they count."""
-        pair = region.materials
-        model = replace(self.micro, surface=sample, contact_modulus=pair.contact_modulus)
-        if not self.finite_slopes:
-            return model
-        return replace(model, slopes=(FiniteSlopes(sample, pair.first, periodic=True),))
+        make, regions = self._cells.model_of, self.samples
+        return [[make(region, one) for one in region.surfaces] for region in regions]
 
     def _stiffness_ratios(self) -> list[float]:
         return [region.materials.stiffness_ratio for region in self.samples]

@@ -33,11 +33,13 @@ from multiscale.bodies.bodies import free_bodies
 from multiscale.inputs.bodies import BodyFacts
 from multiscale.inputs.cost import body_request
 from multiscale.inputs.surfaces import RegionSamples
+from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.laws.refinement import LEAST_LOAD
 from multiscale.loading.load_step import LoadStep
 from multiscale.machine import MemoryRequest
-from multiscale.measured_errors.contact import ErrorProbe, MeasuredErrors
+from multiscale.measured_errors.contact import MeasuredErrors
+from multiscale.measured_errors.sample_cells import SampleCells
 from multiscale.readable import Caution
 from support.arrays import Array
 from support.collective import shared
@@ -78,23 +80,20 @@ class LawErrorProbe:
         problem: The body with the laws on its contact face, at the load step.
         face: The contact face.
         state: The contact there.
-        problem_of: Returns the problem on another face of the same bodies.
-        laws: The laws of the regions.
+        problem_with: Returns the problem on a face of the same bodies, with laws.
+        table: The laws of the regions.
         samples: Their samples.
-        probe_of: Returns what measures the errors of one sample.
-        edge_width_of: Returns the width along the edges of the face that the law of a sample errs
-            by under a mean pressure [mm].
+        cells: The contact problems on the cells of these.
         comm: MPI communicator; None for this process alone.
     """
 
     problem: LawContactProblem
     face: LoadedFace | FacePair
     state: FaceEquilibrium
-    problem_of: Callable[[Any], LawContactProblem]
-    laws: Sequence[PatchLaw]
+    problem_with: Callable[[Any, LawTable], LawContactProblem]
+    table: LawTable
     samples: Sequence[RegionSamples]
-    probe_of: Callable[[RegionSamples, Surface], ErrorProbe]
-    edge_width_of: Callable[[RegionSamples, Surface, float], float]
+    cells: SampleCells
     comm: Any = None
 
     @cached_property
@@ -140,7 +139,7 @@ class LawErrorProbe:
 
         def by_region(function: Callable[[PatchLaw, Array], Array]) -> Array:
             found = np.zeros_like(closure)
-            for region, law in enumerate(self.laws):
+            for region, law in enumerate(self.table.laws):
                 here = patch == region
                 found[here] = function(law, closure[here])
             return found
@@ -269,7 +268,7 @@ class LawErrorProbe:
         """
         from macro.contact.other_elements import start_from_elements
 
-        problem = self.problem_of(face)
+        problem = self.problem_with(face, self.table)
         if same:
             start_from_elements(problem, face, self.state, self.face, self.control.body_state)
         else:
@@ -294,9 +293,9 @@ class LawErrorProbe:
 
         def measure(task: int) -> tuple[float, float, float, float]:
             number, sample = tasks[task]
-            probe = self.probe_of(self.samples[number], sample)
+            probe = self.cells.probe_of(self.samples[number], sample)
             reference = probe.model.reference_height - sample.mean_height
-            law, closure = self.laws[number], float(closures[number])
+            law, closure = self.table.laws[number], float(closures[number])
             approach = reference - separation_of(law, closure, reference)
             model = probe.on_body(probe.model, probe.order)
             state = model.press(Control(approach=approach))
@@ -304,7 +303,7 @@ class LawErrorProbe:
             if not force:  # the closure is that of others of the samples
                 return 0.0, 0.0, 0.0, 0.0
             parts = probe.measure(force, approach, (0.0, 0.0), start=state.guess).parts
-            width = self.edge_width_of(self.samples[number], sample, force / sample.area)
+            width = self.cells.edge_width_of(self.samples[number], sample, force / sample.area)
             return parts["grid"], parts["slopes"], width * force, force
 
         found = shared(self.comm, len(tasks), measure)

@@ -19,7 +19,7 @@ Theory: docs/theory.md, sections 13 and 15.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,9 +29,6 @@ import numpy as np
 from geometry import Control, Surface
 from geometry.shear_state import ShearControl
 from geometry.sliders import Sliders
-from micro.friction.friction_model import FrictionModel
-from multiscale.inputs.surfaces import RegionSamples
-from multiscale.laws.law_table import LawTable
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.measured_errors.contact import MeasuredErrors
 from multiscale.measured_errors.samples import LawErrorProbe, causes_of, separation_of
@@ -41,7 +38,7 @@ from support.collective import shared
 from support.errors import NotConverged
 
 if TYPE_CHECKING:  # finite elements are imported only by scenes that need them
-    from macro import FaceEquilibrium, FacePair, LawContactProblem, LoadedFace
+    from macro import FaceEquilibrium, LawContactProblem
 
 
 class _Point(NamedTuple):
@@ -81,16 +78,9 @@ class LawShearProbe(LawErrorProbe):
 
     Args:
         path: What the turning points of the shear prescribed, the latest load step last.
-        table: The laws.
-        problem_with: Returns the problem on a face of the same bodies, with other laws.
-        friction_of: Returns the friction of a sample's cells, whose pressures and tractions see
-            each other.
     """
 
     path: Sequence[Control]
-    table: LawTable
-    problem_with: Callable[[LoadedFace | FacePair, LawTable], LawContactProblem]
-    friction_of: Callable[[RegionSamples, Surface], FrictionModel]
 
     @property
     def by_shift(self) -> bool:
@@ -144,7 +134,7 @@ class LawShearProbe(LawErrorProbe):
     def _own(self) -> tuple[LawContactProblem, FaceEquilibrium, list[_Point]]:
         """The path on the same elements: the problem, its end, and all turning points."""
         points: list[_Point] = []
-        problem = self.problem_of(self.face)
+        problem = self.problem_with(self.face, self.table)
         return problem, self._gone(problem, points), points
 
     @property
@@ -172,7 +162,7 @@ class LawShearProbe(LawErrorProbe):
 
     def answer_on(self, face: Any, *, same: bool = True) -> Array:
         """Return the answer on another face, at the end of the same path."""
-        return self._answer_of(self._gone(self.problem_of(face)))
+        return self._answer_of(self._gone(self.problem_with(face, self.table)))
 
     def _answer_of(self, state: FaceEquilibrium) -> Array:
         normal = state.force if self.path[-1].force is None else state.approach
@@ -278,9 +268,10 @@ class LawShearProbe(LawErrorProbe):
         those of its cells, and of half and a quarter as many along a side; NaN where these are too
         few, or a contact is not found.
         """
-        probe = self.probe_of(self.samples[number], sample)
+        probe = self.cells.probe_of(self.samples[number], sample)
         reference = probe.model.reference_height - sample.mean_height
-        friction, law = self.friction_of(self.samples[number], sample), self.table.laws[number]
+        friction = self.cells.friction_of(self.samples[number], sample)
+        law = self.table.laws[number]
         normal, own = resampled(probe, friction, sample.grid)
         controls = []
         for reached in path:

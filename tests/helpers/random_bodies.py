@@ -347,11 +347,10 @@ def stated_and_true(body, comm, *, refinements=2):
         problem=problem,
         face=face,
         state=state,
-        problem_of=problem_of,
-        laws=(),
+        problem_with=lambda face, table: problem_of(face),
+        table=None,
         samples=(),
-        probe_of=None,
-        edge_width_of=None,
+        cells=None,
         comm=comm,
     )
     mesh, quadrature = (float(error[0]) for error in probe.discretisation())
