@@ -43,36 +43,49 @@ class SliderState:
     stress: Array
     scale: Array
 
-    def of(self, rows: slice) -> SliderState:
+    def of(self, rows: Any) -> SliderState:
         """Return the sliders of some of the samples."""
         return SliderState(**{name: values[rows] for name, values in vars(self).items()})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SliderRecord:
-    """What load steps leave behind of friction on a whole face, on any number of ranks.
+    """What load steps leave behind of friction on a face: of one rank's samples, or of all.
 
     Attributes:
-        place: Places of the samples in coordinates of the face, shape (m, 2) [mm].
-        shear: Shear stresses there, shape (m, 2) [MPa].
-        closure: Their closures, shape (m,) [mm].
-        slip: Tangential displacements of the plane against them, shape (m, 2) [mm].
-        stress: Shear stresses of their springs, before they are scaled, shape (m, 2, N) [MPa].
-        scale: What they are scaled by, shape (m,).
-        shift: Shift of the plane, shape (2,) [mm].
+        place: Places of the m samples in coordinates of the face, shape (m, 2) [mm].
+        sliders: Their sliders.
+        stress: Shear stresses there, shape (m, 2) [MPa].
+        shift: Shift of the plane along the axes of the face, shape (2,) [mm].
         direction: Unit vector of its last change, shape (2,).
-        dissipated: Energy lost to friction since the start [N mm].
+        dissipated: Energy lost to friction on the whole face since the start [N mm].
     """
 
     place: Array
-    shear: Array
-    closure: Array
-    slip: Array
+    sliders: SliderState
     stress: Array
-    scale: Array
     shift: Array
     direction: Array
     dissipated: float
+
+    def of(self, rows: Any) -> SliderRecord:
+        """Return the record of some of the samples, by their indices."""
+        sliders, stress = self.sliders.of(rows), self.stress[rows]
+        return replace(self, place=self.place[rows], sliders=sliders, stress=stress)
+
+    def with_ranks(self, comm: Any) -> SliderRecord:
+        """Return the record of the samples of all ranks; collective.
+
+        Args:
+            comm: MPI communicator.
+        """
+        own = {"place": self.place, "stress": self.stress}, vars(self.sliders)
+        every = comm.allgather(own)
+        samples, sliders = (
+            {name: np.concatenate([rank[i][name] for rank in every]) for name in own[i]}
+            for i in range(2)
+        )
+        return replace(self, sliders=SliderState(**sliders), **samples)
 
 
 class SliderResponse(NamedTuple):

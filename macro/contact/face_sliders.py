@@ -6,6 +6,7 @@ Theory: docs/theory.md, section 15.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,24 +27,6 @@ _SAME_PLACE = 1e-6
 """Distance of a sample from where its sliders were written, relative to the face's size."""
 _UNHELD = 1e-13
 """Stiffness of what sticks in a direction, over the largest, below which nothing does."""
-
-
-class SliderMemory(NamedTuple):
-    """What load steps leave behind of friction on this rank.
-
-    Attributes:
-        sliders: Sliders of this rank's samples.
-        stress: Shear stresses there, shape (n, 2) [MPa].
-        shift: Shift of the plane along the axes of the face, shape (2,) [mm].
-        direction: Unit vector of its last change, shape (2,).
-        dissipated: Energy lost to friction on the whole face since the start [N mm].
-    """
-
-    sliders: SliderState
-    stress: Array
-    shift: Array
-    direction: Array
-    dissipated: float
 
 
 class _Evaluated(NamedTuple):
@@ -97,8 +80,13 @@ class FaceSliders:
         )
         n = len(patch)
         self.preload: Array = np.zeros((n, 2))
-        self.memory = SliderMemory(
-            self._sliders.at_rest, np.zeros((n, 2)), np.zeros(2), np.array([1.0, 0.0]), 0.0
+        self.memory = SliderRecord(
+            place=np.column_stack([sampling.x, sampling.y]),
+            sliders=self._sliders.at_rest,
+            stress=np.zeros((n, 2)),
+            shift=np.zeros(2),
+            direction=np.array([1.0, 0.0]),
+            dissipated=0.0,
         )
         self._control = Control(approach=0.0)
         self._shear = _HELD
@@ -243,12 +231,13 @@ class FaceSliders:
         after, shear = self._step(found)
         moved = self._shift - before.shift
         size = float(np.hypot(*moved))
-        self.memory = SliderMemory(
-            after,
-            found.stress,
-            self._shift.copy(),
-            moved / size if size else before.direction,
-            shear.dissipated,
+        self.memory = replace(
+            before,
+            sliders=after,
+            stress=found.stress,
+            shift=self._shift.copy(),
+            direction=moved / size if size else before.direction,
+            dissipated=shear.dissipated,
         )
         return shear
 
@@ -273,16 +262,7 @@ class FaceSliders:
 
     def record(self) -> SliderRecord:
         """Return what load steps left behind, of all ranks together."""
-        memory = self.memory
-        own = {"place": self._places(), "shear": memory.stress, **vars(memory.sliders)}
-        every = self._comm.allgather(own)
-        whole = {name: np.concatenate([rank[name] for rank in every]) for name in own}
-        return SliderRecord(
-            **whole,
-            shift=memory.shift,
-            direction=memory.direction,
-            dissipated=memory.dissipated,
-        )
+        return self.memory.with_ranks(self._comm)
 
     def restore(self, record: SliderRecord) -> None:
         """Go on from what load steps left behind, on any number of ranks.
@@ -293,29 +273,16 @@ class FaceSliders:
         Raises:
             InputError: When it is that of another face.
         """
-        own, size = self._places(), self._levers.half
+        own, size = self.memory.place, self._levers.half
         springs = self._sliders.at_rest.stress.shape[2]
 
         def found() -> Any:
             far, index = cKDTree(record.place).query(own) if len(own) else (np.zeros(0), [])
-            if np.any(far > _SAME_PLACE * size) or record.stress.shape[2] != springs:
+            if np.any(far > _SAME_PLACE * size) or record.sliders.stress.shape[2] != springs:
                 raise InputError("the sliders are those of another face, or of other laws")
             return np.asarray(index, np.intp)
 
-        index = together(self._comm, found)
-        sliders = SliderState(
-            closure=record.closure[index],
-            slip=record.slip[index],
-            stress=record.stress[index],
-            scale=record.scale[index],
-        )
-        self.memory = SliderMemory(
-            sliders,
-            record.shear[index],
-            record.shift.copy(),
-            record.direction.copy(),
-            record.dissipated,
-        )
+        self.memory = replace(record.of(together(self._comm, found)), place=own)
 
     def follow(self, other: FaceSliders) -> None:
         """Go on from the sliders of other laws on the same samples, as of laws that go further.
@@ -323,12 +290,8 @@ class FaceSliders:
         Args:
             other: The sliders of these laws.
         """
-        memory = other.memory
-        sliders = self._sliders.following(other._sliders, memory.sliders)
-        self.memory = memory._replace(sliders=sliders)
-
-    def _places(self) -> Array:
-        return np.column_stack([self._sampling.x, self._sampling.y])
+        sliders = self._sliders.following(other._sliders, other.memory.sliders)
+        self.memory = replace(other.memory, sliders=sliders)
 
 
 def _once(laws: Sequence[Any]) -> list[Any]:

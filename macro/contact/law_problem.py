@@ -23,7 +23,6 @@ from macro.contact.contact_response import ApproachResponse, ContactResponse
 from macro.contact.equations import Equilibrium
 from macro.contact.face_equilibrium import FaceEquilibrium
 from macro.contact.face_layer import FaceLayer
-from macro.contact.face_sliders import SliderMemory
 from macro.contact.initial_guess import DisplacementBasis, FirstSteps
 from macro.contact.loaded_face import ContactFace, Mode
 from macro.contact.newton import Newton
@@ -176,12 +175,12 @@ class LawContactProblem:
         return self._sampling
 
     @property
-    def memory(self) -> SliderMemory | None:
+    def memory(self) -> SliderRecord | None:
         """What the load steps so far left behind of friction; set it to take load steps back."""
         return self._sliders.memory if self._sliders else None
 
     @memory.setter
-    def memory(self, memory: SliderMemory | None) -> None:
+    def memory(self, memory: SliderRecord | None) -> None:
         if self._sliders and memory is not None:
             self._sliders.memory = memory
 

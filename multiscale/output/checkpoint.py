@@ -17,7 +17,7 @@ from typing import Any
 
 from geometry.rigid_plane import Control
 from geometry.shear_state import ShearState
-from geometry.sliders import SliderRecord
+from geometry.sliders import SliderRecord, SliderState
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState
 from multiscale.laws.interpolation import LawPoint
@@ -87,6 +87,7 @@ _KINDS = (
     RigidPlane,
     ShearState,
     SliderRecord,
+    SliderState,
     Start,
 )
 """What a checkpoint may consist of: its own records, and those of the states of couplings."""
