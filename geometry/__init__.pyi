@@ -2,6 +2,7 @@
 
 from geometry.asperities import Asperities as Asperities
 from geometry.asperities import find_asperities as find_asperities
+from geometry.contact_state import ShearState as ShearState
 from geometry.facing import facing as facing
 from geometry.facing import laid_on as laid_on
 from geometry.facing import mirrored as mirrored
@@ -25,8 +26,7 @@ from geometry.preparation import Filter as Filter
 from geometry.preparation import Preparation as Preparation
 from geometry.rigid_plane import Control as Control
 from geometry.rigid_plane import RigidPlane as RigidPlane
-from geometry.shear_state import ShearControl as ShearControl
-from geometry.shear_state import ShearState as ShearState
+from geometry.rigid_plane import ShearControl as ShearControl
 from geometry.spectrum import Spectrum as Spectrum
 from geometry.spectrum import synthesise as synthesise
 from geometry.spring_bed import Friction as Friction

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from geometry.patches import PatchGrid
-from geometry.rigid_plane import RigidPlane
-from geometry.shear_state import ShearState
+from geometry.rigid_plane import Pair, RigidPlane
 from support.arrays import Array, Counts, Flags, Indices
 from support.displayed import Displayed, Table
 from support.errors import InputError
@@ -114,6 +113,63 @@ class Start:
             by_slopes = self.by_slopes + share * (other.by_slopes - self.by_slopes)
         known = replace(other, nearby=()), replace(self, nearby=())
         return Start(plane=self.plane, values=values, by_slopes=by_slopes, nearby=known)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ShearState:
+    """Tangential tractions and slip of a contact on nx × ny cells, and what follows from them.
+
+    Args:
+        shift: Shift of the plane along x and y from where it first touched [mm].
+        force: Shear force on the plane along x and y [N].
+        traction: Tractions on the surface along x and y, shape (2, nx, ny) [MPa].
+        slip: Slip of the cells in contact since they touched, 0 elsewhere, shape (2, nx, ny) [mm].
+        bound: Coulomb's bound μ p of the tractions, 0 out of contact, shape (nx, ny) [MPa].
+        slipping: Which cells in contact bear the traction μ p, shape (nx, ny).
+        direction: Unit vector of the last change of the shift.
+        dissipated: Energy lost to friction in all load steps so far [N mm].
+        dissipated_in_step: Part of it that was lost in the last one [N mm].
+        residual: Largest violation of the conditions over the largest shift of a cell.
+        products: Products of the tangential compliance in the last load step.
+    """
+
+    shift: Pair
+    force: Pair
+    traction: Array
+    slip: Array
+    bound: Array
+    slipping: Flags
+    direction: Pair = (1.0, 0.0)
+    dissipated: float = 0.0
+    dissipated_in_step: float = 0.0
+    residual: float = 0.0
+    products: int = 0
+
+    @classmethod
+    def none(cls, grid: tuple[int, int]) -> ShearState:
+        """Return the state of a surface that nothing touches.
+
+        Args:
+            grid: Numbers of cells (nx, ny).
+        """
+        return cls(
+            shift=(0.0, 0.0),
+            force=(0.0, 0.0),
+            traction=np.zeros((2, *grid)),
+            slip=np.zeros((2, *grid)),
+            bound=np.zeros(grid),
+            slipping=np.zeros(grid, bool),
+        )
+
+    @property
+    def closed(self) -> Flags:
+        """Which cells are in contact, shape (nx, ny)."""
+        return np.asarray(self.bound > 0.0)
+
+    @property
+    def sticking(self) -> Flags:
+        """Which cells are in contact and stick, shape (nx, ny)."""
+        return self.closed & ~self.slipping
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False, repr=False)

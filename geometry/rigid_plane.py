@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from geometry.patches import PatchGrid
-from geometry.shear_state import ShearControl
 from support.arrays import Array, Flags
+from support.checks import finite_pair
 from support.errors import InputError, NotConverged
 
 
@@ -27,6 +27,43 @@ class Rectangular(Protocol):
     def lengths(self) -> tuple[float, float]:
         """Sides (Lx, Ly) [mm]."""
         ...
+
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ShearControl:
+    """Shift of the plane along the surface, or shear force on it, at one load step.
+
+    Args:
+        shift: Shift of the plane along x and y from where it first touched [mm]; None when the
+            force is prescribed.
+        force: Shear force on the plane along x and y [N]; None when the shift is prescribed.
+
+    Raises:
+        InputError: When not exactly one of them is given, or it is no pair of finite numbers.
+    """
+
+    shift: Pair | None = None
+    force: Pair | None = None
+
+    def __post_init__(self) -> None:
+        if (self.shift is None) == (self.force is None):
+            raise InputError(
+                "a load step prescribes either the shift or the shear force",
+                value=(self.shift, self.force),
+                allowed="exactly one of them",
+            )
+        pair = self.shift if self.force is None else self.force
+        finite_pair(pair, "needs two finite numbers", allowed="along x and y")
+
+    def __str__(self) -> str:
+        """Say what shears, as in "shear force (2, 0) N"."""
+        if self.force is not None:
+            return f"shear force ({self.force[0]:.6g}, {self.force[1]:.6g}) N"
+        assert self.shift is not None
+        return f"shift ({self.shift[0]:.6g}, {self.shift[1]:.6g}) mm"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

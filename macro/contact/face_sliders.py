@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from geometry.rigid_plane import Control, PlaneLevers
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import Control, PlaneLevers, ShearControl
 from geometry.sliders import SliderRecord, SliderResponse, Sliders, SliderState
 from geometry.spring_bed import Friction, springs_of_law, stiffness_ratios
 from macro.contact.face_equilibrium import FaceShear

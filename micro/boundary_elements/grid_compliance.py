@@ -17,8 +17,7 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from micro.boundary_elements.compliance_matrix import ComplianceMatrix
-from micro.boundary_elements.few_cells import FewCells
+from micro.boundary_elements.compliance_matrix import ComplianceMatrix, FewCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse

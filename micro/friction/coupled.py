@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from geometry import Control
-from geometry.contact_state import ContactState
-from geometry.shear_state import ShearState
+from geometry.contact_state import ContactState, ShearState
 from micro.complementarity.slope_iteration import AndersonMixing
 from micro.friction.friction_model import FrictionModel
 from micro.half_space.model import HalfSpaceModel

@@ -17,8 +17,9 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
+from geometry.contact_state import ShearState
 from geometry.materials import MaterialPair
-from geometry.shear_state import ShearControl, ShearState
+from geometry.rigid_plane import ShearControl
 from micro.boundary_elements.body_modes import TractionModes, TractionsOnCells
 from micro.boundary_elements.half_space_grid import Cells
 from micro.complementarity.cell_fields import Box, box_around

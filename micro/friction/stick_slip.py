@@ -15,7 +15,7 @@ that compliance D = |s|/g in series with the half-space. The inverse of both is 
 
 of all displacements U of the whole surface that are r on cells that stick; on cells that slip only
 the part across the slip counts. Any U that depends linearly on r makes an approximate inverse that
-is symmetric and positive. Here it is the extension of `micro.boundary_elements.extension`, in which
+is symmetric and positive. Here it is the extension of `micro.boundary_elements.inverse`, in which
 a cell that slips knows the share c/(c + D) of its displacement across, c being the compliance of a
 cell, and nothing of that along the slip.
 
@@ -26,8 +26,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from micro.boundary_elements.extension import Extension
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.inverse import Extension
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.friction.tangential_grid import BodyGrid, TangentialGrid
 from micro.friction.traction_problem import TractionProblem, Tractions

@@ -17,7 +17,7 @@ from geometry.contact_state import ContactState, Start
 from geometry.plausibility import check_slopes
 from geometry.rigid_plane import RigidPlane, motion_units
 from micro.boundary_elements.body_modes import BodyModes
-from micro.boundary_elements.few_cells import FewCells
+from micro.boundary_elements.compliance_matrix import FewCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.free_sides import FreeSides
 from micro.boundary_elements.grid_compliance import BodyTerm, Compliance

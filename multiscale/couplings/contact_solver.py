@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from geometry import Control, PatchGrid, RigidPlane, Surface, overlaps
-from geometry.contact_state import ContactState, Start
+from geometry.contact_state import ContactState, ShearState, Start
 from geometry.patches import patch_means
-from geometry.shear_state import ShearState
 from micro import HalfSpaceModel, MicroModel, Stiffness
 from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel

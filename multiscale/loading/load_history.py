@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 
 from geometry import Control
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import ShearControl
 from geometry.zero import FIRST_TOUCH, Zero
 from multiscale.loading.stages import (
     Leg,

@@ -23,8 +23,8 @@ from dataclasses import replace
 import numpy as np
 
 from geometry import Control
-from geometry.contact_state import ContactState, Start
-from geometry.shear_state import ShearControl, ShearState
+from geometry.contact_state import ContactState, ShearState, Start
+from geometry.rigid_plane import ShearControl
 from micro import HalfSpaceModel
 from micro.friction.coupled import press_coupled
 from micro.friction.friction_model import FrictionModel

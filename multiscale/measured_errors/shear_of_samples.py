@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from geometry import Control, Surface
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import ShearControl
 from geometry.sliders import Sliders
 from multiscale.laws.patch_law import PatchLaw
 from multiscale.measured_errors.contact import MeasuredErrors

@@ -15,8 +15,8 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from geometry.contact_state import ShearState
 from geometry.rigid_plane import Control
-from geometry.shear_state import ShearState
 from geometry.sliders import SliderRecord, SliderState
 from micro import RigidPlane, Start
 from multiscale.law_solvers.loaded_patches import DenseState

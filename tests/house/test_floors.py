@@ -28,7 +28,7 @@ FLOORS = {
         "interpolant legendre_modes materials",
         "face_frame filters spring_bed surface",
         "patches sliders spectrum statistics zero",
-        "plausibility shear_state",
+        "plausibility",
         "facing preparation rigid_plane",
         "files",
         "asperities contact_state meshes plane_equilibrium",

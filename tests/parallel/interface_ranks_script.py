@@ -29,8 +29,7 @@ from helpers.user_problems import (
 )
 
 from geometry.meshes.block import BlockShape
-from geometry.rigid_plane import Control, RigidPlane
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import Control, RigidPlane, ShearControl
 from geometry.spring_bed import Friction
 from macro import (
     Block,

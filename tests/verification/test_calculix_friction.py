@@ -20,8 +20,7 @@ from scipy.interpolate import RegularGridInterpolator
 
 from geometry.materials import mindlin_ratio
 from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import Control, ShearControl
 from geometry.spring_bed import Friction, SpringBed
 from macro import ContactProblem, Interface, LawContactProblem, LoadedFace
 from multiscale.exports.export import export_laws

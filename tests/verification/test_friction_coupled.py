@@ -14,7 +14,8 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from geometry import Control, Material, MaterialPair, Surface
-from geometry.shear_state import ShearControl, ShearState
+from geometry.contact_state import ShearState
+from geometry.rigid_plane import ShearControl
 from micro import FrictionModel, HalfSpaceModel
 from micro.boundary_elements.half_space_grid import HalfSpaceGrid
 from micro.friction.coupled import press_coupled

@@ -7,7 +7,7 @@ import pytest
 
 from geometry import Surface
 from geometry.materials import Material, MaterialPair
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import ShearControl
 from micro import HalfSpaceModel
 from micro.closed_forms.mindlin import MindlinSphere
 from micro.friction.friction_model import FrictionModel

@@ -8,7 +8,7 @@ import pytest
 
 from geometry import Spectrum, spring_bed, synthesise
 from geometry.materials import Material, MaterialPair
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import ShearControl
 from geometry.sliders import Sliders
 from geometry.spring_bed import springs_of
 from micro import HalfSpaceModel

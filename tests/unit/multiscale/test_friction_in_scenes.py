@@ -9,7 +9,7 @@ from helpers.pressed_cells import pressed_cells
 from helpers.resumed_runs import gone_on, ran_past
 from helpers.small_scene import SMALL_SCENE
 
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import ShearControl
 from micro import HalfSpaceModel
 from micro.friction.friction_model import FrictionModel
 from multiscale import Run, make_setup, run

@@ -23,8 +23,7 @@ from helpers.user_problems import (
 from petsc4py import PETSc
 
 from geometry.materials import mindlin_ratio
-from geometry.rigid_plane import Control, RigidPlane
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import Control, RigidPlane, ShearControl
 from geometry.spring_bed import Friction
 from macro import (
     ContactProblem,

@@ -7,8 +7,7 @@ import pytest
 from helpers.body_meshes import box, hanging, standing
 
 from geometry.patches import PatchGrid
-from geometry.rigid_plane import Control
-from geometry.shear_state import ShearControl
+from geometry.rigid_plane import Control, ShearControl
 from geometry.spring_bed import Friction
 from macro import FacePair, LawContactProblem, Material
 from macro.contact.loaded_face import displacements_under

@@ -6,9 +6,8 @@ import pytest
 from geometry import Control, Spectrum, Surface, synthesise
 from micro import HalfSpaceModel
 from micro.boundary_elements import half_space_grid
-from micro.boundary_elements.extension import Extension
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
-from micro.boundary_elements.inverse import CutInverse, contact_inverse
+from micro.boundary_elements.inverse import CutInverse, Extension, contact_inverse
 
 SINGLE = 1e-5
 """Rounding of a few operations in single precision."""

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from micro.boundary_elements.extension import Extension
 from micro.boundary_elements.half_space_grid import Cells
+from micro.boundary_elements.inverse import Extension
 from micro.friction.stick_slip import FreeInverse, across
 from micro.friction.tangential_grid import TangentialGrid
 
