@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 from multiscale.auto.keys import resolved_sections
-from multiscale.clock import Clock
 from multiscale.couplings.coupling import Coupling
 from multiscale.couplings.dispatch import load_finite_elements
 from multiscale.laws.law_table import LawTable
@@ -16,7 +15,7 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import LoadPosition, LoadStepper
 from multiscale.machine import cluster_nodes
 from multiscale.observers.step_observers import Observers
-from multiscale.progress import run_progress
+from multiscale.progress import Clock, run_progress
 from multiscale.results.accuracy import verdict
 from multiscale.results.contact_record import ContactRecord
 from multiscale.results.history import History

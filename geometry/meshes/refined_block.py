@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from geometry.meshes.bisection import Tetrahedra, from_hexahedra, hexahedron_sides, refined
-from geometry.meshes.lattice import Segment, lattice_cells, node_share
+from geometry.meshes.block import Segment, lattice_cells, node_share
 from support.arrays import Array
 from support.checks import positive_lengths
 from support.errors import InputError

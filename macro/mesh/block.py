@@ -13,8 +13,8 @@ from dolfinx import mesh as dmesh
 from numpy.typing import NDArray
 
 from geometry.meshes.bisection import Tetrahedra, with_middles
-from geometry.meshes.block import BlockShape
-from geometry.meshes.lattice import (
+from geometry.meshes.block import (
+    BlockShape,
     cells_beyond,
     lattice_cells,
     lattice_part,

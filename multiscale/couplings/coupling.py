@@ -22,7 +22,6 @@ from geometry.plausibility import check_finite_slopes
 from geometry.statistics import roughness
 from micro import HalfSpaceModel, MicroModel
 from multiscale.bodies.bodies import Bodies, free_bodies, solver_options_given
-from multiscale.clock import Clock
 from multiscale.couplings import describe, validity
 from multiscale.inputs.bodies import SceneBody
 from multiscale.inputs.cost import Work, body_request, cost_statement, scene_requests
@@ -32,6 +31,7 @@ from multiscale.laws.law_table import LawTable
 from multiscale.loading.load_step import LoadStep
 from multiscale.loading.stepper import StepSolver, step_count
 from multiscale.machine import MemoryRequest
+from multiscale.progress import Clock
 from multiscale.readable import Detail, percent, quantity, times
 from multiscale.results.history import range_notes
 from multiscale.results.reference_record import ReferenceRecord

@@ -53,7 +53,7 @@ FLOORS = {
     ],
     "multiscale": [
         "gap_flows readable removed",
-        "clock figures machine",
+        "figures machine",
         "console laws loading",
         "progress",
         "exports results scene",

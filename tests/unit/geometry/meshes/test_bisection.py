@@ -14,7 +14,7 @@ from geometry.meshes.bisection import (
     refined,
     with_middles,
 )
-from geometry.meshes.lattice import lattice_cells
+from geometry.meshes.block import lattice_cells
 
 SIDES = np.array([(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)])
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from geometry.meshes.lattice import (
+from geometry.meshes.block import (
     Segment,
     cells_beyond,
     lattice_cells,

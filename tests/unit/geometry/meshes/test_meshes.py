@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from geometry import BlockShape, InputError, PatchGrid, misalignment
-from geometry.meshes.lattice import lattice_cells, lattice_part, node_share
+from geometry.meshes.block import lattice_cells, lattice_part, node_share
 
 SHAPE = {"interface": (1.0, 2.0), "height": 1.5, "cells": (4, 6, 3)}
 MARGIN = {"margin": 0.7, "margin_cells": 2, "margin_grading": 3.0}
