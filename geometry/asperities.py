@@ -20,6 +20,9 @@ from support.errors import InputError
 _COINCIDENT = 1e-3
 """Distance of summits that are taken for one [cells]."""
 
+_SUMMIT_ARRAYS = ("x", "y", "z", "radius_major", "radius_minor", "angle")
+_BORDER_ARRAYS = ("border_x", "border_y", "border_z")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GridMaxima:
@@ -176,10 +179,6 @@ def _ascent(slope: Array, curvature: Array) -> Array:
     flat = np.abs(bend) < np.abs(along)
     step = np.where(flat, np.sign(along), along / np.where(flat, 1.0, np.abs(bend) + (bend == 0.0)))
     return np.asarray(np.einsum("nij,nj->ni", axes, step))
-
-
-_SUMMIT_ARRAYS = ("x", "y", "z", "radius_major", "radius_minor", "angle")
-_BORDER_ARRAYS = ("border_x", "border_y", "border_z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

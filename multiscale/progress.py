@@ -19,6 +19,9 @@ from multiscale.loading.load_step import LoadStep
 from multiscale.readable import Observer, duration, quantity
 from support.collective import place_in
 
+Show = Callable[[str], None]
+"""Shows a text."""
+
 
 class Clock:
     """Measures the wall time of phases from now on, each without that of phases within it.
@@ -64,10 +67,6 @@ class Clock:
         """Wall time of each phase that ended, and of all else until then as ``other`` [s]."""
         rest = self._until - self._began - sum(self.seconds.values())
         return {**self.seconds, "other": max(rest, 0.0)}
-
-
-Show = Callable[[str], None]
-"""Shows a text."""
 
 
 def counting(show: Show) -> Observer:

@@ -28,6 +28,13 @@ _VALUE_UNIT = re.compile(r"#\s*Value units\s*[:：]\s*(\S+)\s*", re.IGNORECASE)
 _WORD = re.compile(r"#[^:：]*[:：]\s*(\S+)\s*")
 _FOREIGN = re.compile(r"#\s*File Format\s*=")
 
+Line = tuple[int, str]
+"""A line of a file without its comment: its number, from 1, and its text."""
+_DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
+_NUMBER = re.compile(rf"{_DIGITS}|[-+]?(?:nan|inf|infinity)", re.IGNORECASE | re.ASCII)
+_WITH_COMMA = re.compile(r"[-+]?\d*,\d+(?:e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Text:
@@ -208,15 +215,6 @@ def _places(coordinate: Array, axis: str) -> tuple[Indices, float]:
     if np.max(np.abs(place - index)) > 0.01:
         raise InputError(f"the points are not evenly spaced along {axis}")
     return index, step
-
-
-Line = tuple[int, str]
-"""A line of a file without its comment: its number, from 1, and its text."""
-
-_DIGITS = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?"
-_NUMBER = re.compile(rf"{_DIGITS}|[-+]?(?:nan|inf|infinity)", re.IGNORECASE | re.ASCII)
-_WITH_COMMA = re.compile(r"[-+]?\d*,\d+(?:e[-+]?\d+)?", re.IGNORECASE | re.ASCII)
-_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}", re.ASCII)
 
 
 def is_number(cell: str) -> bool:

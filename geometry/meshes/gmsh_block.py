@@ -24,6 +24,24 @@ from support.packages import optional_packages
 _TETRAHEDRA = 4
 """gmsh's number of the tetrahedra with four nodes."""
 
+_OPTIONS = {
+    "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
+    "General.Verbosity": 0,
+    "General.Terminal": 0,
+    "Mesh.Algorithm": 6,
+    "Mesh.ElementOrder": 1,
+    "Mesh.RecombineAll": 0,
+    "Mesh.SubdivisionAlgorithm": 0,
+    "Mesh.SaveAll": 0,
+    "Mesh.MeshSizeFactor": 1,
+    "Mesh.MeshSizeMin": 0,
+    "Mesh.MeshSizeMax": 1e22,
+    "Mesh.MeshSizeFromPoints": 0,
+    "Mesh.MeshSizeFromCurvature": 0,
+    "Mesh.MeshSizeExtendFromBoundary": 0,
+}
+"""Options that a caller's own session may have changed; they are restored afterwards."""
+
 
 def block_by_gmsh(
     interface: tuple[float, float],
@@ -129,25 +147,6 @@ def _tetrahedra(gmsh: Any, unit: float) -> Tetrahedra:
         facets=np.empty((0, 3), np.int64),
         facet_tags=np.empty(0, np.int32),
     )
-
-
-_OPTIONS = {
-    "General.AbortOnError": 2,  # errors raise exceptions; 4 would end the process
-    "General.Verbosity": 0,
-    "General.Terminal": 0,
-    "Mesh.Algorithm": 6,
-    "Mesh.ElementOrder": 1,
-    "Mesh.RecombineAll": 0,
-    "Mesh.SubdivisionAlgorithm": 0,
-    "Mesh.SaveAll": 0,
-    "Mesh.MeshSizeFactor": 1,
-    "Mesh.MeshSizeMin": 0,
-    "Mesh.MeshSizeMax": 1e22,
-    "Mesh.MeshSizeFromPoints": 0,
-    "Mesh.MeshSizeFromCurvature": 0,
-    "Mesh.MeshSizeExtendFromBoundary": 0,
-}
-"""Options that a caller's own session may have changed; they are restored afterwards."""
 
 
 @contextmanager

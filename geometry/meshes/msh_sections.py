@@ -20,6 +20,20 @@ from numpy.typing import NDArray
 from support.arrays import Array
 from support.errors import InputError
 
+Table = NDArray[np.int64]
+ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"
+KINDS = {
+    15: (0, 1, "point"), 1: (1, 2, "line"), 8: (1, 3, "line"),
+    2: (2, 3, "triangle"), 9: (2, 6, "triangle"),
+    3: (2, 4, "quadrilateral"), 16: (2, 8, "quadrilateral"), 10: (2, 9, "quadrilateral"),
+    4: (3, 4, "tetrahedron"), 11: (3, 10, "tetrahedron"),
+    5: (3, 8, "hexahedron"), 17: (3, 20, "hexahedron"), 12: (3, 27, "hexahedron"),
+    6: (3, 6, "prism"), 18: (3, 15, "prism"), 13: (3, 18, "prism"),
+    7: (3, 5, "pyramid"), 19: (3, 13, "pyramid"), 14: (3, 14, "pyramid"),
+}  # fmt: skip
+"""Dimension, nodes and name of gmsh's kinds of elements of first and second order."""
+_NUMERIC = ("Entities", "PartitionedEntities", "Nodes", "Elements")
+
 
 class TextNumbers:
     """Numbers between spaces and line ends.
@@ -125,22 +139,6 @@ def _too_short() -> InputError:
     return InputError("a section of the file ends before all that it announces")
 
 
-Table = NDArray[np.int64]
-
-ALLOWED = "a mesh of gmsh, format 2 or 4, beginning with $MeshFormat"
-
-KINDS = {
-    15: (0, 1, "point"), 1: (1, 2, "line"), 8: (1, 3, "line"),
-    2: (2, 3, "triangle"), 9: (2, 6, "triangle"),
-    3: (2, 4, "quadrilateral"), 16: (2, 8, "quadrilateral"), 10: (2, 9, "quadrilateral"),
-    4: (3, 4, "tetrahedron"), 11: (3, 10, "tetrahedron"),
-    5: (3, 8, "hexahedron"), 17: (3, 20, "hexahedron"), 12: (3, 27, "hexahedron"),
-    6: (3, 6, "prism"), 18: (3, 15, "prism"), 13: (3, 18, "prism"),
-    7: (3, 5, "pyramid"), 19: (3, 13, "pyramid"), 14: (3, 14, "pyramid"),
-}  # fmt: skip
-"""Dimension, nodes and name of gmsh's kinds of elements of first and second order."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Elements:
     """Elements of one kind.
@@ -221,9 +219,6 @@ def _format(data: bytes) -> tuple[float, str]:
     if one not in orders or words[2] != b"8":
         raise InputError("a binary file whose numbers have another size", allowed=ALLOWED)
     return float(words[0]), orders[one]
-
-
-_NUMERIC = ("Entities", "PartitionedEntities", "Nodes", "Elements")
 
 
 def _sections(data: bytes, order: str) -> Iterator[tuple[str, Numbers | bytes]]:

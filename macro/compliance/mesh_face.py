@@ -46,6 +46,9 @@ from support.errors import InputError
 _BATCH = 20_000
 """Points of the surface whose fields are evaluated at once."""
 
+MOST_DOFS = 500_000
+"""Degrees of freedom up to which linear elements are raised to quadratic ones."""
+
 
 class HalfSpaceFields(Protocol):
     """Fields in a half-space under the modes, in the coordinates of the rectangle."""
@@ -175,10 +178,6 @@ class HalfSpaceCorrections:
         nodes = np.unique(compat.cell_nodes(body.space)[np.flatnonzero(other)])
         action = compat.compile_form(ufl.action(form, displacement))
         return action, displacement, nodes, self._displacement(nodes)
-
-
-MOST_DOFS = 500_000
-"""Degrees of freedom up to which linear elements are raised to quadratic ones."""
 
 
 def from_outside(facets: ContactFacets, length: float) -> ContactFacets:

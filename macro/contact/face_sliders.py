@@ -27,6 +27,14 @@ _SAME_PLACE = 1e-6
 _UNHELD = 1e-13
 """Stiffness of what sticks in a direction, over the largest, below which nothing does."""
 
+_MOST_STEPS = 100
+_FARTHEST = 4.0
+"""Largest step to the shift, in shifts that all springs could stick over."""
+_SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
+"""Parts of the stiffness of springs that all stick, which shorten steps to the shift."""
+_ENOUGH = 1e-12
+"""Residual of a prescribed shear force, relative to the largest that friction transmits."""
+
 
 class _Evaluated(NamedTuple):
     """A response of the sliders, and what it is one to."""
@@ -296,15 +304,6 @@ class FaceSliders:
 def _once(laws: Sequence[Any]) -> list[Any]:
     """Return the different laws among those of patches, which may have one in common."""
     return list({id(law): law for law in laws}.values())
-
-
-_MOST_STEPS = 100
-_FARTHEST = 4.0
-"""Largest step to the shift, in shifts that all springs could stick over."""
-_SHORTER = 0.0, 1e-3, 1e-2, 0.1, 1.0, 4.0
-"""Parts of the stiffness of springs that all stick, which shorten steps to the shift."""
-_ENOUGH = 1e-12
-"""Residual of a prescribed shear force, relative to the largest that friction transmits."""
 
 
 def find_shift(

@@ -33,6 +33,17 @@ _STEPS = 10
 _CLOSE = 1e-3
 """Last step in the basis, relative to the guess."""
 
+NEAR = 3e-3
+"""Residual over the contact forces from which Newton's method goes on alone. With 0.01 three rings
+pressed to an approach by two laws took four steps along a path, in place of three."""
+_MOST_STEPS = 8
+_TOLERANCE, _ROUGHLY = 1e-4, 1e-3
+"""Relative tolerance of linear solves, and that by a prescribed force in a first load or with
+friction, which took 5 to 10 % more iterations with 1e-4. Under a prescribed approach an error of
+the mean displacement is one of all closures, which with 0.01 were off by a stiff law's roughness. A
+prescribed force corrects it. Along a path one such step leads near the solution: with 1e-3 two laws
+on pads took four steps, in place of three with as many iterations."""
+
 
 class DisplacementBasis:
     """Earlier displacements, orthonormal in the block's energy, as a basis for initial guesses.
@@ -176,18 +187,6 @@ class DisplacementBasis:
 
     def _sum(self, values: Any) -> Any:
         return self._comm.allreduce(values, op=MPI.SUM)
-
-
-NEAR = 3e-3
-"""Residual over the contact forces from which Newton's method goes on alone. With 0.01 three rings
-pressed to an approach by two laws took four steps along a path, in place of three."""
-_MOST_STEPS = 8
-_TOLERANCE, _ROUGHLY = 1e-4, 1e-3
-"""Relative tolerance of linear solves, and that by a prescribed force in a first load or with
-friction, which took 5 to 10 % more iterations with 1e-4. Under a prescribed approach an error of
-the mean displacement is one of all closures, which with 0.01 were off by a stiff law's roughness. A
-prescribed force corrects it. Along a path one such step leads near the solution: with 1e-3 two laws
-on pads took four steps, in place of three with as many iterations."""
 
 
 class FirstSteps:

@@ -55,6 +55,8 @@ finite body; the truncated Newton method took 86 B.
 
 _NEWTON = "Newton's method on the active set"
 
+_WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
+
 
 class InteractionDisplacement(NamedTuple):
     """Displacements of n summits by the m active contacts, except by each contact's own field.
@@ -288,9 +290,6 @@ def damped_step(
             return trial, caused, left
         length *= 0.5
     raise failure("a damped Newton step", "LINE_SEARCH", 1)
-
-
-_WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
 
 
 def truncated_newton(

@@ -23,6 +23,10 @@ from micro.boundary_elements.half_space_grid import Cells
 from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from support.arrays import Array, Indices
 
+_REST_OF_RATE = 2e-4
+"""Rest of the derivative of the pressures by the approach. Its square, times the few per cent that
+finite slopes add, is what the derivative of the force errs by."""
+
 
 class ComplianceMatrix:
     """Compliance of n cells, a column of them, by its matrix; see `GridCompliance`.
@@ -120,11 +124,6 @@ class FactoredInverse:
     def __call__(self, displacement: Array) -> Array:
         """Return the pressures that displace the cells so, shape (n,)."""
         return np.asarray(scipy.linalg.cho_solve(self._factors, displacement, check_finite=False))
-
-
-_REST_OF_RATE = 2e-4
-"""Rest of the derivative of the pressures by the approach. Its square, times the few per cent that
-finite slopes add, is what the derivative of the force errs by."""
 
 
 @dataclass(frozen=True, eq=False)

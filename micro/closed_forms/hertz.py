@@ -41,6 +41,9 @@ from numpy.typing import ArrayLike
 from support.arrays import Array
 from support.errors import InputError
 
+NEAREST = 30.0
+"""Smallest confocal parameter v for which the series is exact to rounding."""
+
 
 class ShapeFactors(NamedTuple):
     """What the shape of the contact ellipse contributes to Hertz's formulas (no units).
@@ -302,10 +305,6 @@ def crowned_peak(
         return max(peak, modulus * math.sqrt(0.5 * approach / radius))
     peak = (6.0 * force * modulus**2 / (math.pi**3 * radius**2)) ** (1.0 / 3.0)
     return max(peak, 2.0 / math.pi * modulus * math.sqrt(approach / radius))
-
-
-NEAREST = 30.0
-"""Smallest confocal parameter v for which the series is exact to rounding."""
 
 
 def elliptic_field(

@@ -21,6 +21,10 @@ from support.arrays import Array
 from support.errors import InputError
 from support.network import Network, NetworkFlow, Preconditioner, factorised, network_flow
 
+_LEAST_GAP = 1e-7
+"""Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
+ones, and the flow through it is 1e-21 of that through the largest."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Constriction:
@@ -77,11 +81,6 @@ def critical_constriction(
     )
     share = float(downwards[crossing].sum()) / solution.total
     return Constriction(place=(x, y), gap=float(gap.flat[cell]), share=min(share, 1.0))
-
-
-_LEAST_GAP = 1e-7
-"""Gap over the largest one that counts as closed. Solutions of the contact problem know no smaller
-ones, and the flow through it is 1e-21 of that through the largest."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

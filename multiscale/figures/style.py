@@ -98,6 +98,10 @@ STYLE: dict[str, Any] = {
 }  # fmt: skip
 """Parameters of matplotlib, as ``matplotlib.rcParams`` has them."""
 
+_LEVEL = 3
+"""Level of compression; 6, the usual one, takes twice as long for a tenth of the size."""
+_METRE = 39.37  # inches
+
 
 def styled() -> Any:
     """Return a decorator, or context, in which matplotlib draws in this style."""
@@ -324,11 +328,6 @@ def add_legend(figure: Figure) -> None:
     first = figure.axes[0]
     if len(first.get_legend_handles_labels()[0]) > 1:
         first.legend()
-
-
-_LEVEL = 3
-"""Level of compression; 6, the usual one, takes twice as long for a tenth of the size."""
-_METRE = 39.37  # inches
 
 
 def png_of(figure: Any, dots_per_inch: int) -> bytes:

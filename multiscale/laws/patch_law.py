@@ -29,6 +29,9 @@ CAUSES = "grid", "rows", "samples"
 _OF_ROWS = 3.0
 """Error by the rows over the change where every second one is left out."""
 
+_ROUNDING = 1e-12
+"""Share of the end of a table by which a converged closure may exceed it."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Transmissivity:
@@ -105,10 +108,6 @@ class Transmissivity:
             return np.asarray((gaps + beyond[:, None]) ** 3)
         gap: Any = scipy.interpolate.PchipInterpolator(rows, gaps)(within)
         return np.asarray((np.maximum(gap, 0.0) + beyond[:, None]) ** 3)
-
-
-_ROUNDING = 1e-12
-"""Share of the end of a table by which a converged closure may exceed it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

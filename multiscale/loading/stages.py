@@ -16,6 +16,13 @@ from support.fields import Length, Limits, Pressure, Tag, Unit, check_limits
 
 Rise = Annotated[float, Unit("K")]
 
+Quantity = Literal["approach", "force"]
+Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
+Pair = tuple[float, float]
+Pairs = tuple[Pair, ...]
+_SHEARS = ("shear", "shear_force")
+_OF_PLANE = ("approach", "force", "pressure", "hold")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TractionSection:
@@ -105,14 +112,6 @@ def _replaced(loads: Sequence[Any], later: Sequence[Any]) -> tuple[Any, ...]:
     """Return loads of faces, with later ones of the same faces instead."""
     faces = {one.surface for one in later}
     return (*(one for one in loads if one.surface not in faces), *later)
-
-
-Quantity = Literal["approach", "force"]
-Repeats = Annotated[int, Limits(ge=1, le=1_000_000)]
-Pair = tuple[float, float]
-Pairs = tuple[Pair, ...]
-_SHEARS = ("shear", "shear_force")
-_OF_PLANE = ("approach", "force", "pressure", "hold")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
