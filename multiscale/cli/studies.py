@@ -6,6 +6,7 @@ import argparse
 import os
 import platform
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ from multiscale.studies.cases import sweep_cases, values_from_text
 from multiscale.studies.comparison import Comparison, compare
 from multiscale.studies.configurations import Configuration
 from multiscale.studies.difference import Difference, difference
-from multiscale.studies.running import JOURNAL, CaseResult, part_name
+from multiscale.studies.running import JOURNAL, CaseResult
 from multiscale.studies.sweep import Statistics, SweepResults, sweep
 from support.collective import on_root, place_in
 from support.errors import InputError, NotConverged
@@ -50,20 +51,26 @@ def sweep_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> No
     """
     scene, folder = scene_and_folder(choice, comm, ending=SWEEP_ENDING)
     vary = dict(values_from_text(text) for text in choice.vary)
-    which, parts = choice.part or slurm_part()
-    own = folder / JOURNAL / part_name((which, parts))
+    part = choice.part or slurm_part()
     # --overwrite removes the cases of all parts, of which none may be running
-    with locked(folder, comm, shared=not choice.overwrite), locked(own, comm):
+    with locked(folder, comm, shared=not choice.overwrite) as lock:
         if choice.overwrite:
             on_root(comm, lambda: _remove_results(folder))
+            on_root(comm, lock.share)
         else:
             on_root(comm, lambda: refuse_other_kind(folder, cases=True))
         cases = on_root(comm, lambda: len(sweep_cases(scene, vary)))
-        ranks = parts * place_in(comm)[1]
+        ranks = part[1] * place_in(comm)[1]
         console.say(comm, f"{cases} cases on {ranks} rank{'s' * (ranks > 1)}")
-        with case_progress(comm, cases, parts) as observe:
-            done = sweep(scene, vary, comm, folder=folder, part=(which, parts), observe=observe)
-        files = on_root(comm, lambda: _write_sweep(folder, done, scene.output.figures))
+        with case_progress(comm, cases, part[1]) as observe:
+            done = sweep(scene, vary, comm, folder=folder, part=part, observe=observe)
+        known = None
+        # a part that ended meanwhile may have written its tables before these, which lack its cases
+        while known is None or known.unfinished > done.unfinished:
+            known = done
+            files = on_root(comm, partial(_write_sweep, folder, done, scene.output.figures))
+            if done.unfinished:
+                done = sweep(scene, vary, comm, folder=folder, part=part)
     for text in _summary(done):
         console.say(comm, text)
     console.show_files(comm, files)
@@ -218,8 +225,9 @@ def compare_scene(choice: argparse.Namespace, options: list[str], comm: Any) -> 
     if options:
         raise InputError("configurations take no PETSc options", key="--", value=" ".join(options))
     scene, folder = scene_and_folder(choice, comm, ending=COMPARE_ENDING)
-    with locked(folder, comm):
+    with locked(folder, comm) as lock:
         on_root(comm, lambda: refuse_other_kind(folder, cases=True))
+        on_root(comm, lock.share)  # with what `compare` takes
         with following(comm) as (begun, ended):
 
             def observe(one: Configuration, result: CaseResult) -> None:

@@ -131,6 +131,17 @@ class FolderLock:
                 raise InputError(problem, key="--out", value=str(self._folder))
             time.sleep(0.02)
 
+    def share(self) -> None:
+        """Let others that share the folder hold it too, from now on.
+
+        Raises:
+            InputError: When another process took the lock at this moment.
+        """
+        self._way = fcntl.LOCK_SH
+        if self._handle is not None:
+            self._close()
+            self.hold()
+
     def release(self) -> None:
         """Lift the lock and leave nothing of it."""
         if self._locked != self._folder and self._handle is not None and self._is_held():

@@ -13,6 +13,7 @@ costs no more than the cases that were under way.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field, fields, replace
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from multiscale.loading.load_step import COLUMNS
+from multiscale.output.results_folder import locked
 from multiscale.results.history import History
 from multiscale.run import Run
 from multiscale.scene.scene import Scene, changes, told
@@ -117,9 +119,26 @@ def run_cases(
         The results that this rank has computed or read, by number; one by one all of them, else no
         two ranks have the same.
 
+    Raises:
+        InputError: When another process runs the same part in the folder of the journal, or what
+            shares that with no study.
+
     Note:
         Collective.
     """
+    with journal.held(comm, part):
+        return _run_cases(cases, solve, journal, comm, part, one_by_one, observe)
+
+
+def _run_cases(
+    cases: Sequence[Any],
+    solve: Callable[[Any, Callable[[], None]], CaseResult],
+    journal: Journal,
+    comm: Any,
+    part: tuple[int, int],
+    one_by_one: bool,
+    observe: Callable[[Any, CaseResult], None] | None,
+) -> dict[int, CaseResult]:
     (which, parts), (rank, _) = part, place_in(comm)
     if one_by_one:
         mine, done = on_root(comm, lambda: _read(journal, cases, None))
@@ -162,6 +181,24 @@ class Journal:
     def __init__(self, folder: str | Path | None, identity: Mapping[str, Any]) -> None:
         self._folder = None if folder is None else Path(folder) / JOURNAL
         self._identity = dict(identity)
+
+    @contextmanager
+    def held(self, comm: Any, part: tuple[int, int]) -> Iterator[None]:
+        """Hold the locks on the folder of the study, which other parts share, and on a part.
+
+        Args:
+            comm: MPI communicator, or None.
+            part: The part of the study, the k-th of n.
+
+        Raises:
+            InputError: When another process runs this part, or what is no part of a study.
+        """
+        if self._folder is None:
+            yield
+            return
+        own = self._folder / part_name(part)
+        with locked(self._folder.parent, comm, shared=True), locked(own, comm):
+            yield
 
     def files(self) -> list[Path]:
         """Return the files that are there, in the order of their names."""

@@ -111,6 +111,21 @@ def test_busy_machine_is_told():
     assert "the machine was busy with something else" in warning
 
 
+def test_a_comparison_shares_its_folder_with_none(tmp_path):
+    scene, out = Scene.load(PAPER, TINY), tmp_path / "out"
+    failed, refused = CaseResult(status="failed"), []
+
+    def solve(*_):
+        if not refused:
+            with pytest.raises(InputError, match="another run is writing to this folder") as other:
+                compare(scene, folder=out, solve=lambda *_: failed)
+            refused.append(other)
+        return failed
+
+    assert compare(scene, folder=out, solve=solve).measure is None and refused
+    assert not out.exists()  # nothing was stored, and nothing is left
+
+
 def test_nothing_reached_is_no_comparison():
     def never(one, comm, seconds):
         return CaseResult(status="failed")

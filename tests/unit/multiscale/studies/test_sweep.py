@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
 
 from multiscale import run, sweep
+from multiscale.cli import studies
 from multiscale.cli.command_line import main
 from multiscale.run import Run
 from multiscale.scene.scene import Scene
@@ -304,6 +305,42 @@ def test_parts_make_the_whole(scene, tmp_path):
     np.testing.assert_array_equal(both.force_N, sweep(scene, {SEED: range(5)}).force_N)
     with pytest.raises(InputError, match="is no part of a sweep"):
         sweep(scene, {SEED: range(5)}, part=(3, 2))
+
+
+def test_no_other_run_of_a_part_shares_its_folder(scene, file, tmp_path, capsys):
+    """A sweep in Python holds the locks that the command holds."""
+    out, met = tmp_path / "out", []
+
+    def meet(case, result):
+        with pytest.raises(InputError, match="another run is writing to this folder"):
+            sweep(scene, {SEED: [1, 2]}, folder=out, part=(1, 2))
+        met.append(sweep(scene, {SEED: [1, 2]}, folder=out, part=(2, 2)).unfinished)
+        for words in (["run"], ["sweep", "--vary", f"{SEED}=1..2", "--overwrite"]):
+            assert main([words[0], str(file), *words[1:], "--out", str(out)]) == 2
+            assert "another run is writing to this folder" in capsys.readouterr().err
+
+    sweep(scene, {SEED: [1, 2]}, folder=out, part=(1, 2), observe=meet)
+    assert met == [0]  # the case that is observed is stored already
+    with pytest.raises(ValueError, match="ended"):  # an error gives the folder back
+        sweep(scene, {SEED: [3]}, folder=out, observe=lambda *_: float("ended"))
+    assert not sweep(scene, {SEED: [1, 2, 3]}, folder=out).unfinished
+
+
+def test_tables_have_what_parts_did_while_they_were_written(file, tmp_path, monkeypatch):
+    """The other part ends, tables and all, when this one has read what is done."""
+    words = ["sweep", str(file), "--vary", f"{SEED}=1..3", "--out", str(tmp_path / "out")]
+    write, codes = studies._write_sweep, []
+
+    def late(*of):
+        if not codes:
+            codes.append(None)
+            codes[0] = main([*words, "--part", "2/2"])
+        return write(*of)
+
+    monkeypatch.setattr(studies, "_write_sweep", late)
+    assert main([*words, "--part", "1/2"]) == 0 and codes == [0]
+    assert [row["status"] for row in rows(tmp_path / "out" / "cases.csv")] == 3 * ["done"]
+    assert rows(tmp_path / "out" / "statistics.csv")
 
 
 def test_a_case_that_fails_does_not_end_the_others(scene, tmp_path, monkeypatch):
