@@ -92,8 +92,7 @@ class _Reader:
 
     def _read(self, regions: Sequence[str | int], opposite: FaceFrame | None) -> SceneBody:
         from macro import contact_facets
-        from macro.mesh.checks import size_note
-        from macro.mesh.from_file import read_mesh
+        from macro.mesh.from_file import read_mesh, size_note
         from macro.mesh.refinement import refined
 
         mesh = read_mesh(self._path, self._comm, unit=_MILLIMETRES[self._section.mesh_unit])

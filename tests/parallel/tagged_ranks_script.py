@@ -16,9 +16,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from helpers.mesh_files import tagged_box, write_boxes, write_msh2
 
 from macro import compat
-from macro.mesh.checks import check_cells
 from macro.mesh.facets import parts
-from macro.mesh.from_file import read_mesh
+from macro.mesh.from_file import check_cells, read_mesh
 from macro.mesh.supports import free_motions
 from macro.mesh.tagged import TaggedMesh, planar_face
 from macro.mesh.xdmf import write_mesh

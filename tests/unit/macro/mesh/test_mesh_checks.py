@@ -7,8 +7,8 @@ from helpers.mesh_files import tagged_box
 from mpi4py import MPI
 
 from macro import compat
-from macro.mesh.checks import check_cells, check_connected, size_note
 from macro.mesh.facets import parts
+from macro.mesh.from_file import check_cells, check_connected, size_note
 from macro.mesh.tagged import TaggedMesh
 from support.errors import InputError
 

@@ -6,7 +6,7 @@ from helpers.random_bodies import FACES, drawn, mesh_of
 from mpi4py import MPI
 
 from macro import compat
-from macro.mesh.checks import check_cells, check_connected
+from macro.mesh.from_file import check_cells, check_connected
 from macro.mesh.refinement import refined
 from macro.mesh.tagged import surface_area
 
