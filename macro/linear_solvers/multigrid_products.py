@@ -49,8 +49,6 @@ def galerkin(
     weights: PETSc.Mat,
     free: PETSc.Vec,
     coarse_free: PETSc.Vec,
-    *,
-    nodes_at_once: int = _NODES_AT_ONCE,
 ) -> PETSc.Mat:
     """Return the coarser matrix (W ⊗ I₃)ᵀ A (W ⊗ I₃), constrained unknowns apart.
 
@@ -62,7 +60,6 @@ def galerkin(
         weights: W, of nodes by coarse nodes.
         free: 1 for unknowns that are free, 0 for constrained ones.
         coarse_free: The same for the coarser grid.
-        nodes_at_once: Nodes whose rows are multiplied at a time.
 
     Returns:
         The matrix, of the same type, with unit rows and columns where constrained.
@@ -77,7 +74,7 @@ def galerkin(
         units = -_diagonal_blocks(free.array_r == 0.0)  # are no part of the product
         terms = ((rows.own, own), (rows.ghost, weights_seen[rows.own.shape[1] :]), (units, own))
         for blocks, right in terms:
-            parts += list(_products(own, blocks, right, nodes_at_once))
+            parts += list(_products(own, blocks, right))
     coarser = _sum_of_parts(parts, coarse, weights)
     first = coarser.getOwnershipRange()[0]
     constrained = first + np.flatnonzero(coarse_free.array_r == 0.0)
@@ -114,7 +111,6 @@ def _products(
     left: sparse.csr_matrix,
     blocks: sparse.bsr_matrix,
     right: sparse.csr_matrix,
-    nodes_at_once: int,
 ) -> Iterator[sparse.bsr_matrix]:
     """Multiply from both sides, some rows of blocks at a time, without those that are empty.
 
@@ -123,7 +119,7 @@ def _products(
     """
     filled = np.flatnonzero(np.diff(blocks.indptr))
     right = right.tobsr((1, 1))
-    for nodes in np.array_split(filled, -(-len(filled) // nodes_at_once) or 1):
+    for nodes in np.array_split(filled, -(-len(filled) // _NODES_AT_ONCE) or 1):
         if not len(nodes):
             return
         first, last = nodes[0], nodes[-1] + 1

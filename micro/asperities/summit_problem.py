@@ -54,8 +54,12 @@ finite body; the truncated Newton method took 86 B.
 """
 
 _NEWTON = "Newton's method on the active set"
+_MOST_STEPS = 40
+"""Newton steps that may be taken; ordinary problems take 4 to 7."""
 
 _WHAT, _ELSE = "the truncated Newton minimisation", ', or choose solver = "active-set"'
+_MOST_MINIMISING, _MOST_SETS = 60, 200
+"""Newton steps that a minimisation may take, and sets of contacts that may be tried."""
 
 
 class InteractionDisplacement(NamedTuple):
@@ -209,13 +213,12 @@ def solve(problem: SummitProblem, method: Method, start: Array) -> Solution:
         load, step, indentation = trial, 2.0 * step, solution.indentation
 
 
-def active_set(problem: SummitProblem, start: Array, *, most_iterations: int = 40) -> Solution:
+def active_set(problem: SummitProblem, start: Array) -> Solution:
     """Solve a contact problem by damped Newton steps on its normal map.
 
     Args:
         problem: The contact problem.
         start: First guess of the indentations, shape (n,) [mm].
-        most_iterations: Number of Newton steps that may be taken; ordinary problems take 4 to 7.
 
     Raises:
         NotConverged: When no step lowers the error, or the iterations are used up.
@@ -227,11 +230,11 @@ def active_set(problem: SummitProblem, start: Array, *, most_iterations: int = 4
 
     z = start
     caused, error = evaluate(z)
-    for iteration in range(most_iterations):
+    for iteration in range(_MOST_STEPS):
         if problem.residual(z, caused.displacement) <= TOLERANCE:
             return problem.solution(z, caused, iteration)
         z, caused, error = damped_step(evaluate, z, _newton_step(caused, error), error)
-    raise failure(_NEWTON, "MAX_ITERATIONS", most_iterations)
+    raise failure(_NEWTON, "MAX_ITERATIONS", _MOST_STEPS)
 
 
 def _newton_step(caused: InteractionDisplacement, error: Array) -> Array:
@@ -292,13 +295,7 @@ def damped_step(
     raise failure("a damped Newton step", "LINE_SEARCH", 1)
 
 
-def truncated_newton(
-    problem: SummitProblem,
-    start: Array,
-    *,
-    most_iterations: int = 60,
-    most_sets: int = 200,
-) -> Solution:
+def truncated_newton(problem: SummitProblem, start: Array) -> Solution:
     """Solve a contact problem by the paper's minimisation over a changing set of contacts.
 
     All summits that violate a condition change sides together. When their number has not shrunk
@@ -307,8 +304,6 @@ def truncated_newton(
     Args:
         problem: The contact problem.
         start: First guess of the indentations, shape (n,) [mm].
-        most_iterations: Number of Newton steps that a minimisation may take.
-        most_sets: Number of sets of contacts that may be tried.
 
     Raises:
         NotConverged: When a minimisation stalls or no set of contacts meets the conditions.
@@ -322,8 +317,8 @@ def truncated_newton(
     slack = 0.1 * TOLERANCE * problem.scale
     rounds = 5
     fewest, patience = len(start) + 1, rounds
-    for _ in range(most_sets):
-        indentation, caused, inner = _minimise(problem, contacting, indentation, most_iterations)
+    for _ in range(_MOST_SETS):
+        indentation, caused, inner = _minimise(problem, contacting, indentation)
         spent += inner
         pulled = contacting & (indentation < 0.0)
         penetrated = ~contacting & (caused.displacement < problem.interference - slack)
@@ -340,7 +335,7 @@ def truncated_newton(
 
 
 def _minimise(
-    problem: SummitProblem, contacting: Flags, start: Array, most_iterations: int
+    problem: SummitProblem, contacting: Flags, start: Array
 ) -> tuple[Array, InteractionDisplacement, int]:
     """Bring w − d to 0 over the set of contacts; a negative t displaces no other summit."""
     rows, goal = np.flatnonzero(contacting), 0.1 * TOLERANCE * problem.scale
@@ -351,14 +346,14 @@ def _minimise(
 
     t = start
     caused, error = evaluate(t)
-    for iteration in range(most_iterations):
+    for iteration in range(_MOST_MINIMISING):
         if np.abs(error).max(initial=0.0) <= goal:
             return t, caused, iteration
         step = np.zeros_like(t)
         forcing = min(0.1, float(np.linalg.norm(error)) / problem.scale)
         step[rows] = _gauss_newton_step(caused, rows, error, forcing)
         t, caused, error = damped_step(evaluate, t, step, error)
-    raise failure(_WHAT, "MAX_ITERATIONS", most_iterations, _ELSE)
+    raise failure(_WHAT, "MAX_ITERATIONS", _MOST_MINIMISING, _ELSE)
 
 
 def _gauss_newton_step(
