@@ -5,6 +5,7 @@ import pytest
 from helpers.asperity_states import places
 
 from geometry import NotConverged
+from micro.asperities import summit_problem
 from micro.asperities.hertz_pairs import HertzPairs
 from micro.asperities.summit_problem import (
     TOLERANCE,
@@ -71,14 +72,15 @@ def test_newton_is_fast(cluster):
 @pytest.mark.parametrize(
     ("method", "limit", "what", "reason"),
     [
-        (active_set, "most_iterations", "Newton's method on the active set", "MAX_ITERAT"),
-        (truncated_newton, "most_iterations", "the truncated Newton minimisation", "MAX_ITERAT"),
-        (truncated_newton, "most_sets", "the truncated Newton minimisation", "CONTACTING_SET"),
+        (active_set, "_MOST_STEPS", "Newton's method on the active set", "MAX_ITERAT"),
+        (truncated_newton, "_MOST_MINIMISING", "the truncated Newton minimisation", "MAX_ITERAT"),
+        (truncated_newton, "_MOST_SETS", "the truncated Newton minimisation", "CONTACTING_SET"),
     ],
 )
-def test_running_out_is_an_error(cluster, method, limit, what, reason):
+def test_running_out_is_an_error(cluster, monkeypatch, method, limit, what, reason):
+    monkeypatch.setattr(summit_problem, limit, 1)
     with pytest.raises(NotConverged, match=f"^{what} did not converge: {reason}.* after"):
-        method(problem(cluster, 5e-3), np.zeros(7), **{limit: 1})
+        method(problem(cluster, 5e-3), np.zeros(7))
 
 
 def test_step_that_never_gains_is_an_error():
