@@ -105,23 +105,23 @@ class ParityBlock:
         )
 
     def traction_response(self) -> list[list[Array]]:
-        """Return the displacements of the top by modes of traction along x, y and downwards.
+        """Return the displacements of the top by modes of traction along x and y.
 
         Modes are those that load the block with the parity of its pressures: a traction along an
         axis has the opposite parity along it.
 
         Returns:
-            By component of the displacement and of the traction the integrals over the top of modes
-            times displacements, shape (k, l, m, n) each as in `Response` [mm³/MPa].
+            By component of the displacement, the third downwards, and of the traction the integrals
+            over the top of modes times displacements, shape (k, l, m, n) each as in `Response`
+            [mm³/MPa].
         """
         loads = [(-1.0 if axis == 2 else 1.0) * self._modes(axis) for axis in range(3)]
-        tops, _ = self._stiffness.solve(dict(enumerate(loads)))
-        splits = np.cumsum([len(load) for load in loads])[:2]
+        tops, _ = self._stiffness.solve(dict(enumerate(loads[:2])))
         shapes = [self._counts(axis) for axis in range(3)]
         return [
             [
                 np.tensordot(load, part).reshape(*shapes[seen], *shapes[by])
-                for by, part in enumerate(np.split(top, splits, axis=2))
+                for by, part in enumerate(np.split(top, [len(loads[0])], axis=2))
             ]
             for seen, (load, top) in enumerate(zip(loads, tops, strict=True))
         ]
@@ -344,7 +344,8 @@ def face_tractions(
 
     Returns:
         Displacements along x, along y and downwards by tractions likewise, in modes: symmetric,
-        shape (3, 3, K², K²) [mm/N]; the same on every rank and for every number of ranks.
+        shape (3, 3, K², K²) [mm/N]; the same on every rank and for every number of ranks. Those
+        downwards by pressures are left 0: `face_compliance` has them.
 
     Note:
         Collective. The ranks share the parities.
@@ -358,16 +359,43 @@ def face_tractions(
                 lines=lines, height=height, material=material, sides=sides, parity=parity
             )
 
-        parts = shared(comm, 4, lambda index: block(PARITIES[index]).traction_response())
+        alike = lengths[0] == lengths[1]
+        families = [parity for parity in PARITIES if not (alike and parity == (1, 0))]
+        parts = shared(
+            comm, len(families), lambda index: block(families[index]).traction_response()
+        )
+        responses = dict(zip(families, parts, strict=True))
+        if alike:  # exchange x and y
+            turned, other = (1, 0, 2), responses[0, 1]
+            responses[1, 0] = [
+                [other[turned[seen]][turned[by]].transpose(1, 0, 3, 2) for by in range(2)]
+                for seen in range(3)
+            ]
         total = np.zeros((3, 3, *4 * (count,)))
-        for parity, response in zip(PARITIES, parts, strict=True):
+        for parity, response in responses.items():
             odd = [block(parity).parity_of(axis) for axis in range(3)]
             for seen, row in enumerate(response):
                 for by, part in enumerate(row):
                     (a, b), (c, d) = odd[seen], odd[by]
                     total[seen, by, a::2, b::2, c::2, d::2] = part
         total = total.reshape(3, 3, count**2, count**2) / (lengths[0] * lengths[1]) ** 2
-        return {"tractions": 0.5 * (total + total.transpose(1, 0, 3, 2))}
+        return {"tractions": reciprocal(total)}
 
     block_key = (lengths, height, material, sides, count)
     return cached("tractions", block_key, compute, comm)["tractions"]
+
+
+def reciprocal(total: Array) -> Array:
+    """Return displacements by tractions, symmetric, with those along the face by pressures.
+
+    Pressures displace a face along itself as tractions along it displace it downwards (Maxwell and
+    Betti), so that solutions under pressures are not needed.
+
+    Args:
+        total: By tractions along x and y, symmetric up to errors, shape (3, 3, K², K²).
+    """
+    found = np.zeros_like(total)
+    along, found[2, :2] = total[:2, :2], total[2, :2]
+    found[:2, :2] = 0.5 * (along + along.transpose(1, 0, 3, 2))
+    found[:2, 2] = total[2, :2].transpose(0, 2, 1)
+    return found

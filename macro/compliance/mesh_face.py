@@ -31,7 +31,7 @@ from geometry.materials import Material
 from geometry.patches import PatchGrid
 from macro import compat
 from macro.bodies import MeshedBody
-from macro.compliance.face_compliance import FaceCompliance, stresses_in_face
+from macro.compliance.face_compliance import FaceCompliance, reciprocal, stresses_in_face
 from macro.compliance.surroundings import FaceMoments
 from macro.elastic_body import ElasticBody, stiffness_form
 from macro.linear_solvers.options import PREFIX
@@ -276,21 +276,22 @@ def mesh_face_tractions(
         rectangle: The rectangle as one patch, in that frame.
         material: Elastic constants under the rectangle.
         count: Modes K along a side of the rectangle.
-        fields: The half-space of that material under modes along x, along y and downwards; None to
-            load the mesh by the modes themselves, see `mesh_face_compliance`.
+        fields: The half-space of that material under modes along x and along y; None to load the
+            mesh by the modes themselves, see `mesh_face_compliance`.
 
     Returns:
-        Displacements along x, along y and downwards by tractions likewise, in modes: symmetric,
-        shape (3, 3, K², K²) [mm/N]; the same on every rank.
+        Displacements along x, along y and downwards by tractions likewise, in modes, as
+        `face_tractions` returns them: symmetric, shape (3, 3, K², K²) [mm/N]; the same on every
+        rank.
 
     Raises:
         NotConverged: When a linear solve fails.
 
     Note:
-        Collective. One solve for each of the 3 K² modes.
+        Collective. One solve for each of the 2 K² modes.
     """
     moments = FaceMoments(body, facets, rectangle, count)
-    loads: Sequence[_Load] = [_Tractions(moments, axis) for axis in range(3)]
+    loads: Sequence[_Load] = [_Tractions(moments, axis) for axis in range(2)]
     if fields is not None:
         loads = [HalfSpaceCorrections(body, facets, rectangle, material, field) for field in fields]
     total = np.zeros((3, 3, count**2, count**2))
@@ -298,8 +299,8 @@ def mesh_face_tractions(
         total[:, axis, :, mode] = moments.displacements(displacement)
     total /= float(np.prod(rectangle.lengths))
     if fields is not None:
-        total += np.stack([field.displacement_modes() for field in fields], axis=1)
-    return np.asarray(0.5 * (total + total.transpose(1, 0, 3, 2)))
+        total[:, :2] += np.stack([field.displacement_modes() for field in fields], axis=1)
+    return reciprocal(total)
 
 
 def seen_from_behind(tractions: Array) -> Array:

@@ -8,7 +8,6 @@ Theory: sections 5 and 6 of ``docs/theory.md``.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -173,6 +172,9 @@ class FaceMoments:
         along_x = mode_values(self.points.x - x, lx, count)
         along_y = mode_values(self.points.y - y, ly, count)
         self._modes = (along_x[:, None] * along_y).reshape(count**2, -1) * self.points.weight
+        nodes, place = np.unique(self.points.nodes, return_inverse=True)
+        self._dofs = _components_of(nodes).ravel()  # of the cells at the face, ghosts included
+        self._places = _components_of(place.reshape(self.points.nodes.shape))
 
     def of(self, displacement: Any) -> Array:
         """Return integrals over the rectangle of modes times fields, divided by the area, (4, K²).
@@ -183,8 +185,8 @@ class FaceMoments:
         Args:
             displacement: dolfinx Function, ghosts up to date [mm].
         """
-        values = displacement.x.array
-        local = np.stack([self._modes @ (part @ values) for part in self._operators])
+        values = displacement.x.array[self._dofs]
+        local = np.concatenate([self._displacements[2:] @ values, self._strains @ values])
         return np.asarray(self._body.comm.allreduce(local) / self._area)
 
     def displacements(self, displacement: Any) -> Array:
@@ -193,8 +195,7 @@ class FaceMoments:
         Args:
             displacement: dolfinx Function, ghosts up to date [mm].
         """
-        values = displacement.x.array
-        local = np.stack([self._modes @ (part @ values) for part in self._components])
+        local = self._displacements @ displacement.x.array[self._dofs]
         return np.asarray(self._body.comm.allreduce(local) / self._area)
 
     def load(self, mode: int, axis: int = 2) -> Array:
@@ -204,34 +205,40 @@ class FaceMoments:
             mode: The mode.
             axis: 0 along x, 1 along y, 2 into the body, as pressures are.
         """
-        return compat.sum_of_ranks(self._body.space, self._components[axis].T @ self._modes[mode])
+        forces = np.zeros(3 * len(self._body.space.tabulate_dof_coordinates()))
+        forces[self._dofs] = self._displacements[axis, mode]
+        return compat.sum_of_ranks(self._body.space, forces)
 
     @cached_property
-    def _components(self) -> tuple[csr_matrix, ...]:
-        """From nodal values to displacements along x, along y and into the body at the points."""
+    def _displacements(self) -> Array:
+        """From nodal values to integrals of displacements along x, along y and into the body."""
         axes, values = self._frame.axes, self.points.values[..., None]
-        return tuple(self._matrices([values * axes[0], values * axes[1], -values * axes[2]]))
+        return self._integrated([values * axes[0], values * axes[1], -values * axes[2]])
 
     @cached_property
-    def _operators(self) -> tuple[csr_matrix, ...]:
-        """From nodal values to displacements into the body and strains at the points."""
+    def _strains(self) -> Array:
+        """From nodal values to integrals of strains along x, along y and in shear."""
         axes, slopes = self._frame.axes, self._slopes()
         parts = [
             *(slopes[..., a : a + 1] * axes[a] for a in (0, 1)),
             0.5 * (slopes[..., :1] * axes[1] + slopes[..., 1:] * axes[0]),
         ]
-        return (self._components[2], *self._matrices(parts))
+        return self._integrated(parts)
 
-    def _matrices(self, parts: list[Array]) -> Iterator[csr_matrix]:
-        """Yield sums of nodal values at the points, weighted by parts of shape (n, m, 3)."""
-        points = self.points
-        columns = (3 * points.nodes[..., None] + np.arange(3)).reshape(
-            len(points.x), 3 * points.nodes.shape[1]
-        )
-        starts = columns.shape[1] * np.arange(len(points.x) + 1)
-        size = len(points.x), 3 * len(self._body.space.tabulate_dof_coordinates())
-        for part in parts:
-            yield csr_matrix((part.ravel(), columns.ravel(), starts), shape=size)
+    def _integrated(self, parts: list[Array]) -> Array:
+        """Return integrals of modes times sums of nodal values, (parts, K², values).
+
+        Args:
+            parts: Weights of the values in the sums, at the n points (n, m, 3) each.
+        """
+        count, *nodal = self._places.shape
+        starts = np.prod(nodal) * np.arange(count + 1)
+        found = np.empty((len(parts), len(self._modes), len(self._dofs)))
+        for integrals, part in zip(found, parts, strict=True):
+            values = part.ravel(), self._places.ravel(), starts
+            sums = csr_matrix(values, shape=(count, len(self._dofs)))
+            integrals[:] = (sums.T @ self._modes.T).T
+        return found
 
     def _slopes(self) -> Array:
         """Return the slopes of the basis functions along both axes of the face, (n, m, 2)."""
@@ -245,3 +252,8 @@ class FaceMoments:
         basis = compat.lagrange_gradients(name, degree, points.reference)
         gradients = np.linalg.solve(maps, basis.transpose(0, 2, 1))
         return np.asarray(np.einsum("aj,njm->nma", self._frame.axes[:2], gradients))
+
+
+def _components_of(nodes: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the places of the three components of values at nodes, shape (..., 3)."""
+    return 3 * nodes[..., None] + np.arange(3)

@@ -386,8 +386,9 @@ def half_space_traction_modes(
         count: Modes K along a side; mode k K + l is k along x, l along y.
 
     Returns:
-        Displacements along x, y and into the body by tractions likewise, as in
-        `micro.boundary_elements.rectangle_modes.half_space_modes`, shape (3, 3, K², K²) [1/mm].
+        Displacements along x, y and into the body by tractions likewise, shape (3, 3, K², K²)
+        [1/mm]. Those into the body by pressures are left 0:
+        `micro.boundary_elements.rectangle_modes.half_space_modes` has them.
 
     Source:
         Johnson, Contact Mechanics (1985), eqs. 3.19 and 3.75.
@@ -395,13 +396,13 @@ def half_space_traction_modes(
     kappa = poisson_ratio / (1.0 - poisson_ratio)
     beta = (1.0 - 2.0 * poisson_ratio) / (2.0 * (1.0 - poisson_ratio))
     total = np.zeros((3, 3, count**2, count**2))
-    total[2, 2] = half_space_modes(lengths, count)
+    normal = half_space_modes(lengths, count)
 
     def modes(powers: tuple[int, int]) -> Array:
         return direction_modes(lengths, powers, count)
 
-    total[0, 0] = total[2, 2] + kappa * modes((2, 0))
-    total[1, 1] = total[2, 2] + kappa * modes((0, 2))
+    total[0, 0] = normal + kappa * modes((2, 0))
+    total[1, 1] = normal + kappa * modes((0, 2))
     total[0, 1] = total[1, 0] = kappa * modes((1, 1))
     total[2, 0], total[2, 1] = beta * modes((1, 0)), beta * modes((0, 1))
     total[0, 2], total[1, 2] = -total[2, 0], -total[2, 1]
@@ -412,7 +413,8 @@ def half_space_traction_modes(
 class TractionModes(FaceModes):
     """Compliance of the top of a body under tractions, in its Legendre modes; see `FaceModes`.
 
-    Its matrix has displacements along x, y and into the body by moments of tractions likewise.
+    Its matrix has displacements along x, y and into the body by moments of tractions likewise, but
+    for those into the body by pressures, which `BodyModes` has.
     """
 
     directions: ClassVar[tuple[int, ...]] = (3, 3)

@@ -103,7 +103,7 @@ class RectangleFields:
         return normal + moved[2], stresses + added
 
     def displacement_modes(self) -> Array:
-        """Return displacements along x, y and downwards by unit moments, in modes.
+        """Return displacements along x, y and downwards by unit moments of tractions along a side.
 
         Returns:
             Shape (3, K², K²) [mm/N].

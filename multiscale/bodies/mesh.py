@@ -146,7 +146,7 @@ class MeshTerms(FaceTerms):
         count, body = max(self.modes, 2), raised(self.body)
 
         def compute() -> dict[str, Any]:
-            fields = [self._fields(count, axis) for axis in range(3)]
+            fields = [self._fields(count, axis) for axis in range(2)]
             loads = fields if self.around.below else None
             found = mesh_face_tractions(body, self.facets, self.rectangle, material, count, loads)
             return {"tractions": found}
