@@ -226,9 +226,28 @@ def field_means(field: Array, lengths: tuple[float, float], patches: PatchGrid) 
     Raises:
         InputError: When a patch reaches beyond the rectangle.
     """
-    shares_x = _shares(tuple(patches.borders_x), lengths[0], field.shape[0], "x")
-    shares_y = _shares(tuple(patches.borders_y), lengths[1], field.shape[1], "y")
+    shares_x, shares_y = mean_shares(patches, lengths, field.shape)
     return (shares_x @ field @ shares_y.T).ravel()
+
+
+def mean_shares(
+    patches: PatchGrid, lengths: tuple[float, float], grid: tuple[int, ...]
+) -> tuple[Array, Array]:
+    """Return the shares of rows of cells in the means over rows of patches, and of columns.
+
+    Args:
+        patches: Nx × Ny patches inside a rectangle.
+        lengths: Sides of the rectangle, which equal cells divide [mm].
+        grid: Their numbers (nx, ny).
+
+    Returns:
+        Shapes (Nx, nx) and (Ny, ny).
+
+    Raises:
+        InputError: When a patch reaches beyond the rectangle.
+    """
+    shares_x = _shares(tuple(patches.borders_x), lengths[0], grid[0], "x")
+    return shares_x, _shares(tuple(patches.borders_y), lengths[1], grid[1], "y")
 
 
 def overlaps(

@@ -81,12 +81,15 @@ class MicroModel(Protocol):
             NotConverged: When the contact conditions or the prescribed loads cannot be met.
         """
 
-    def quick_up_to(self, control: Control, error: float = 0.0) -> Self | None:
+    def quick_up_to(
+        self, control: Control, error: float = 0.0, *, sums_alone: bool = False
+    ) -> Self | None:
         """Return the model for many loads, each solved in milliseconds from one nearby.
 
         Args:
             control: The largest of these loads.
             error: Error of the force that does no harm, over the force.
+            sums_alone: Whether solutions need no displacements of single points, which take long.
 
         Returns:
             The model, or one that remembers more; None where a solution may take long.

@@ -26,7 +26,7 @@ import numpy as np
 
 from geometry.materials import Material
 from macro.compliance.elements import Line
-from support.arrays import Array
+from support.arrays import Array, Indices
 from support.errors import NotConverged
 
 _RESIDUAL = 1e-11
@@ -76,22 +76,46 @@ class ProductStiffness:
         Raises:
             NotConverged: When the iteration does not end.
         """
-        count, unknowns, first = sum(map(len, loads.values())), int(self._splits[-1]), 0
+        twins = self._mirror_images(loads)
+        count, unknowns, first = len(twins), int(self._splits[-1]), 0
         forces = np.zeros((unknowns, count))
         for axis, load in loads.items():
             own, last = self._parts(forces)[axis], self.lines[axis][2].last
             along_top = np.moveaxis(load, 0, -1)[:, :, None]
             own[..., first : first + len(load)] = along_top * last[:, None]
             first += len(load)
-        parts = -(-count * unknowns // _BATCH)
+        alone, place = np.unique(twins, return_inverse=True)
+        parts = -(-len(alone) * unknowns // _BATCH)
         solved = np.concatenate(
-            [self._solved(part) for part in np.array_split(forces, parts, axis=1)], axis=1
-        )
+            [self._solved(part) for part in np.array_split(forces[:, alone], parts, axis=1)], axis=1
+        )[:, place]
+        if len(mirrored := np.flatnonzero(twins != np.arange(count))):
+            u, v, w = (part[..., mirrored].swapaxes(0, 1) for part in self._parts(solved))
+            for part, image in zip(self._parts(solved), (v, u, w), strict=True):
+                part[..., mirrored] = image
         tops = [
             np.einsum("abcm,c->abm", part, component[2].last)
             for part, component in zip(self._parts(solved), self.lines, strict=True)
         ]
         return tops, solved
+
+    def _mirror_images(self, loads: Mapping[int, Array]) -> Indices:
+        """Return for each load the first one that is the same with x and y exchanged, or itself.
+
+        On a square, loads along z and what they displace can be exchanged so.
+        """
+        found = np.arange(sum(map(len, loads.values())))
+        (ux, uy, _), (vx, vy, _), (wx, wy, _) = self.lines
+        pairs = (ux, vy), (uy, vx), (wx, wy)
+        alike = all(
+            np.array_equal(a, b) for one, other in pairs for a, b in zip(one, other, strict=True)
+        )
+        if set(loads) == {2} and alike:
+            first: dict[bytes, int] = {}
+            for index, load in enumerate(loads[2]):
+                found[index] = first.get(load.T.tobytes(), index)
+                first.setdefault(load.tobytes(), index)
+        return found
 
     def growth(self, solved: Array) -> Array:
         """Return by how much the stiffness changes when all functions stretch along z.

@@ -106,7 +106,9 @@ class AsperityModel:
         alone = replace(self, asperities=self.asperities.subset(own), body=None)
         return alone, patches.single(index)
 
-    def quick_up_to(self, control: Control, error: float = 0.0) -> None:
+    def quick_up_to(
+        self, control: Control, error: float = 0.0, *, sums_alone: bool = False
+    ) -> None:
         """Return that a solution may take long; see `MicroModel.quick_up_to`."""
 
     def press(

@@ -298,10 +298,22 @@ class ModesOnCells:
             row: Their rows.
             column: Their columns.
         """
+        modes = self._modes_of(row, column)
+        return np.asarray(modes.T @ (self.matrix @ self._loads_of(row, column)))
+
+    def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
+        """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""
+        modes = np.kron(self.means_x @ along[0].T, self.means_y @ along[1].T)
+        return np.asarray(modes.T @ (self.matrix @ self._loads_of(row, column)))
+
+    def _modes_of(self, row: Indices, column: Indices) -> Array:
+        """Return the modes' means over n cells, shape (K², n)."""
         modes = self.means_x[:, None, row] * self.means_y[:, column]
-        modes = modes.reshape(len(self.matrix), -1)
-        loads = modes * (self.widths_x[row] * self.widths_y[column])
-        return np.asarray(modes.T @ (self.matrix @ loads))
+        return modes.reshape(len(self.matrix), -1)
+
+    def _loads_of(self, row: Indices, column: Indices) -> Array:
+        """Return the modes' moments by unit pressures on n cells, shape (K², n)."""
+        return self._modes_of(row, column) * (self.widths_x[row] * self.widths_y[column])
 
     def among(self, rows: Indices, columns: Indices) -> ModesOnCells:
         """Return the cells where some rows and columns of the grid cross.

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
+from geometry.patches import PatchGrid, mean_shares
 from micro.boundary_elements.compliance_matrix import ComplianceMatrix, FewCells
 from micro.boundary_elements.finite_slopes import FiniteSlopes
 from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
@@ -56,6 +57,17 @@ class ComplianceTerm(Protocol):
 
     def between(self, row: Indices, column: Indices, /) -> Array:
         """Return the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
+        ...
+
+    def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices, /) -> Array:
+        """Return the mean displacements of patches by unit pressures / E* on n cells, (N, n) [mm].
+
+        Args:
+            along: Shares of the rows of cells in the means over Nx rows of patches, (Nx, r), and of
+                the columns likewise, (Ny, c).
+            row: Rows of the n cells.
+            column: Their columns.
+        """
         ...
 
     def among(self, rows: Indices, columns: Indices, /) -> Self:
@@ -197,6 +209,19 @@ class GridCompliance:
             total += term.between(row, column)
         return ComplianceMatrix(total)
 
+    def on_patches(self, flat: Indices, along: tuple[Array, Array]) -> Array:
+        """Return the mean displacements of patches by unit pressures / E* on n cells, (N, n) [mm].
+
+        Args:
+            flat: Flat indices of the cells.
+            along: Shares of rows and columns in the patches, see `ComplianceTerm.on_patches`.
+        """
+        row, column = np.divmod(flat, along[1].shape[1])
+        total = self._half_space.on_patches(along, row, column)
+        for term in self._terms:
+            total += term.on_patches(along, row, column)
+        return total
+
     def _among(self, cells: Cells) -> tuple[list[ComplianceTerm], Indices, tuple[int, int]]:
         """Return the terms on the rows and columns of some cells, and where these cells are."""
         if self._last is None or self._last[0] is not cells:
@@ -237,11 +262,12 @@ class Compliance:
     rest: float = 1e-7
     _last: tuple[Array, Array] | None = field(default=None, init=False)
     _few_cells: FewCells | None = field(default=None, init=False)
+    _on_patches: tuple[PatchGrid, Array] | None = field(default=None, init=False)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the caches behind when sent to another process."""
         own = {name: value for name, value in vars(self).items() if name not in _CACHES}
-        return own | {"_last": None, "_few_cells": None}
+        return own | {"_last": None, "_few_cells": None, "_on_patches": None}
 
     def with_slopes(self, slopes: tuple[FiniteSlopes, ...]) -> Compliance:
         """Return the same body with other finite slopes; both have what is cached of it."""
@@ -347,6 +373,26 @@ class Compliance:
             slopes = [RememberedSlopes(each, self.few) for each in self.slopes]
             self._few_cells = FewCells(self.few, matrix, slopes, self.modulus, self.rest)
         return self._few_cells
+
+    def patch_means(self, pressure: Array, lengths: Pair, patches: PatchGrid) -> Array | None:
+        """Return the mean displacements of N patches, without finite slopes, shape (N,) [mm].
+
+        A matrix gives them, which is cached; None where other cells than ``few`` are loaded.
+
+        Args:
+            pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
+            lengths: Sides of the surface [mm].
+            patches: The patches.
+        """
+        few = self._few_cells
+        if few is None or not few.hold(pressure):
+            return None
+        if self._on_patches is None or self._on_patches[0] is not patches:
+            spacing = lengths[0] / pressure.shape[0], lengths[1] / pressure.shape[1]
+            shares = mean_shares(patches, lengths, pressure.shape)
+            grid = self.on_grid(pressure.shape, spacing)
+            self._on_patches = patches, grid.on_patches(few.cells, shares)
+        return np.asarray(self._on_patches[1] @ pressure.ravel()[few.cells])
 
     def slope_rate(self, pressure: Array, rate: Array) -> Array:
         """Return the derivative of `slope_displacement` along a change of the pressures, (nx, ny).

@@ -302,12 +302,43 @@ class HalfSpaceGrid:
 
         return symmetric(len(row), block)
 
+    def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
+        """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""
+        around, count = even_around(self._kernel.T).T, len(self._kernel)
+        rows = np.unique(row)
+        lines = (along[0] @ around[count - 1 - one : 2 * count - 1 - one] for one in rows)
+        return on_patches(lines, along[1], np.searchsorted(rows, row), column)
+
     @cached_property
     def _kernel(self) -> Array:
         """Displacement of all cells by unit pressure on the first one."""
         one = np.zeros(self.compliance.grid)
         one[0, 0] = 1.0
         return np.asarray(self.compliance(one))
+
+
+def even_around(lines: Array) -> Array:
+    """Return lines of n values at distances 0 … n − 1 with those at −(n − 1) … −1 before them."""
+    return np.concatenate([lines[:, :0:-1], lines], axis=1)
+
+
+def on_patches(lines: Iterable[Array], along: Array, place: Indices, cell: Indices) -> Array:
+    """Return the displacements of patches by unit pressures on n cells of some rows, (N, n).
+
+    Args:
+        lines: For each row the displacements along it by unit pressure on its first cell, summed
+            across Nx rows of patches; even in the distance, shape (Nx, ny) [mm].
+        along: Shares of the cells of a row in the means over Ny patches, shape (Ny, ny).
+        place: Which of the rows each cell is in, shape (n,).
+        cell: Where it is in its row, shape (n,).
+    """
+    found: list[Array] = []
+    for row, line in enumerate(lines):
+        own = cell[place == row]
+        windows = np.lib.stride_tricks.sliding_window_view(even_around(line), line.shape[1], axis=1)
+        found.append(windows[:, line.shape[1] - 1 - own] @ along.T)
+    order = np.argsort(np.argsort(place, kind="stable"), kind="stable")
+    return np.concatenate(found, axis=1)[:, order].swapaxes(1, 2).reshape(-1, len(cell))
 
 
 def symmetric(count: int, block: Callable[[slice, slice], Array]) -> Array:

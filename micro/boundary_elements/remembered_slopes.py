@@ -112,11 +112,12 @@ class RememberedSlopes:
             pressure: Pressures on the few cells, shape (n,) [MPa]; the others have none.
         """
         count, parts = self._known, self._along(0, pressure)
-        moved = np.zeros(self._coarse.shape[2])
+        moved, across = np.zeros(self._coarse.shape[2]), np.zeros(count)
         for order, share in ((1, 1.0), (2, self._share(pressure)[0])):
-            across = self._along(order, pressure) - self._forms[order - 1, :count, :count] @ parts
+            beyond = self._along(order, pressure) - self._forms[order - 1, :count, :count] @ parts
             moved += (share * parts) @ self._coarse[order, :count]
-            moved += (share * across) @ self._coarse[0, :count]
+            across += share * beyond
+        moved += across @ self._coarse[0, :count]
         return self._slopes.refined(moved.reshape(self._slopes.grid))
 
     def _share(self, pressure: Array) -> tuple[float, Array]:

@@ -21,7 +21,7 @@ from scipy import fft
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from micro.boundary_elements.grid_compliance import CellGrid
-from micro.boundary_elements.half_space_grid import many, symmetric
+from micro.boundary_elements.half_space_grid import many, on_patches, symmetric
 from support.arrays import Array, Indices
 from support.cores import blocks, in_threads
 
@@ -148,7 +148,7 @@ class _SidePair:
         step = max(1, _LINES // (len(used) * len(self.kernels)))
         for first in range(0, len(used), step):  # some rows at a time, for the memory
             some = np.flatnonzero((row >= first) & (row < first + step))
-            lines = self.lines_between(used[first : first + step], used)
+            lines = self.lines_between(self.means[used[first : first + step]], self.means[used])
             apart = np.abs(cell[some, None] - cell)
             matrix[some] = lines[row[some, None] - first, row, apart]
         return matrix
@@ -161,10 +161,14 @@ class _SidePair:
         place += np.abs(cell[some, None] - cell[others])
         return lines.take(place)
 
-    def lines_between(self, rows: Indices, others: Indices) -> Array:
-        """Return displacements along rows by a unit pressure in others, shape (r, o, cells)."""
+    def lines_between(self, rows: Array, others: Array) -> Array:
+        """Return displacements along rows by a unit pressure in others, by their `means`.
+
+        Returns:
+            Shape (r, o, cells).
+        """
         count = len(self.kernels)
-        means = (np.split(self.means[some], 2, axis=1) for some in (rows, others))
+        means = (np.split(some, 2, axis=1) for some in (rows, others))
         pairs = zip(*means, strict=True)
         waves = sum(one @ self.kernels @ other.T for one, other in pairs)
         # waves are cosines: a product is quicker than their transform
@@ -173,6 +177,19 @@ class _SidePair:
         cosines *= np.where(np.arange(count) % (count - 1), 1.0, 0.5)[:, None] / (count - 1)
         lines = waves.reshape(count, -1).T @ cosines
         return np.asarray(lines.reshape(len(rows), len(others), -1))
+
+    def on_patches(self, across: Array, along: Array, row: Indices, cell: Indices) -> Array:
+        """Return the displacements of Na × Nb patches by unit pressures on n cells, (Na, Nb, n).
+
+        Args:
+            across: Shares of the rows in the means over patches, shape (Na, rows).
+            along: Shares of the cells of a row, shape (Nb, cells).
+            row: Rows of the n cells.
+            cell: Their places in the rows.
+        """
+        rows, place = np.unique(row, return_inverse=True)
+        lines = self.lines_between(across @ self.means, self.means[rows]).swapaxes(0, 1)
+        return on_patches(lines, along, place, cell).reshape(len(across), len(along), -1)
 
     def displaced(self, lines: Array) -> Array:
         """Return displacements at the nodes by lines of loads there, shape (2 a, cells)."""
@@ -198,8 +215,7 @@ class _SidePair:
 @lru_cache(maxsize=8)
 def _all_lines(pair: _SidePair) -> Array:
     """Return the lines between all rows, (rows, rows, cells); cached for other surfaces, too."""
-    rows = np.arange(pair.means.shape[0])
-    return pair.lines_between(rows, rows)
+    return pair.lines_between(pair.means, pair.means)
 
 
 def _nodes(length: float, rows: int, *, stress: bool) -> Array:
@@ -304,6 +320,13 @@ class SideCells:
     def between(self, row: Indices, column: Indices) -> Array:
         """Return the displacements of n cells by unit pressures on them, (n, n) [mm]."""
         return self.across_x.between(row, column) + self.across_y.between(column, row)
+
+    def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
+        """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""
+        along_x, along_y = along
+        by_y = self.across_y.on_patches(along_y, along_x, column, row).swapaxes(0, 1)
+        by_x = self.across_x.on_patches(along_x, along_y, row, column)
+        return np.asarray((by_x + by_y).reshape(-1, len(row)))
 
     def among(self, rows: Indices, columns: Indices) -> SideCells:
         """Return some of these rows and columns, by ascending indices among them."""

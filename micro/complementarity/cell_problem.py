@@ -20,7 +20,7 @@ Theory: docs/theory.md, section 3.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -48,8 +48,8 @@ class ContactPressures(NamedTuple):
         iterations: Products of the compliance with pressures.
         by_slopes: What finite slopes add to the displacements, shape (nx, ny) [mm]; None where that
             is not known.
-        nearby: Interferences of solutions nearby, less what finite slopes add, and what these add,
-            shape (nx, ny) [mm].
+        nearby: Returns interferences of solutions nearby, less what finite slopes add, and what
+            these add, shape (nx, ny) [mm].
     """
 
     pressure: Array
@@ -57,7 +57,7 @@ class ContactPressures(NamedTuple):
     residual: float = 0.0
     iterations: int = 0
     by_slopes: Array | None = None
-    nearby: tuple[tuple[Array, Array], ...] = ()
+    nearby: Callable[[], Sequence[tuple[Array, Array]]] = tuple
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -100,7 +100,7 @@ class _Forces:
         self._scale = float(problem.interference.max())
         self._closed = closed * self._scale
         self._known: dict[float, ContactPressures] = {}
-        self._first = None if start is None else start._replace(motion=np.zeros(1), nearby=())
+        self._first = None if start is None else start._replace(motion=np.zeros(1), nearby=tuple)
         ones = [np.ones((1, count)) for count in problem.interference.shape]
         self._level = Motions(along_x=ones[0], along_y=ones[1], loads=np.zeros(1))
 

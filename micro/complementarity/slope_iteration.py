@@ -197,7 +197,7 @@ class _SlopeIteration:
         self._begin_without()
         self.change, first = np.inf, _FIRST
         if start is not None and not problem.motions.count:
-            self._mixing = AndersonMixing(start.nearby)
+            self._mixing = AndersonMixing(start.nearby())
         if start is not None and start.pressure.any():
             known, first = start.by_slopes, _FIRST**2
             self.displaced = self._by_slopes(start.pressure) if known is None else known

@@ -156,7 +156,9 @@ def _solve_growing(problem: CellProblem, place: Place, start: Array | None) -> C
     solution = _solve_on(problem, place, start)
     while problem.compliance.lifts and not _is_whole(place, problem.interference):
         nearer = problem.interference + problem.motions.displacement(solution.motion)
-        larger = _lifted(problem, place, nearer, solution.pressure)
+        outside = np.ones(problem.interference.shape, bool)
+        outside[place] = False
+        larger = _lifted(problem, outside, nearer, solution.pressure)
         if not larger.any():
             break
         larger[place] = True  # what touched once may touch again
@@ -173,22 +175,21 @@ def penetrates_outside(problem: CellProblem, solution: ContactPressures) -> bool
         problem: The contact problem of all cells of a surface, without free motions.
         solution: The solution, which has pressures where the body overlaps the surface alone.
     """
-    place = np.nonzero(problem.undeformed > 0.0)
-    return bool(_lifted(problem, place, problem.interference, solution.pressure).any())
+    outside = problem.undeformed <= 0.0
+    return bool(_lifted(problem, outside, problem.interference, solution.pressure).any())
 
 
-def _lifted(problem: CellProblem, place: Place, interference: Array, pressure: Array) -> Flags:
-    """Return which cells outside a place penetrate the rigid body.
+def _lifted(problem: CellProblem, outside: Flags, interference: Array, pressure: Array) -> Flags:
+    """Return which of the cells outside, that have no pressure, penetrate the rigid body.
 
     The half-space only lowers cells. All displacements are therefore evaluated only where those by
     what may lift cells, such as a finite body, do not clear every cell outside.
     """
-    outside = np.ones(interference.shape, bool)
-    outside[place] = False
     moved = problem.compliance.lifted(pressure, problem.spacing)
-    if not np.any(outside & (moved < interference)):
-        return np.zeros(interference.shape, bool)
-    return np.asarray(outside & (problem.grid.displacement(pressure) < interference))
+    lifted = outside & (moved < interference)
+    if not lifted.any():
+        return lifted
+    return np.asarray(lifted & (problem.grid.displacement(pressure) < interference))
 
 
 def _solve_on(problem: CellProblem, place: Place, start: Array | None) -> ContactPressures:

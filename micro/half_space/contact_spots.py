@@ -121,8 +121,9 @@ def summed(
     """Return a contact with all that follows from its plane and its fields.
 
     Args:
-        state: The contact, with pressures, displacements and gaps of all cells; where cells yield,
-            these are negative by the plastic depth that the load leaves.
+        state: The contact, with the pressures of all cells and the mean displacements of patches;
+            with displacements and gaps of all cells, where they are known. Where cells yield, gaps
+            are negative by the plastic depth that the load leaves.
         surface: The surface.
         depths: Mean depths of the patches below the height that the approach counts from, (N,)
             [mm].
@@ -131,23 +132,25 @@ def summed(
             where contacts are elastic.
     """
     plane, patches, pressure = state.plane, state.patches, state.pressures
-    moved, gap, yielding = state.displacement, state.gap, state.yielding
-    assert moved is not None and gap is not None and yielding is not None
+    gap, energy = state.gap, np.nan
     cell = surface.spacing[0] * surface.spacing[1]
 
     def means(field: Array) -> Array:
         return field_means(field, surface.lengths, patches)
 
-    displacement, depth, work = means(moved), None, 0.0
-    separation = depths - plane.means(patches) + displacement
+    depth, work = None, 0.0
+    separation = depths - plane.means(patches) + state.patch_displacement
     if hardness is not None:
-        anew = np.where(yielding, np.maximum(-gap, 0.0), 0.0)
+        assert gap is not None and state.yielding is not None
+        anew = np.where(state.yielding, np.maximum(-gap, 0.0), 0.0)
         depth = anew if state.earlier_depth is None else state.earlier_depth + anew
         gap = gap + anew
         separation += means(depth)
         left = depth > 0.0
         spent = np.multiply(hardness, depth, out=np.zeros_like(depth), where=left)
         work = float(spent.sum()) * cell
+    if state.displacement is not None:
+        energy = 0.5 * float(np.vdot(pressure, state.displacement)) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
     return replace(
@@ -160,11 +163,10 @@ def summed(
         patch_force=(along_x @ pressure @ along_y.T).ravel(),
         patch_area=(along_x @ share @ along_y.T).ravel(),
         patch_contacts=spots.per_patch(patches),
-        patch_displacement=displacement,
         patch_separation=separation,
         spots=spots,
         gap=gap,
         plastic_depth=depth,
-        elastic_energy=0.5 * float(np.vdot(pressure, moved)) * cell,
+        elastic_energy=energy,
         plastic_work=work,
     )

@@ -6,7 +6,7 @@ Theory: docs/theory.md, sections 3 and 4.
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Self
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from geometry import Control, PatchGrid, Surface
 from geometry.contact_state import ContactState, Start
+from geometry.patches import field_means
 from geometry.plausibility import check_slopes
 from geometry.rigid_plane import RigidPlane, motion_units
 from micro.boundary_elements.body_modes import BodyModes
@@ -76,6 +77,8 @@ class HalfSpaceModel:
             when not given. The interference left where cells carry it is plastic depth.
         few: Flat indices of the few cells that can touch, those first that touch first, see
             `quick_up_to`; not known when not given.
+        sums_alone: Whether a contact of these cells is known by its pressures and sums alone,
+            without displacements, gaps and energy.
 
     Raises:
         InputError: When modulus, tolerance or hardness are not positive, a periodic model has a
@@ -97,6 +100,7 @@ class HalfSpaceModel:
     slopes: tuple[FiniteSlopes, ...] = ()
     hardness: float | None = None
     few: Indices | None = None
+    sums_alone: bool = False
 
     def __post_init__(self) -> None:
         allowed = "what read_surface or synthesise returns, or Surface(heights=…, lengths=…)"
@@ -224,7 +228,7 @@ class HalfSpaceModel:
             InputError: Also when a periodic surface is pressed to an approach in full contact, by a
                 tilted plane or, with finite slopes, by a mean pressure of Young's modulus.
         """
-        patches, means = checked_patches(self.surface, patches, mean_heights)
+        patches, heights = checked_patches(self.surface, patches, mean_heights)
         surface, modulus = self.surface, self.contact_modulus
         if start is not None and start.values.shape != surface.grid:
             problem, allowed = "the solution to start from is of another grid", f"{surface.grid}"
@@ -237,9 +241,14 @@ class HalfSpaceModel:
         yielding, pressure = self._bound.reached(solved.pressure), solved.pressure * modulus
         if self.hardness is not None:
             pressure[yielding] = self.hardness
-        displacement = self._displacement(pressure, solved.by_slopes)
-        if displaced is not None:
-            displacement = displacement + displaced
+        means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
+        displacement = gap = None
+        if means is None:
+            displacement = self._displacement(pressure, solved.by_slopes)
+            if displaced is not None:
+                displacement = displacement + displaced
+            gap = displacement - self.interference(plane, depth)
+            means = field_means(displacement, surface.lengths, patches)
         state = ContactState(
             plane=plane,
             patches=patches,
@@ -249,16 +258,19 @@ class HalfSpaceModel:
             x=surface.x,
             y=surface.y,
             pressure=pressure,
-            gap=displacement - self.interference(plane, depth),
+            gap=gap,
             displacement=displacement,
+            patch_displacement=means,
             yielding=yielding,
             earlier_depth=depth,
             by_slopes=solved.by_slopes,
         )
-        depths = self.reference_height - means
+        depths = self.reference_height - heights
         return summed(state, surface, depths, periodic=self.periodic, hardness=self.hardness)
 
-    def quick_up_to(self, control: Control, error: float = 0.0) -> Self | None:
+    def quick_up_to(
+        self, control: Control, error: float = 0.0, *, sums_alone: bool = False
+    ) -> Self | None:
         """Return the model for many loads, where few cells touch; see `MicroModel.quick_up_to`.
 
         Its finite slopes remember the pressures of earlier solutions.
@@ -273,8 +285,12 @@ class HalfSpaceModel:
         if not touches_few_cells(self.problem(interference, control.free, control.loads)):
             return None
         count = np.count_nonzero(interference > 0.0)
-        rough = replace(self, tolerance=max(self.tolerance, error))
-        return replace(rough, few=np.argsort(-interference, axis=None, kind="stable")[:count])
+        return replace(
+            self,
+            tolerance=max(self.tolerance, error),
+            few=np.argsort(-interference, axis=None, kind="stable")[:count],
+            sums_alone=sums_alone and self.hardness is None,
+        )
 
     @property
     def learnt(self) -> list[list[Array]]:
@@ -381,8 +397,9 @@ class HalfSpaceModel:
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
             motion_there = np.array([start.plane.approach])
-            nearby = () if displaced is not None else self._nearby(start)
-            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes, nearby=nearby)
+            first = ContactPressures(known, motion_there, by_slopes=start.by_slopes)
+            if displaced is None:
+                first = first._replace(nearby=partial(self._nearby, start))
         problem = replace(problem, tolerance=max(tolerance, self.tolerance))
         try:
             with blas_threads(1):  # all cores are taken by threads of ours
@@ -400,6 +417,22 @@ class HalfSpaceModel:
             for one in start.nearby or (start,)
             if one.by_slopes is not None and one.plastic_depth is None
         )
+
+    def _means_alone(
+        self,
+        pressure: Array,
+        by_slopes: Array | None,
+        patches: PatchGrid,
+        displaced: Array | None,
+    ) -> Array | None:
+        """Return mean displacements of patches, (N,) [mm], where they are known without fields."""
+        if not self.sums_alone or displaced is not None:
+            return None
+        lengths, loaded = self.surface.lengths, np.divide(pressure, self.contact_modulus)
+        means = self.compliance.patch_means(loaded, lengths, patches)
+        if means is None or by_slopes is None:
+            return means
+        return means + field_means(by_slopes, lengths, patches)
 
     def _displacement(self, pressure: Array, by_slopes: Array | None) -> Array:
         """Return the displacement of the cells by pressures [mm]; on a period from its mean."""

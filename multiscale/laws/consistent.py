@@ -102,7 +102,8 @@ def consistent_laws(
     )
     first, end, tilt = on_root_alone(comm, lambda: whole.range_up_to(largest))
     end += (_POINTWISE_RESERVE if pointwise else _RESERVE) * max(end - first, 0.0)
-    quick = model.quick_up_to(Control(approach=end, tilt=largest.tilt), ROW_ERROR * tolerance)
+    last = Control(approach=end, tilt=largest.tilt)
+    quick = model.quick_up_to(last, ROW_ERROR * tolerance, sums_alone=True)
     if quick is not None:
         whole = replace(whole, model=quick, quick=True)
     made = refined(

@@ -27,8 +27,8 @@ class Counted:
     def __getattr__(self, name):
         return getattr(self.model, name)
 
-    def quick_up_to(self, control, error):
-        quick = self.model.quick_up_to(control, error)
+    def quick_up_to(self, control, error, **options):
+        quick = self.model.quick_up_to(control, error, **options)
         if quick is None:
             return None
         self.model = quick
