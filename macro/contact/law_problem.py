@@ -13,7 +13,6 @@ from petsc4py import PETSc
 
 from geometry.materials import Material
 from geometry.rigid_plane import Control, RigidPlane
-from geometry.sliders import SliderRecord
 from geometry.spring_bed import Friction
 from macro import compat
 from macro.contact.beside_half_space import BesideHalfSpace
@@ -59,6 +58,9 @@ class LawContactProblem:
         opposite: Elastic constants of a half-space on the other side, which is displaced under the
             whole face, sideways too where there is friction; None: a rigid plane.
 
+    Attributes:
+        sliders: The sliders of the face, with what load steps left behind; None without friction.
+
     Raises:
         InputError: When there is not one law per patch, or no such mode.
 
@@ -86,7 +88,7 @@ class LawContactProblem:
         self._flat_gap = self._undeformed_gap
         self._preload: Array | None = None
         self.forces = ContactForces(face, mode, laws, self._undeformed_gap, friction)
-        self._sliders = self.forces.sliders
+        self.sliders = self.forces.sliders
         self.equilibrium = Equilibrium(body, self.forces)
         self._beside = None
         if opposite is not None:
@@ -174,41 +176,6 @@ class LawContactProblem:
         """Where the laws are evaluated."""
         return self._sampling
 
-    @property
-    def memory(self) -> SliderRecord | None:
-        """What the load steps so far left behind of friction; set it to take load steps back."""
-        return self._sliders.memory if self._sliders else None
-
-    @memory.setter
-    def memory(self, memory: SliderRecord | None) -> None:
-        if self._sliders and memory is not None:
-            self._sliders.memory = memory
-
-    def slider_record(self) -> SliderRecord | None:
-        """Return what the load steps so far left behind of friction, of all ranks together."""
-        return self._sliders.record() if self._sliders else None
-
-    def restore_sliders(self, record: SliderRecord) -> None:
-        """Go on from what load steps left behind, on any number of ranks.
-
-        Args:
-            record: What `slider_record` returned.
-
-        Raises:
-            InputError: When it is that of another face, or of other laws.
-        """
-        assert self._sliders is not None
-        self._sliders.restore(record)
-
-    def follow_sliders(self, other: LawContactProblem) -> None:
-        """Go on from what load steps left behind under other laws on the same face.
-
-        Args:
-            other: The problem with these laws.
-        """
-        if self._sliders and other._sliders:
-            self._sliders.follow(other._sliders)
-
     def tangential_stiffness(self) -> tuple[float, int]:
         """Return the derivative of the shear force along the plane's shift, body included [N/mm].
 
@@ -228,8 +195,8 @@ class LawContactProblem:
 
     def sticking_stiffness(self) -> float:
         """Return the tangential stiffness of what sticks, without the body [N/mm]; collective."""
-        assert self._sliders is not None
-        return float(self._sliders.total(self._stuck[:, None])[0])
+        assert self.sliders is not None
+        return float(self.sliders.total(self._stuck[:, None])[0])
 
     def start_from(self, pressure: Array) -> None:
         """Take the displacements by mean pressures of the patches for the latest solution.
@@ -296,8 +263,8 @@ class LawContactProblem:
             moved.array[:] = self._preload
             self.forces.gap = self._undeformed_gap + self._sampling.displacements(moved)
             self._flat_gap = self.forces.gap
-            if self._sliders:
-                self._sliders.preload = self.forces.along(moved)
+            if self.sliders:
+                self.sliders.preload = self.forces.along(moved)
 
     def _start(self) -> int:
         """Add the displacement by a uniform pressure to the basis, and return the iterations."""

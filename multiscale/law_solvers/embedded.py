@@ -133,11 +133,12 @@ class EmbeddedLaws(LawSolver):
     @property
     def past(self) -> Any:
         """What load steps left behind of friction; set it to take them back."""
-        return self._problem.memory
+        return self._problem.sliders and self._problem.sliders.memory
 
     @past.setter
     def past(self, past: Any) -> None:
-        self._problem.memory = past
+        if self._problem.sliders and past is not None:
+            self._problem.sliders.memory = past
 
     def press(self, control: Control) -> LoadStep:
         """Solve one load step; see `StepSolver.press`."""
@@ -169,8 +170,9 @@ class EmbeddedLaws(LawSolver):
         last = self._last
         if last is None:
             return None
-        sliders = self._problem.slider_record()
-        return last.approach, last.tilt, last.patch_pressure, self._body_state, sliders
+        sliders = self._problem.sliders
+        left = None if sliders is None else sliders.record()
+        return last.approach, last.tilt, last.patch_pressure, self._body_state, left
 
     def restore(self, state: Any) -> None:
         """Find the equilibrium under a plane again, from the pressures.
@@ -178,9 +180,8 @@ class EmbeddedLaws(LawSolver):
         It agrees with the earlier one to the tolerance of the Newton iteration.
         """
         if state is not None:
-            sliders = state[-1]
-            if sliders is not None:
-                self._problem.restore_sliders(sliders)
+            if self._problem.sliders and state[-1] is not None:
+                self._problem.sliders.restore(state[-1])
             self._solve_again(state)
 
     def _solve_again(self, state: Any) -> None:
@@ -304,6 +305,7 @@ class ExtendedLaws(EmbeddedLaws):
                     raise
                 last, shorter = self.state(), self._problem
                 self._take(self._problem_of(longer), longer)
-                self._problem.follow_sliders(shorter)
+                if self._problem.sliders and shorter.sliders:
+                    self._problem.sliders.follow(shorter.sliders)
                 if last is not None:
                     self._solve_again(last)

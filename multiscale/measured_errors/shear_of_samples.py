@@ -344,11 +344,11 @@ def _errors_of(
 
 def _means(problem: LawContactProblem, state: FaceEquilibrium) -> _Point:
     """Return the means of every region at a load step just solved; collective."""
-    sampling, memory = problem.sampling, problem.memory
-    assert memory is not None
+    assert problem.sliders is not None
+    sampling, slip = problem.sampling, problem.sliders.memory.sliders.slip
     pressure = state.sample_pressure
     force = sampling.patch_sums(pressure)
     loaded = np.where(force > 0.0, force, 1.0)
     closure = sampling.patch_sums(pressure * state.sample_closure) / loaded
-    slips = [sampling.patch_sums(pressure * along) / loaded for along in memory.sliders.slip.T]
+    slips = [sampling.patch_sums(pressure * along) / loaded for along in slip.T]
     return _Point(np.where(force > 0.0, closure, -np.inf), np.stack(slips, axis=1), force)

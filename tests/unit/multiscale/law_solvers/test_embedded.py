@@ -32,10 +32,7 @@ def law(end=1.0, **columns):
 class EasyBlock:
     """Stands for a block that gives way to nothing: closures are the approach."""
 
-    memory = None  # no friction
-
-    def slider_record(self):
-        return None
+    sliders = None  # no friction
 
     def solve(self, control):
         self.approach = approach = control.approach
