@@ -36,7 +36,7 @@ COMMON = ["output.check=none", "surface.grid=[128, 128]", "block.cells=[24, 24, 
 MESHES = ["coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=3"]
 if choice.quick:
     COMMON[1:] = ["surface.grid=[64, 64]", "block.cells=[8, 8, 6]", "load.steps=2"]
-    MESHES[2:] = ["reference.meshes=2", "reference.fine='20 um'"]
+    MESHES[2:] = ["reference.meshes=2", "reference.fine='30 um'"]
 HALF_SPACE, SMALL = "micro.model=half-space", "micro.finite_slopes=false"
 
 

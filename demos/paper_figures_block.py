@@ -34,7 +34,7 @@ COMMON = ["output.check=none"]  # the errors are those against the reference
 MESHES = ["coupling.kind=reference", "reference.mesh=tetrahedra", "reference.meshes=3"]
 if choice.quick:
     COMMON += ["surface.grid=[64, 64]", "block.cells=[8, 8, 6]", "load.steps=2"]
-    MESHES[2:] = ["reference.meshes=2", "reference.fine='20 um'"]
+    MESHES[2:] = ["reference.meshes=2", "reference.fine='30 um'"]
 
 
 def go(*keys, n=16):

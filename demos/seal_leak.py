@@ -32,8 +32,9 @@ choice = parser.parse_args()
 choice.out.mkdir(parents=True, exist_ok=True)
 BODIES = Path(__file__).parent / "bodies"
 HEIGHTS = {"0.05 um": BLUE, "0.1 um": GREEN, "0.2 um": VERMILLION}
-SIZE, STEPS = ("1.25", 2) if choice.quick else ("0.5", 9)
-FEW = {"surface.grid": [32, 32], "surface.spectrum.waves": [2, 8], "coupling.table_tolerance": 1e-2}
+SIZE, STEPS = ("2", 2) if choice.quick else ("0.5", 9)
+FEW = {"surface.grid": [16, 16], "surface.spectrum.waves": [2, 4], "law.seeds": [1, 2]}
+FEW["coupling.table_tolerance"] = 2e-2
 SMALL = FEW if choice.quick else {}
 
 # %%
