@@ -2,6 +2,7 @@
 
 import gc
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -25,6 +26,9 @@ from helpers.waiting_ranks import WaitingRanks
 # as in a terminal, also where the tests are started in the background or by nohup
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
+# modules stay compiled for all the processes that tests start, as they do for users
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # nothing is left in the home of who runs the tests
 os.environ["PATCHLAW_CACHE"] = "off"
 SOLVED_ANEW = ("tests/parallel/", "tests/unit/macro/")
@@ -38,6 +42,14 @@ LONGEST = (
     "parallel/test_four_ranks.py", "parallel/test_memory_ranks.py", "parallel/test_faults.py",
 )  # fmt: skip
 """Files of half a minute and more, begun first, so that no worker waits for one at the end."""
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Pass over files that say nothing of long tests where those alone are asked for."""
+    if config.option.markexpr == "long" and collection_path.match("test_*.py"):
+        text = collection_path.read_text(encoding="utf-8")
+        return None if re.search(r"mark\.long\b|\bRANKS\b", text) else True
+    return None
 
 
 def pytest_collection_modifyitems(items):
