@@ -368,6 +368,18 @@ class HalfSpaceModel:
         vars(model)["compliance"] = self.compliance.with_slopes(slopes)
         return model
 
+    def force_at(self, control: Control, start: Start, displaced: Array) -> float:
+        """Return the force at an approach [N], for which `press` finds much besides.
+
+        Args:
+            control: What is prescribed.
+            start: What the solution may start from.
+            displaced: As for `press`.
+        """
+        solved, _ = self.pressures_under(control, start, start.plastic_depth, displaced)
+        cell = self.surface.spacing[0] * self.surface.spacing[1]
+        return float(solved.pressure.sum()) * self.contact_modulus * cell
+
     def pressures_under(
         self,
         control: Control,

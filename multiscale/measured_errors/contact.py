@@ -236,12 +236,12 @@ class _Problems:
         # The largest counts: by a grid twice as fine, by one twice as coarse, and by that and one
         # twice as coarse again. Without the finer grid coarser ones tell an eighth of the error. It
         # matters from half of the other causes on.
-        half, quarter = (self._state(grid).force for grid in (self._half, self._quarter))
+        half, quarter = (self._force(grid) for grid in (self._half, self._quarter))
         error = max(abs(force - half) / 8, abs(half - quarter) / 30)
         needed = min(nx, ny) < _FEWEST_CELLS or 8.0 * error > 0.5 * others
         if 4 * nx * ny > MOST_CHECKED_CELLS or not needed:
             return 8.0 * error
-        finer = abs(self._state((2 * nx, 2 * ny)).force - self._state((nx, ny)).force)
+        finer = abs(self._force((2 * nx, 2 * ny)) - self._force((nx, ny)))
         return max(1.5 * finer, error)
 
     def stiffness(self) -> float:
@@ -262,19 +262,28 @@ class _Problems:
         """
         control = replace(self._control, approach=(self._control.approach or 0.0) + nearer)
         displaced = displaced + self._displaced(self._others)
-        found = model.press(control, start=self._known.guess, displaced=displaced)
-        return found.force - self._known.force
+        return model.force_at(control, self._known.guess, displaced) - self._known.force
 
     def _state(self, grid: tuple[int, int]) -> ContactState:
         """Return the solution on a grid."""
         if grid not in self._states:
-            model = self._without_slopes(grid)
-            nearest = self._states.get(self._half, None) if grid == self._quarter else None
-            known = self._start if nearest is None else nearest.guess
-            start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
-            displaced = self._displaced(grid)
+            model, start, displaced = self._problem_on(grid)
             self._states[grid] = model.press(self._control, start=start, displaced=displaced)
         return self._states[grid]
+
+    def _force(self, grid: tuple[int, int]) -> float:
+        """Return the force of the solution on a grid [N]."""
+        if grid in self._states:
+            return self._states[grid].force
+        model, start, displaced = self._problem_on(grid)
+        return model.force_at(self._control, start, displaced)
+
+    def _problem_on(self, grid: tuple[int, int]) -> tuple[HalfSpaceModel, Start, Array]:
+        """Return the model on a grid, what to start from, and what finite slopes displace."""
+        nearest = self._states.get(self._half, None) if grid == self._quarter else None
+        known = self._start if nearest is None else nearest.guess
+        start = replace(known, values=_on_grid(known.values, grid), by_slopes=None)
+        return self._without_slopes(grid), start, self._displaced(grid)
 
     def _displaced(self, grid: tuple[int, int]) -> Array:
         """Return what finite slopes displace the cells of a grid by in the run [mm]."""
