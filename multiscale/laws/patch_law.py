@@ -373,7 +373,9 @@ class PatchLaws:
     def __init__(self, laws: Sequence[PatchLaw]) -> None:
         self.laws = tuple(laws)
         self._index = np.arange(len(laws))
-        self._curves = LawCurves.packed([law.curves for law in laws])
+        rows, separations = [law.rows for law in laws], [law.initial_separation for law in laws]
+        every = rows[0].joined(*rows[1:])
+        self._curves = LawCurves.through(every, list(map(len, rows)), separations)
         self.first_touch = np.array([law.first_touch for law in laws])
         # without rows the local approach is the closure
         self.end = np.array(
