@@ -237,6 +237,14 @@ def _largest(pressure: Array) -> float:
     return max(float(pressure.max(initial=0.0)), -float(pressure.min(initial=0.0))) or 1.0
 
 
+def _on_cells(
+    terms: Sequence[BodyTerm], modulus: float, cells: CellGrid
+) -> list[tuple[BodyTerm, ComplianceTerm]]:
+    """Return terms beside the half-space, each with itself on some cells."""
+    made = ((term, term.on_cells(cells, modulus)) for term in terms)
+    return [(term, on_cells) for term, on_cells in made if on_cells is not None]
+
+
 @dataclass(kw_only=True, eq=False)
 class Compliance:
     """The elastic body of one contact model: its terms, on any grid.
@@ -336,11 +344,8 @@ class Compliance:
     @cached_property
     def _terms_on(self) -> Callable[[CellGrid], list[tuple[BodyTerm, ComplianceTerm]]]:
         """Function from cells to the terms beside the half-space, and these on them; cached."""
-        return lru_cache(maxsize=_MOST_GRIDS)(self._make_terms)
-
-    def _make_terms(self, cells: CellGrid) -> list[tuple[BodyTerm, ComplianceTerm]]:
-        made = ((term, term.on_cells(cells, self.modulus)) for term in self.terms)
-        return [(term, on_cells) for term, on_cells in made if on_cells is not None]
+        # not of a method: a cache that refers to its owner outlives it until Python looks for cycles
+        return lru_cache(maxsize=_MOST_GRIDS)(partial(_on_cells, self.terms, self.modulus))
 
     @cached_property
     def half_space(self) -> Callable[[tuple[int, int], Pair], HalfSpaceGrid]:

@@ -11,9 +11,8 @@ Theory: docs/theory.md, section 15.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 
 import numpy as np
 
@@ -174,11 +173,13 @@ class FrictionModel:
         """
         if self.body is None and self.materials.dundurs_beta == 0.0:
             return None
-        return self._cross_on(grid)
+        if grid not in self._crosses:
+            self._crosses[grid] = self._make_cross(grid)
+        return self._crosses[grid]
 
     @cached_property
-    def _cross_on(self) -> Callable[[tuple[int, int]], CrossCompliance]:
-        return lru_cache(maxsize=2)(self._make_cross)
+    def _crosses(self) -> dict[tuple[int, int], CrossCompliance]:
+        return {}
 
     def _make_cross(self, grid: tuple[int, int]) -> CrossCompliance:
         whole = slice(0, grid[0]), slice(0, grid[1])

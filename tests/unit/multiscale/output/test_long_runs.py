@@ -24,6 +24,7 @@ CASES = {
     "summits": {"micro": {"model": "elliptic"}},
     "hardness": {"micro": {"model": "half-space", "hardness": 300.0}},
 }
+PRESSED_AND_SHEARED = {"force": 1.0, "shear_force": [0.1, 0.0], "steps": 2}
 
 
 def cyclic(changes, cycles):
@@ -106,3 +107,29 @@ def test_resumed_cycles_go_on_where_they_were(tmp_path):
     whole = ran_past(cyclic(CASES["hardness"], 5), 9, tmp_path / "c.h5")
     again, _ = gone_on(whole.given, tmp_path / "c.h5")
     assert [step.force_N for step in again.steps] == [step.force_N for step in whole.steps]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"micro": {"model": "half-space", "finite_slopes": True}, "output": {}},
+        {"friction": {"coefficient": 0.3, "coupled": True}, "load": PRESSED_AND_SHEARED},
+        {"micro": {"model": "elliptic"}},
+    ],
+    ids=["slopes", "friction", "summits"],
+)
+def test_a_run_is_freed_as_soon_as_it_is_dropped(changes):
+    """Otherwise the cases of a sweep wait for the search for cycles, of 5 MB each and more."""
+    gc.collect()
+    gc.set_debug(gc.DEBUG_SAVEALL)
+    try:
+        steps = list(Run(cyclic(changes, cycles=1)).load_steps())
+        assert len(steps) > 1
+        del steps
+        gc.collect()
+        waiting = {type(each) for each in gc.garbage}
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+    ours = {"geometry", "macro", "micro", "multiscale", "numpy"}
+    assert not [kind for kind in waiting if kind.__module__.partition(".")[0] in ours]
