@@ -23,7 +23,11 @@ from micro.boundary_elements.grid_compliance import CellGrid
 from micro.boundary_elements.rectangle_modes import direction_modes, half_space_modes
 from support.arrays import Array, Indices
 from support.checks import positive_lengths
+from support.cores import blocks
 from support.errors import InputError
+
+_ROWS = 256
+"""Rows of a matrix that are made at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -291,15 +295,17 @@ class ModesOnCells:
         amplitudes = amplitudes.reshape(*self.matrix.shape[:-2], *moments.shape)
         return np.asarray(self.means_x.T @ amplitudes @ self.means_y)
 
-    def between(self, row: Indices, column: Indices) -> Array:
-        """Return the displacements of n cells by unit pressures on them, shape (n, n) [mm].
+    def add_between(self, total: Array, row: Indices, column: Indices) -> None:
+        """Add the displacements of n cells by unit pressures on them.
 
         Args:
-            row: Their rows.
+            total: What they are added to, shape (n, n) [mm].
+            row: Rows of the cells.
             column: Their columns.
         """
-        modes = self._modes_of(row, column)
-        return np.asarray(modes.T @ (self.matrix @ self._loads_of(row, column)))
+        modes, moved = self._modes_of(row, column), self.matrix @ self._loads_of(row, column)
+        for some in blocks(len(row), _ROWS):
+            total[some] += modes[:, some].T @ moved
 
     def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
         """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""

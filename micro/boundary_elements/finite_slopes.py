@@ -41,7 +41,7 @@ from scipy import fft
 
 from geometry import Material, Surface
 from geometry.plausibility import check_finite_slopes
-from micro.boundary_elements.waves import Around, Spectrum, surface_waves
+from micro.boundary_elements.waves import Around, surface_waves
 from support.arrays import Array
 from support.errors import InputError
 
@@ -311,9 +311,9 @@ class FiniteSlopes:
         waves, stiffness = self._waves, self.material.shear_modulus
         stiffness /= 1.0 - self.material.poisson_ratio
 
-        def changed(loads: Spectrum, here: slice) -> Spectrum:
+        def changed(loads: Array, here: slice) -> Array:
             directions = waves.directions[:, :, here]
-            parts = np.empty((5, *loads.shape[1:]), complex)
+            parts = np.empty((5, *loads.shape[1:]))
             np.multiply(loads, directions[::2], out=parts[:2])
             curved = loads * (waves.wave_number[:, here] / stiffness)
             np.multiply(curved, directions, out=parts[2:])
@@ -322,33 +322,47 @@ class FiniteSlopes:
         parts = waves.changed(pressure[None], changed, 5)
         return parts[:2], parts[2:]
 
-    def _strained(self, waves: Spectrum, here: slice) -> Spectrum:
+    def _strained(self, waves: Array, here: slice) -> Array:
         """Return the waves of strains by tractions ∂_α (h σ_αβ), by those of moments h σ_αβ."""
-        nu, shear = self.material.poisson_ratio, self.material.shear_modulus
-        along_x, along_y, across = self._waves.directions[:, :, here]
+        nu, factor = self.material.poisson_ratio, -1.0 / self.material.shear_modulus
+        along, _, across = self._waves.directions[:, :, here]
         xx, yy, xy = waves
-        crossed = across * xy
-        both = nu * (along_x * xx + along_y * yy + 2.0 * crossed)
+        crossed, straight = across * xy, along * (xx - yy)
+        straight += yy
+        straight += crossed
+        straight += (
+            crossed  # k · m k/k², as the trace of k k/k² is 1: that of the strains over 1 − ν
+        )
         parts = np.empty_like(waves)
-        parts[0] = along_x * (xx - both) + crossed
-        parts[1] = along_y * (yy - both) + crossed
-        parts[2] = across * (0.5 * (xx + yy) - both) + 0.5 * xy
-        parts *= self._waves.wave_number[:, here] / -shear
+        both = np.multiply(straight, nu, out=parts[1])
+        np.multiply(along, np.subtract(xx, both, out=parts[0]), out=parts[0])
+        parts[0] += crossed
+        mean = np.add(xx, yy, out=parts[2])
+        mean *= 0.5
+        mean -= both
+        mean *= across
+        mean += np.multiply(xy, 0.5, out=crossed)
+        straight -= both
+        np.subtract(straight, parts[0], out=parts[1])
+        parts *= self._waves.wave_number[:, here] * factor
         return parts
 
-    def _displaced(self, waves: Spectrum, here: slice) -> Spectrum:
+    def _displaced(self, waves: Array, here: slice) -> Array:
         """Return the waves of the displacements by those of tensors, of which one is added last.
 
         Tensors t are given by t_xx − t_yy and t_xy + t_yx, and contribute k · t k/k² less t_yy. The
         last one is whole, and contributes (1 − ν)/G |k| times k · t k/k² to the one before it.
         """
-        stiffness = self.material.shear_modulus / (1.0 - self.material.poisson_ratio)
+        factor = (1.0 - self.material.poisson_ratio) / self.material.shear_modulus
         along, _, across = self._waves.directions[:, :, here]
-        xx, yy, xy = waves[-3:] * (self._waves.wave_number[:, here] / stiffness)
-        waves[-5] += xx - yy
-        waves[-4] += xy
-        moved = along * waves[:-3:2] + across * waves[1:-3:2]
-        moved[-1] += yy
+        last = waves[-3:]
+        last *= self._waves.wave_number[:, here] * factor
+        waves[-5] += last[0]
+        waves[-5] -= last[1]
+        waves[-4] += last[2]
+        moved = along * waves[:-3:2]
+        moved += np.multiply(across, waves[1:-3:2], out=waves[1:-3:2])
+        moved[-1] += last[1]
         return moved
 
     def _strains(self, stresses: Array) -> Array:

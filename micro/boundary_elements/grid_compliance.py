@@ -55,8 +55,8 @@ class ComplianceTerm(Protocol):
         """Return the displacements by pressures / E* on all these cells, shape (r, c) [mm]."""
         ...
 
-    def between(self, row: Indices, column: Indices, /) -> Array:
-        """Return the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
+    def add_between(self, total: Array, row: Indices, column: Indices, /) -> None:
+        """Add the displacements of n cells by unit pressures / E* on them, (n, n) [mm]."""
         ...
 
     def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices, /) -> Array:
@@ -204,9 +204,10 @@ class GridCompliance:
             columns: Number of columns of the grid.
         """
         row, column = np.divmod(flat, columns)
-        total = self._half_space.between(row, column)
+        total = np.zeros((len(flat), len(flat)))
+        self._half_space.add_between(total, row, column)
         for term in self._terms:
-            total += term.between(row, column)
+            term.add_between(total, row, column)
         return ComplianceMatrix(total)
 
     def on_patches(self, flat: Indices, along: tuple[Array, Array]) -> Array:
@@ -344,7 +345,7 @@ class Compliance:
     @cached_property
     def _terms_on(self) -> Callable[[CellGrid], list[tuple[BodyTerm, ComplianceTerm]]]:
         """Function from cells to the terms beside the half-space, and these on them; cached."""
-        # not of a method: a cache that refers to its owner outlives it until Python looks for cycles
+        # not of a method: what refers to its owner stays until Python looks for such cycles
         return lru_cache(maxsize=_MOST_GRIDS)(partial(_on_cells, self.terms, self.modulus))
 
     @cached_property

@@ -286,11 +286,12 @@ class HalfSpaceGrid:
         self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
         self.inverse = Convolution(inverse.astype(np.float32), period, period, work)
 
-    def between(self, row: Indices, column: Indices) -> Array:
-        """Return the displacements of n cells by unit pressures on them, shape (n, n) [mm].
+    def add_between(self, total: Array, row: Indices, column: Indices) -> None:
+        """Add the displacements of n cells by unit pressures on them.
 
         Args:
-            row: Their rows.
+            total: What they are added to, shape (n, n) [mm].
+            row: Rows of the cells.
             column: Their columns.
         """
 
@@ -300,7 +301,7 @@ class HalfSpaceGrid:
             place += np.abs(column[some, None] - column[others])
             return self._kernel.take(place)
 
-        return symmetric(len(row), block)
+        add_symmetric(total, block)
 
     def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
         """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""
@@ -341,22 +342,17 @@ def on_patches(lines: Iterable[Array], along: Array, place: Indices, cell: Indic
     return np.concatenate(found, axis=1)[:, order].swapaxes(1, 2).reshape(-1, len(cell))
 
 
-def symmetric(count: int, block: Callable[[slice, slice], Array]) -> Array:
-    """Return a symmetric matrix by its blocks.
+def add_symmetric(total: Array, block: Callable[[slice, slice], Array]) -> None:
+    """Add a symmetric matrix by its blocks; large ones take less time so than in new memory.
 
     Args:
-        count: Number n of rows.
+        total: What it is added to, shape (n, n).
         block: Returns the block of some rows and columns.
-
-    Returns:
-        Shape (n, n).
     """
-    matrix = np.empty((count, count))
-    for rows in blocks(count, _SQUARE):
-        left = slice(0, rows.stop)
-        part = matrix[rows, left] = block(rows, left)
-        matrix[left, rows] = part.T
-    return matrix
+    for rows in blocks(len(total), _SQUARE):
+        part = block(rows, slice(0, rows.stop))
+        total[rows, : rows.stop] += part
+        total[: rows.start, rows] += part[:, : rows.start].T
 
 
 def many(grid: tuple[int, int]) -> bool:

@@ -21,7 +21,7 @@ from scipy import fft
 
 from micro.boundary_elements.free_sides import FreeSides, distance_nodes, means_over
 from micro.boundary_elements.grid_compliance import CellGrid
-from micro.boundary_elements.half_space_grid import many, on_patches, symmetric
+from micro.boundary_elements.half_space_grid import add_symmetric, many, on_patches
 from support.arrays import Array, Indices
 from support.cores import blocks, in_threads
 
@@ -139,19 +139,18 @@ class _SidePair:
         lines = fft.irfft(by_side, 2 * len(self.kernels) - 2, axis=1)[:, self.place]
         return lines.reshape(self.means.shape[1], -1)
 
-    def between(self, row: Indices, cell: Indices) -> Array:
-        """Return the displacements of n cells by unit pressures on them, shape (n, n)."""
+    def add_between(self, total: Array, row: Indices, cell: Indices) -> None:
+        """Add the displacements of n cells by unit pressures on them, shape (n, n)."""
         if self.means.shape[0] ** 2 * len(self.kernels) <= _LINES:
-            return symmetric(len(row), partial(self._block, _all_lines(self), row, cell))
+            add_symmetric(total, partial(self._block, _all_lines(self), row, cell))
+            return
         used, row = np.unique(row, return_inverse=True)
-        matrix = np.empty((len(row), len(row)))
         step = max(1, _LINES // (len(used) * len(self.kernels)))
         for first in range(0, len(used), step):  # some rows at a time, for the memory
             some = np.flatnonzero((row >= first) & (row < first + step))
             lines = self.lines_between(self.means[used[first : first + step]], self.means[used])
             apart = np.abs(cell[some, None] - cell)
-            matrix[some] = lines[row[some, None] - first, row, apart]
-        return matrix
+            total[some] += lines[row[some, None] - first, row, apart]
 
     @staticmethod
     def _block(lines: Array, row: Indices, cell: Indices, some: slice, others: slice) -> Array:
@@ -317,9 +316,10 @@ class SideCells:
         in_threads(move, parts)
         return moved
 
-    def between(self, row: Indices, column: Indices) -> Array:
-        """Return the displacements of n cells by unit pressures on them, (n, n) [mm]."""
-        return self.across_x.between(row, column) + self.across_y.between(column, row)
+    def add_between(self, total: Array, row: Indices, column: Indices) -> None:
+        """Add the displacements of n cells by unit pressures on them, (n, n) [mm]."""
+        self.across_x.add_between(total, row, column)
+        self.across_y.add_between(total, column, row)
 
     def on_patches(self, along: tuple[Array, Array], row: Indices, column: Indices) -> Array:
         """Return the displacements of patches by pressures on n cells; see `ComplianceTerm`."""

@@ -9,8 +9,6 @@ Theory: docs/theory.md, section 7.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from micro.complementarity.active_set import solve
@@ -18,11 +16,7 @@ from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from support.errors import NotConverged
 
 _MOST_SOLUTIONS = 30
-_FIRST = 1e-4
-"""Residual of the first solution."""
-_PART = 1e-2
-"""Residual of a solution over the last change of the displacements by finite slopes."""
-_CONVERGED = 3e-9
+_CONVERGED = 3e-10
 """Change of these displacements at which the iteration ends, over the largest interference."""
 
 
@@ -45,16 +39,16 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
     if len(inside) < np.count_nonzero(touchable):
         return None
     some = slice(0, len(inside)) if inside[-1] == len(inside) - 1 else inside
-    tolerance, largest = problem.tolerance, float(problem.interference.max())
+    largest = float(problem.interference.max())
     pressure, used = np.zeros(len(few.cells)), 0
     if start is not None:
         pressure[some] = start.pressure.ravel()[few.cells[some]]
         few.learn(pressure)
-    accuracy, compliance = max(tolerance, _FIRST), few.compliance(pressure)
+    compliance, converged = few.compliance(pressure), max(_CONVERGED, 3.0 * problem.tolerance)
     for _ in range(_MOST_SOLUTIONS):
         part = problem.among(few.cells[some], compliance.among(some))
         try:
-            found = solve(replace(part, tolerance=accuracy), pressure[some][:, None])
+            found = solve(part, pressure[some][:, None])
         except NotConverged:  # slopes too steep for the theory; the search for all cells tells
             return None
         used += found.iterations
@@ -66,7 +60,7 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
         change = compliance.displacement_by_added(pressure) - known
         changes = np.abs(np.broadcast_to(change, pressure.shape)[pressure > 0.0])
         changed = float(changes.max(initial=0.0)) / largest
-        if accuracy <= tolerance and changed <= max(_CONVERGED, 10.0 * tolerance):
+        if changed <= converged:
             everywhere = np.zeros(problem.interference.shape)
             everywhere.ravel()[few.cells] = pressure
             return found._replace(
@@ -75,5 +69,4 @@ def solved_on_few(problem: CellProblem, start: ContactPressures | None) -> Conta
                 by_slopes=few.slope_displacement(pressure),
                 residual=max(found.residual, changed),
             )
-        accuracy = max(tolerance, min(_FIRST, _PART * changed))
     return None
