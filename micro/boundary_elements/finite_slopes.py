@@ -327,13 +327,11 @@ class FiniteSlopes:
         nu, factor = self.material.poisson_ratio, -1.0 / self.material.shear_modulus
         along, _, across = self._waves.directions[:, :, here]
         xx, yy, xy = waves
+        parts = np.empty_like(waves)
         crossed, straight = across * xy, along * (xx - yy)
         straight += yy
-        straight += crossed
-        straight += (
-            crossed  # k · m k/k², as the trace of k k/k² is 1: that of the strains over 1 − ν
-        )
-        parts = np.empty_like(waves)
+        # k · m k/k², as the trace of k k/k² is 1: that of the strains over 1 − ν
+        straight += np.multiply(crossed, 2.0, out=parts[0])
         both = np.multiply(straight, nu, out=parts[1])
         np.multiply(along, np.subtract(xx, both, out=parts[0]), out=parts[0])
         parts[0] += crossed
