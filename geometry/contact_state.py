@@ -73,7 +73,11 @@ def peaks_of(group: NDArray[np.integer], values: Array, count: int) -> Indices:
         values: The values, shape (n,).
         count: Number of groups.
     """
-    rising = np.argsort(values, kind="stable")
+    high, other = np.ones(len(values), bool), group[1:] != group[:-1]
+    high[1:] &= other | (values[1:] >= values[:-1])
+    high[:-1] &= other | (values[:-1] >= values[1:])
+    some = np.flatnonzero(high)  # few are as large as those of their group beside them
+    rising = some[np.argsort(values[some], kind="stable")]
     peaks = np.zeros(count, np.intp)
     peaks[group[rising]] = rising  # the last, largest one stays
     return peaks

@@ -221,7 +221,10 @@ class RigidPlane:
             InputError: When the centre is not known.
         """
         (xc, yc), force = self._known_centre, np.asarray(force)
-        return float(np.sum(force * (x - xc))), float(np.sum(force * (y - yc)))
+        sums = "xy,xy->" if force.ndim == 2 else "x,x->"  # without products as large as the forces
+        arms = (np.broadcast_to(arm, force.shape) for arm in (x - xc, y - yc))
+        along_x, along_y = (float(np.einsum(sums, force, arm)) for arm in arms)
+        return along_x, along_y
 
     @property
     def _known_centre(self) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import scipy
 
 from geometry.surface import Surface
 from support.arrays import Array, Indices
-from support.cores import cores
+from support.cores import cores, on_rows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,22 +172,35 @@ def _spectral(surface: Surface) -> list[float]:
     waves = scipy.fft.rfft2(
         surface.heights - surface.mean_height, norm="forward", overwrite_x=True, workers=cores()
     )
-    power = np.square(waves.real)
-    power += np.square(waves.imag)
-    power[:, 1 : (surface.grid[1] + 1) // 2] *= 2.0  # waves of the other half
-    x, y = (wavenumber.ravel() ** 2 for wavenumber in _wavenumbers(surface))
-    y = y[: power.shape[1]]
-    along_x, along_y = power.sum(axis=1), power.sum(axis=0)
-    xx, yy, mixed = float(along_x @ x**2), float(along_y @ y**2), float(x @ power @ y)
-    return [float(along_x @ x), float(along_y @ y), xx, yy, xx + 2.0 * mixed + yy]
+    x, y = (np.vander(each.ravel() ** 2, 3, increasing=True) for each in _wavenumbers(surface))
+    y = y[: waves.shape[1]]
+    y[1 : (surface.grid[1] + 1) // 2] *= 2.0  # waves of the other half
+
+    def moments(rows: slice) -> Array:
+        power = np.square(waves.real[rows])
+        power += np.square(waves.imag[rows])
+        return np.asarray(x[rows].T @ power @ y)
+
+    sums = np.sum(on_rows(moments, waves.shape), axis=0)  # times powers of qx² and qy²
+    x2, y2, x4, y4 = sums[1, 0], sums[0, 1], sums[2, 0], sums[0, 2]
+    return [float(mean) for mean in (x2, y2, x4, y4, x4 + 2.0 * sums[1, 1] + y4)]
 
 
 def _differences(surface: Surface) -> list[float]:
     """Return these means from central differences over the inner cells."""
-    h, (dx, dy) = surface.heights, surface.spacing
-    x = (h[2:, :] - h[:-2, :]) / (2.0 * dx)
-    y = (h[:, 2:] - h[:, :-2]) / (2.0 * dy)
-    xx = (h[2:, :] - 2.0 * h[1:-1, :] + h[:-2, :]) / dx**2
-    yy = (h[:, 2:] - 2.0 * h[:, 1:-1] + h[:, :-2]) / dy**2
-    laplacian = xx[:, 1:-1] + yy[1:-1, :]
-    return [float(np.mean(part**2)) for part in (x, y, xx, yy, laplacian)]
+    h, (dx, dy), (nx, ny) = surface.heights, surface.spacing, surface.grid
+
+    def sums(rows: slice) -> list[float]:
+        """Return the sums of squares over some rows, without the first and last where need be."""
+        own, near = h[rows], h[max(rows.start - 1, 0) : rows.stop + 1]
+        inner = slice(max(rows.start, 1) - rows.start, min(rows.stop, nx - 1) - rows.start)
+        x, y = (near[2:] - near[:-2]) / (2.0 * dx), (own[:, 2:] - own[:, :-2]) / (2.0 * dy)
+        xx = (near[2:] - 2.0 * near[1:-1] + near[:-2]) / dx**2
+        yy = (own[:, 2:] - 2.0 * own[:, 1:-1] + own[:, :-2]) / dy**2
+        laplacian = xx[:, 1:-1] + yy[inner]
+        return [float(np.vdot(part, part)) for part in (x, y, xx, yy, laplacian)]
+
+    along_x, along_y, both = (nx - 2) * ny, nx * (ny - 2), (nx - 2) * (ny - 2)
+    counts = along_x, along_y, along_x, along_y, both
+    totals = np.sum(on_rows(sums, (nx, 4 * ny)), axis=0)
+    return [float(total) for total in totals / counts]

@@ -25,6 +25,8 @@ BLOCK = 2**20
 core; blocks of half or twice the size take 5 to 60 % longer on grids of 4096²."""
 CELLS = 2**16
 """Cells here and there on a grid that a thread gathers or scatters at a time."""
+_LINE = 8
+"""Numbers in a line of the cache."""
 _STATED = ("OMP_NUM_THREADS", "SLURM_CPUS_PER_TASK")
 _RANKS_HERE = ("OMPI_COMM_WORLD_LOCAL_SIZE", "MPI_LOCALNRANKS", "MV2_COMM_WORLD_LOCAL_SIZE")
 """Variables that launchers set to the number of ranks on this node: Open MPI's mpirun; Hydra, of
@@ -141,14 +143,22 @@ def _bind(wanted: Collection[int]) -> None:
         os.sched_setaffinity(0, wanted)
 
 
-def blocks(count: int, size: int) -> list[slice]:
+def blocks(count: int, size: int, least: int = 1) -> list[slice]:
     """Return ranges that divide a number of rows; work on them does not depend on the threads.
+
+    There is one, or an even number of about equal ones: two threads then end together.
 
     Args:
         count: Number of rows.
-        size: Rows in a range, the last one may have fewer; at least one.
+        size: Most rows in a range, apart from rounding up to lines of the cache; at least one.
+        least: Number of ranges at least, where there are so many rows.
     """
-    size = max(1, size)
+    if 0 < count <= size and least == 1:
+        return [slice(0, count)]
+    number = max(-(-count // max(1, size)), least)
+    number += number % 2 if number > 1 else 0
+    size = max(1, -(-count // number))
+    size = -(-size // _LINE) * _LINE if size > _LINE else size
     return [slice(first, min(first + size, count)) for first in range(0, count, size)]
 
 
@@ -189,6 +199,52 @@ def in_threads(work: Callable[[Any], Result], tasks: Iterable[Any]) -> list[Resu
     return [results[task] for task in range(len(listed))]
 
 
+def on_rows(work: Callable[[slice], Result], shape: tuple[int, ...]) -> list[Result]:
+    """Do work on all rows of an array of two axes, in blocks that stay in the cache, on all cores.
+
+    Blocks depend on the array alone: sums over them are the same on any number of threads.
+
+    Args:
+        work: Called with the rows of each block.
+        shape: Shape (nx, ny) of the array.
+
+    Returns:
+        The results, in the order of the rows.
+    """
+    return in_threads(work, blocks(shape[0], BLOCK // (8 * shape[1])))
+
+
+def taken(values: Any, places: Any) -> Any:
+    """Return some values of an array by their flat indices, taken on all cores.
+
+    Args:
+        values: Row by row in memory.
+        places: The indices, shape (n,).
+    """
+    flat = values.ravel()
+    if len(places) <= CELLS:
+        return flat[places]
+    found = np.empty(len(places), values.dtype)
+
+    def work(some: slice) -> None:
+        found[some] = flat[places[some]]
+
+    in_threads(work, blocks(len(places), CELLS))
+    return found
+
+
+def largest(values: Any) -> float:
+    """Return the largest size of some values, 0 of none, found on all cores.
+
+    Args:
+        values: Of any shape; an array that lies row by row in memory.
+    """
+    if values.size <= CELLS:
+        return float(np.abs(values).max(initial=0.0))
+    flat, parts = values.ravel(), blocks(values.size, CELLS)
+    return max(in_threads(lambda some: float(np.abs(flat[some]).max()), parts))
+
+
 def copied(array: Any, out: Any = None) -> Any:
     """Return a copy of an array of two axes, made on all cores.
 
@@ -197,8 +253,7 @@ def copied(array: Any, out: Any = None) -> Any:
         out: Overwritten by the copy; new memory, row by row, if not given.
     """
     out = np.empty(array.shape, array.dtype) if out is None else out
-    rows = blocks(len(array), BLOCK // (array.itemsize * array.shape[1]))
-    in_threads(lambda some: np.copyto(out[some], array[some]), rows)
+    on_rows(lambda rows: np.copyto(out[rows], array[rows]), array.shape)
     return out
 
 
@@ -210,12 +265,11 @@ def scaled(array: Any, factor: float, out: Any) -> Any:
         factor: The factor.
         out: Overwritten by the result.
     """
-    rows = blocks(len(array), BLOCK // (array.itemsize * array.shape[1]))
 
-    def work(some: slice) -> None:
-        np.multiply(array[some], factor, out=out[some], dtype=float, casting="same_kind")
+    def work(rows: slice) -> None:
+        np.multiply(array[rows], factor, out=out[rows], dtype=float, casting="same_kind")
 
-    in_threads(work, rows)
+    on_rows(work, array.shape)
     return out
 
 

@@ -24,7 +24,7 @@ from micro.boundary_elements.half_space_grid import Cells, HalfSpaceGrid
 from micro.boundary_elements.inverse import ContactInverse, contact_inverse
 from micro.boundary_elements.remembered_slopes import RememberedSlopes
 from support.arrays import Array, Indices
-from support.cores import copied, scaled
+from support.cores import copied, largest, scaled
 from support.small_caches import cached_where_small
 
 Grid = tuple[int, ...]
@@ -158,7 +158,7 @@ class GridCompliance:
         """
         self.products += 1
         if self._rough:
-            scale = _largest(pressure)
+            scale = largest(pressure) or 1.0
             loaded = scaled(pressure, 1.0 / scale, np.empty(pressure.shape, np.float32))
             found = self._half_space.rough_compliance(copied(loaded))
             for term in self._single:
@@ -181,7 +181,7 @@ class GridCompliance:
         moved = self._half_space.rough_compliance.on_cells(cells, pressure)
         if self._terms:
             terms, place, shape = self._among(cells)
-            scale = _largest(pressure)
+            scale = largest(pressure) or 1.0
             some: Any = np.zeros(shape, np.float32)
             some.ravel()[place] = pressure / scale
             for term in terms:
@@ -231,11 +231,6 @@ class GridCompliance:
             place = cells.row * len(columns) + column.ravel()
             self._last = cells, terms, place, (len(cells.rows), len(columns))
         return self._last[1:]
-
-
-def _largest(pressure: Array) -> float:
-    """Return the largest size of some pressures, or 1: single precision ends at 1e-38."""
-    return max(float(pressure.max(initial=0.0)), -float(pressure.min(initial=0.0))) or 1.0
 
 
 def _on_cells(

@@ -18,7 +18,7 @@ from scipy import fft
 
 from micro.closed_forms.love import corner_integral
 from support.arrays import Array, Indices
-from support.cores import BLOCK, CELLS, blocks, cores, in_threads
+from support.cores import BLOCK, CELLS, blocks, cores, in_threads, largest, on_rows, scaled
 
 Field = NDArray[Any]
 
@@ -39,9 +39,15 @@ def love_kernel(grid: tuple[int, int], spacing: tuple[float, float]) -> Array:
     Source:
         Love 1929; Johnson 1985, eq. 3.25.
     """
-    corners = [(np.arange(n + 1) - 0.5) * step for n, step in zip(grid, spacing, strict=True)]
-    terms = corner_integral(corners[0][:, None], corners[1])
-    return np.diff(np.diff(terms, axis=0), axis=1) / np.pi
+    x, y = ((np.arange(n + 1) - 0.5) * step for n, step in zip(grid, spacing, strict=True))
+    found = np.empty(grid)
+
+    def work(rows: slice) -> None:
+        terms = corner_integral(x[rows.start : rows.stop + 1, None], y)
+        np.divide(np.diff(np.diff(terms, axis=0), axis=1), np.pi, out=found[rows])
+
+    on_rows(work, (grid[0], 4 * grid[1]))  # what it is made of stays in the cache
+    return found
 
 
 def padded_spectrum(padded: tuple[int, int], spacing: tuple[float, float]) -> Array:
@@ -110,14 +116,25 @@ class Cells(NamedTuple):
     @classmethod
     def of(cls, flat: Indices, grid: tuple[int, ...]) -> Cells:
         """Return cells of a grid (nx, ny) by their flat indices, ascending."""
-        on_grid = flat // grid[1]  # faster than with its remainder
-        rows = np.flatnonzero(np.bincount(on_grid, minlength=grid[0]))
+        row, column, parts = np.empty_like(flat), np.empty_like(flat), blocks(len(flat), CELLS)
+        used, order = np.zeros(grid[0], bool), np.zeros(grid[0], np.intp)
+
+        def locate(some: slice) -> None:
+            np.floor_divide(flat[some], grid[1], out=row[some])  # faster than with its remainder
+            np.subtract(flat[some], row[some] * grid[1], out=column[some])
+            used[row[some]] = True
+
+        def number(some: slice) -> None:
+            row[some] = order[row[some]]
+
+        in_threads(locate, parts)
+        rows = np.flatnonzero(used)
         # nearly all rows between the first and the last cell: a range is copied faster than rows
         if rows.size > 0.8 * (rows[-1] - rows[0] + 1 if rows.size else 1):
             rows = np.arange(rows[0], rows[-1] + 1)
-        order = np.zeros(grid[0], np.intp)
         order[rows] = np.arange(len(rows))
-        return cls(flat, rows, order[on_grid], flat - on_grid * grid[1])
+        in_threads(number, parts)
+        return cls(flat, rows, row, column)
 
 
 class Convolution:
@@ -179,10 +196,10 @@ class Convolution:
             field[here] = fft.irfft(work[here], n=my, axis=1)[:, : self.grid[1]]
 
         size = work.itemsize
-        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
         # of a row two lines of the cache at least
-        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, 128) // size))
-        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        in_threads(along_columns, blocks(work.shape[1], max(BLOCK // mx, 128) // size, 4))
+        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
         return field
 
     def _along_columns(self, part: Field, here: slice, loaded: Any) -> Field:
@@ -207,7 +224,7 @@ class Convolution:
 
     def on_cells(self, cells: Cells, values: Array) -> Array:
         """Convolve values on some cells, in single precision; return those of the same cells."""
-        scale = float(np.abs(values).max(initial=0.0)) or 1.0  # single precision ends at 1e-38
+        scale = largest(values) or 1.0  # single precision ends at 1e-38
         if self._factors is not None:
             few = np.zeros((len(cells.rows), self.grid[1]), np.float32)
             place = cells.row * self.grid[1] + cells.column
@@ -283,7 +300,8 @@ class HalfSpaceGrid:
         most = max(2 * grid[0] * (padded[1] // 2 + 1), period[0] * (period[1] // 2 + 1))
         work = np.empty((most + 1) // 2, complex)  # one for all: they take turns
         self.compliance = Convolution(spectrum, grid, padded, work)
-        self.rough_compliance = Convolution(spectrum.astype(np.float32), grid, padded, work)
+        single = scaled(spectrum, 1.0, np.empty(spectrum.shape, np.float32))
+        self.rough_compliance = Convolution(single, grid, padded, work)
         self.inverse = Convolution(inverse.astype(np.float32), period, period, work)
 
     def add_between(self, total: Array, row: Indices, column: Indices) -> None:

@@ -34,7 +34,7 @@ from numpy.typing import NDArray
 
 from micro.boundary_elements.half_space_grid import Cells, Convolution, HalfSpaceGrid, many
 from support.arrays import Array, Indices
-from support.cores import BLOCK, CELLS, blocks, in_threads
+from support.cores import BLOCK, CELLS, blocks, in_threads, largest, on_rows, taken
 
 Field = NDArray[np.float32]
 
@@ -73,14 +73,16 @@ class Extension:
             self._block[some] = (rows[some] >> 1) * shape[1] + (columns[some] >> 1)
 
         in_threads(locate, blocks(len(rows), CELLS))
-        sums = np.bincount(self._block, weights, minlength=shape[0] * shape[1])
-        weight = sums.reshape(shape).astype(np.float32)
+        rows_of = blocks(shape[0], BLOCK // (8 * shape[1]))
+        ends = np.searchsorted(rows, [0, *(2 * some.stop for some in rows_of)])
+        self._parts = [*zip(rows_of, map(slice, ends, ends[1:]), strict=True)]
+        weight = self._summed(weights)
         self._scales: list[Field] = []  # from sums over four cells to a level's weighted values
         self._unknown: list[Field] = []  # of each level but the finest, what it does not know
         while True:
-            limited = _limited(weight)
+            limited, unknown = _limited(weight)
             self._scales.append(weight)
-            self._unknown.append(np.float32(1.0) - limited)
+            self._unknown.append(unknown)
             if min(shape) <= _SMALLEST:
                 break
             weight = _sums(limited)
@@ -133,10 +135,8 @@ class Extension:
             weighted: Values of the cells times their weights, shape (n,).
             out: Overwritten by the interpolation, shape (mx, my).
         """
-        scales = self._scales
-        sums = np.bincount(self._block, weighted, minlength=scales[0].size)
-        known = [np.multiply(sums.reshape(scales[0].shape), scales[0], dtype=np.float32)]
-        for scale in scales[1:]:
+        known = [self._summed(weighted, self._scales[0])]
+        for scale in self._scales[1:]:
             known.append(scale * _sums(known[-1]))
         field = known.pop()
         for mine, unknown in zip(reversed(known), self._unknown[-2::-1], strict=True):
@@ -144,6 +144,20 @@ class Extension:
             _interpolate(field, finer, unknown, mine)
             field = finer
         _interpolate(field, out)
+
+    def _summed(self, values: Array | None, scale: Field | None = None) -> Field:
+        """Return sums of values of the cells, or of ones, over coarse cells, times a scale."""
+        found = np.empty(_halved(self._period), np.float32)
+
+        def work(part: tuple[slice, slice]) -> None:
+            rows, some = part
+            here, own = found[rows], None if values is None else values[some]
+            sums = np.bincount(self._block[some] - rows.start * here.shape[1], own, here.size)
+            factor = 1.0 if scale is None else scale[rows]
+            np.multiply(sums.reshape(here.shape), factor, out=here, casting="same_kind")
+
+        in_threads(work, self._parts)
+        return found
 
     def collected(self, field: Field) -> Array:
         """Return the transpose of `interpolated` times a field.
@@ -160,13 +174,7 @@ class Extension:
         total = levels.pop() * self._scales[-1]
         for scale, level in zip(self._scales[-2::-1], reversed(levels), strict=True):
             total = _scaled_sum(level, total, scale)
-        flat, found = total.ravel(), np.empty(len(self._block))
-
-        def take(some: slice) -> None:
-            found[some] = flat[self._block[some]]
-
-        in_threads(take, blocks(len(found), CELLS))
-        return found
+        return taken(total, self._block)
 
 
 def _halved(shape: tuple[int, int]) -> tuple[int, int]:
@@ -174,25 +182,36 @@ def _halved(shape: tuple[int, int]) -> tuple[int, int]:
     return (shape[0] + 1) // 2, (shape[1] + 1) // 2
 
 
-def _limited(weight: Field) -> Field:
-    """Return a share of sums of weights, at most 1, and leave its ratio to these in their place."""
-    limited = np.empty_like(weight)
+def _limited(weight: Field) -> tuple[Field, Field]:
+    """Return a share of sums of weights, at most 1, and what it lacks of 1.
+
+    Its ratio to the sums takes their place.
+    """
+    limited, lacking = np.empty_like(weight), np.empty_like(weight)
 
     def work(rows: slice) -> None:
         here, most = weight[rows], limited[rows]
         np.minimum(np.float32(_SHARE) * here, np.float32(1.0), out=most)
+        np.subtract(np.float32(1.0), most, out=lacking[rows])
         np.divide(most, here, out=here, where=here > _NONE)
 
-    in_threads(work, blocks(len(weight), BLOCK // (8 * weight.shape[1])))
-    return limited
+    on_rows(work, weight.shape)
+    return limited, lacking
 
 
 def _sums(fine: Field) -> Field:
     """Return sums over the cells of the next coarser grid."""
     odd = [(0, n % 2) for n in fine.shape]
     full = np.pad(fine, odd) if odd != [(0, 0), (0, 0)] else fine
-    rows = full[0::2] + full[1::2]
-    return np.asarray(rows[:, 0::2] + rows[:, 1::2])
+    found = np.empty((len(full) // 2, full.shape[1] // 2), np.float32)
+
+    def work(rows: slice) -> None:
+        here = full[2 * rows.start : 2 * rows.stop]
+        sums = here[0::2] + here[1::2]
+        np.add(sums[:, 0::2], sums[:, 1::2], out=found[rows])
+
+    on_rows(work, (len(found), full.shape[1]))
+    return found
 
 
 def _scaled_sum(fine: Field, coarse: Field, scale: Field) -> Field:
@@ -377,7 +396,7 @@ class ExtendedInverse:
 
     def __call__(self, displacement: Array) -> Array:
         """Return roughly the pressures / E* that displace the cells; see `ContactInverse`."""
-        scale = float(np.abs(displacement).max(initial=0.0)) or 1.0  # single precision: 1e-38
+        scale = largest(displacement) or 1.0  # single precision ends at 1e-38
         memory = self._inverse.memory()
         self._extension.extended(displacement / scale, memory)
         self._inverse(memory[:, : self._inverse.grid[1]])

@@ -21,11 +21,9 @@ from micro.complementarity.cell_problem import CellProblem, ContactPressures
 from micro.complementarity.conjugate_gradients import ContactCells
 from micro.complementarity.start import admissible_start
 from support.arrays import Array, Flags, Indices
-from support.cores import CELLS, blocks, copied, in_threads
+from support.cores import CELLS, blocks, copied, in_threads, on_rows, taken
 from support.errors import NotConverged
 
-_BLOCK = 2**17
-"""Cells that a thread evaluates at a time."""
 _TRUSTING_STEPS = 20
 """Steps that may raise the energy when they lower the residual; later ones must lower the energy.
 Where cells of very different sides meet the periodic kernel, whose inverse is then far from an
@@ -85,24 +83,25 @@ class ActiveSet:
         self._ends = float(problem.interference.min()), float(problem.interference.max())
         self.gap = np.empty_like(start)
         pressure, self.motion = admissible_start(problem, start)
-        self._accept(pressure)
+        self._accept(np.ascontiguousarray(pressure))  # cells are written through flat views
 
     def _accept(self, pressure: Array) -> None:
         """Evaluate admissible pressures."""
         problem, motions, self.pressure = self.problem, self.problem.motions, pressure
         gap = self.gap = problem.grid.displacement(pressure, out=self.gap)
         interference = problem.interference
-        parts = blocks(gap.shape[0], _BLOCK // gap.shape[1])
 
-        def work(rows: slice) -> tuple[float, float, float]:
+        def work(rows: slice) -> tuple[float, float, float, tuple[float, float]]:
             """Turn displacements of some rows into gaps; return three sums over these rows.
 
             They are the pressures, and these times the displacements and times the interference.
+            The largest pressure and the gap there follow.
             """
             here, p = gap[rows], pressure[rows]
-            elastic = float(np.vdot(p, here))
+            elastic, top = float(np.vdot(p, here)), np.argmax(p)
             here -= interference[rows]
-            return float(p.sum()), elastic, float(np.vdot(p, interference[rows]))
+            peak = float(p.flat[top]), float(here.flat[top])
+            return float(p.sum()), elastic, float(np.vdot(p, interference[rows])), peak
 
         def extremes(rows: slice) -> tuple[float, float, float, float]:
             """Let free motions act; return four extremes.
@@ -119,18 +118,19 @@ class ActiveSet:
                 closed[yielding] = 0.0  # yielding cells may have negative gaps
             return most, -least, max(apart, -float(closed.min())), -float(open_gaps.min())
 
-        total, elastic, pressed = map(sum, zip(*in_threads(work, parts), strict=True))
+        *sums, peaks = zip(*on_rows(work, gap.shape), strict=True)
+        total, elastic, pressed = map(sum, sums)
         self._energy = elastic - 2.0 * pressed
         if motions.count and total > 0.0:
             if motions.turns or problem.bound.is_finite or self._constrained.size:
                 self.motion = self._closing(pressure)
             else:  # mean gap under the pressures; gaps differ by less than heights, which round
-                base = gap.flat[np.argmax(pressure)]
-                beyond = in_threads(
-                    lambda rows: float(np.vdot(pressure[rows], gap[rows] - base)), parts
+                base = max(peaks)[1]
+                beyond = on_rows(
+                    lambda rows: float(np.vdot(pressure[rows], gap[rows] - base)), gap.shape
                 )
                 self.motion = np.array([base + sum(beyond) / total])
-        most, least, inside, outside = map(max, zip(*in_threads(extremes, parts), strict=True))
+        most, least, inside, outside = map(max, zip(*on_rows(extremes, gap.shape), strict=True))
         # clear of all cells, and yet loaded: the largest absolute value counts
         self.scale = most if most > 0.0 or total == 0.0 else max(most, least)
         self.residual = self.rounding = 0.0
@@ -206,42 +206,49 @@ class ActiveSet:
     def _step_together(self, *, cautious: bool) -> bool:
         """Move all cells at once, by less while that gains nothing; return whether it gained."""
         touching = self._touching(entering=self._enters)
-        same = np.array_equal(touching, self._set)
+        before = self._set
+        same = all(on_rows(lambda rows: np.array_equal(touching[rows], before[rows]), before.shape))
         if not same:
             self._set, self._contact = touching, self._among(np.flatnonzero(touching))
         cells = self._contact.cells.flat
+        gap, old, residual, energy = self.gap, self.pressure, self.residual, self._energy
         change = self._contact.close(
-            self.gap.ravel()[cells], stop=self._stop(same), limit=_MOST_ITERATIONS
+            taken(gap, cells), stop=self._stop(same), limit=_MOST_ITERATIONS
         )
-        old, residual, energy = self.pressure, self.residual, self._energy
+        before, accepted = taken(old, cells), False
         for halving in range(_MOST_HALVINGS):
-            admissible = self._moved(old, cells, 0.5**halving * change)
+            admissible = self._moved(old, cells, before, 0.5**halving * change)
             if admissible is None:
                 continue
             self._accept(admissible)
+            accepted = True
             gain = self._energy < energy or (self.residual < residual and not cautious)
             if gain or self.residual <= self.enough:
                 return True
+        if not accepted or self.pressure is not old:
+            old.ravel()[cells] = before
         return False
 
-    def _moved(self, old: Array, cells: Indices, change: Array) -> Array | None:
+    def _moved(self, old: Array, cells: Indices, before: Array, change: Array) -> Array | None:
         """Return admissible pressures near old ones and a change; None if there are none.
 
         Args:
-            old: Pressures / E* before, shape (nx, ny).
-            cells: Flat indices of the cells that change, shape (n,).
+            old: Pressures / E* before, shape (nx, ny); may be overwritten on the cells that change.
+            cells: Flat indices of these, those among them that carry below the bound, shape (n,).
+            before: Their pressures / E* before, shape (n,).
             change: Their change, shape (n,).
         """
-        problem, moved, wanted = self.problem, copied(old), np.empty(len(cells))
+        problem, wanted = self.problem, np.empty(len(cells))
+        final = not problem.bound.is_finite or not problem.motions.count
+        moved = old if final else copied(old)  # which takes as long as half a product
         upper, flat = problem.bound.of(cells), moved.ravel()
 
         def work(some: slice) -> None:
             most = upper if np.ndim(upper) == 0 else np.asarray(upper)[some]
-            here = np.add(flat[cells[some]], change[some], out=wanted[some])
+            here = np.add(before[some], change[some], out=wanted[some])
             flat[cells[some]] = np.minimum(np.maximum(here, 0.0), most)
 
         in_threads(work, blocks(len(cells), CELLS))
-        final = not problem.bound.is_finite or not problem.motions.count
         admissible = problem.admissible(moved if final else moved.copy(), self._yielding)
         if admissible is not None or final:
             return admissible
@@ -313,7 +320,7 @@ class ActiveSet:
             if entering:
                 here |= gap[rows] < 0.0
 
-        in_threads(work, blocks(gap.shape[0], _BLOCK // gap.shape[1]))
+        on_rows(work, gap.shape)
         if self.problem.bound.is_finite:
             self._yielding = self.problem.yielding(self.pressure) & (self.gap <= 0.0)
             touching &= ~self._yielding

@@ -195,7 +195,8 @@ class CellProblem:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.motions.count:
-            return np.minimum(pressure, self.bound.value, out=pressure)
+            finite = self.bound.is_finite
+            return np.minimum(pressure, self.bound.value, out=pressure) if finite else pressure
         scaled = None
         if fixed is not None:
             scaled = self.motions.scaled_to_loads(pressure, self.bound, fixed)

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 
 from micro.complementarity.cell_fields import ELASTIC, Box, PressureBound, coarsened
 from support.arrays import Array, Flags, Indices
-from support.cores import BLOCK, blocks, in_threads
+from support.cores import on_rows, scaled
 
 _MOST_STEPS, _MOST_HALVINGS = 100, 8
 _LONGEST = 1.5
@@ -144,13 +144,11 @@ class Motions:
             The pressures, zero where they were; None where no such pressures meet the loads.
         """
         if not self.turns and not bound.is_finite:
-            parts = blocks(len(pressure), BLOCK // (8 * pressure.shape[1]))
-            total = sum(in_threads(lambda rows: float(pressure[rows].sum()), parts))
+            total = sum(on_rows(lambda rows: float(pressure[rows].sum()), pressure.shape))
             if not total > 0.0:
                 return None
             factor = float(self.loads[0]) / total
-            in_threads(lambda rows: np.multiply(pressure[rows], factor, pressure[rows]), parts)
-            return pressure
+            return scaled(pressure, factor, pressure)
         cells, loads, acting = np.flatnonzero(pressure > 0.0), self.loads, 0.0
         if fixed is not None:
             cells = np.flatnonzero((pressure > 0.0) & ~fixed)
@@ -168,9 +166,9 @@ class Motions:
             values = _scaled_to_load(start, upper, float(loads[0]), acting)
         if values is None:
             return None
-        scaled = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
-        scaled.ravel()[cells] = values
-        return scaled
+        found = np.zeros(pressure.shape) if fixed is None else np.where(fixed, pressure, 0.0)
+        found.ravel()[cells] = values
+        return found
 
     def shifted_to_load(self, wanted: Array, upper: Array | float, acting: float) -> Array | None:
         """Return the pressures nearest to given ones, between 0 and H, that meet the only load.

@@ -122,6 +122,8 @@ def place_of(problem: CellProblem, touchable: Flags) -> Place:
     if problem.compliance.periodic:
         return _whole(touchable)
     box = box_around(touchable)
+    if not _are_few(np.count_nonzero(touchable), touchable):
+        return box
     undeformed = problem.undeformed
     depth = undeformed.max() - undeformed
     if deepest := float(depth[touchable].max()):

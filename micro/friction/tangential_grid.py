@@ -163,9 +163,9 @@ class TangentialConvolution:
             fields[:, here] = fft.irfft(work[:, here], n=my, axis=2)[:, :, : self.grid[1]]
 
         size = 4 * work.itemsize
-        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my)))
-        in_threads(along_columns, blocks(waves, max(BLOCK // mx, 128) // size))
-        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my)))
+        in_threads(along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
+        in_threads(along_columns, blocks(waves, max(BLOCK // mx, 128) // size, 4))
+        in_threads(back_along_rows, blocks(count, 2 * BLOCK // (size * my), 4))
         return fields
 
     def on_cells(self, cells: Cells, values: Array) -> Array:

@@ -15,7 +15,7 @@ from geometry import Surface, overlaps
 from geometry.contact_state import ContactState, Spots, peaks_of
 from geometry.patches import field_means
 from support.arrays import Array
-from support.cores import BLOCK, blocks, in_threads
+from support.cores import on_rows, taken
 
 Labels = NDArray[np.integer]
 
@@ -46,10 +46,11 @@ def find_spots(
     """
     contact = pressure > 0.0
     labels, count = scipy.ndimage.label(contact)
-    if periodic and count:
-        labels, count = _joined(labels, count)
     cells = np.flatnonzero(contact)
-    which, load = labels.ravel()[cells] - 1, pressure.ravel()[cells]
+    which, load = taken(labels, cells) - 1, taken(pressure, cells)
+    if periodic and count:
+        name, count = _joined(labels, count)
+        which = name[which]
     cell = np.float64(spacing[0] * spacing[1])
     share = true_area(contact, periodic=periodic)
     if hardness is not None:
@@ -58,7 +59,7 @@ def find_spots(
     middle = np.stack(np.unravel_index(top, pressure.shape), axis=1) + 0.5
     spots = Spots(
         place=np.multiply(middle, spacing),
-        area=np.bincount(which, share.ravel()[cells], minlength=count) * cell,
+        area=np.bincount(which, taken(share, cells), minlength=count) * cell,
         force=np.bincount(which, load, minlength=count) * cell,
         peak_pressure=pressure.ravel()[top],
     )
@@ -94,12 +95,12 @@ def true_area(contact: NDArray[np.bool_], *, periodic: bool) -> Array:
             edges += here > neighbour
         np.subtract(here, np.multiply(edges, EDGE_EXCESS, dtype=float), out=share[rows])
 
-    in_threads(work, blocks(len(contact), BLOCK // (8 * contact.shape[1])))
+    on_rows(work, contact.shape)
     return share
 
 
 def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
-    """Merge the contacts that meet over the borders of a period."""
+    """Return the numbers of contacts whose parts meet over a period's borders, and their count."""
     sides = ((labels[0], labels[-1]), (labels[:, 0], labels[:, -1]))
     one, other = (np.concatenate(part) for part in zip(*sides, strict=True))
     both = (one > 0) & (other > 0)
@@ -107,7 +108,7 @@ def _joined(labels: Labels, count: int) -> tuple[Labels, int]:
     merged, name = scipy.sparse.csgraph.connected_components(
         scipy.sparse.coo_array(links, shape=(count, count)), directed=False
     )
-    return np.append(0, name + 1).astype(labels.dtype)[labels], merged
+    return name, merged
 
 
 def summed(
@@ -153,9 +154,10 @@ def summed(
         energy = 0.5 * float(np.vdot(pressure, state.displacement)) * cell
     spots, share = find_spots(pressure, surface.spacing, periodic=periodic, hardness=hardness)
     along_x, along_y = overlaps(patches, surface.lengths, surface.grid)
+    moment_x, moment_y = plane.moment(surface.x[:, None], surface.y, pressure)
     return replace(
         state,
-        moment=plane.moment(surface.x[:, None], surface.y, pressure * cell),
+        moment=(cell * moment_x, cell * moment_y),
         contact_area=float(spots.area.sum()),
         contacts=len(spots),
         peak_pressure=float(pressure.max()),

@@ -34,7 +34,7 @@ from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices
 from support.checks import of_kind
-from support.cores import BLOCK, blas_threads, blocks, in_threads
+from support.cores import blas_threads, on_rows, scaled
 from support.errors import InputError
 
 _REST, _LEAST_REST = 500.0, 1e-7
@@ -238,7 +238,8 @@ class HalfSpaceModel:
             near = (0.0, 0.0) if start is None else start.plane.tilt
             control, start = self._first_touch(control.tilt or near, depth), None
         solved, plane = self.pressures_under(control, start, depth, displaced)
-        yielding, pressure = self._bound.reached(solved.pressure), solved.pressure * modulus
+        yielding, pressure = self._bound.reached(solved.pressure), np.empty(surface.grid)
+        scaled(solved.pressure, modulus, out=pressure)
         if self.hardness is not None:
             pressure[yielding] = self.hardness
         means = self._means_alone(pressure, solved.by_slopes, patches, displaced)
@@ -247,7 +248,8 @@ class HalfSpaceModel:
             displacement = self._displacement(pressure, solved.by_slopes)
             if displaced is not None:
                 displacement = displacement + displaced
-            gap = displacement - self.interference(plane, depth)
+            gap = self.interference(plane, depth)
+            np.subtract(displacement, gap, out=gap)
             means = field_means(displacement, surface.lengths, patches)
         state = ContactState(
             plane=plane,
@@ -326,7 +328,7 @@ class HalfSpaceModel:
                 below += depth[rows]
             np.subtract(plane.at(surface.x[rows, None], surface.y), below, out=found[rows])
 
-        in_threads(work, blocks(surface.grid[0], BLOCK // (8 * surface.grid[1])))
+        on_rows(work, surface.grid)
         return found
 
     def stiffness(self, state: ContactState, *, turns: bool) -> Stiffness:

@@ -173,3 +173,12 @@ def test_copies_lie_row_by_row(order):
     np.testing.assert_array_equal(found, array)
     assert found.flags.c_contiguous
     assert not np.shares_memory(found, array)
+
+
+def test_blocks_are_an_even_number_of_about_equal_ranges():
+    for count, size, least in ((257, 256, 1), (513, 128, 1), (512, 512, 4), (7, 100, 4), (0, 5, 1)):
+        found = module.blocks(count, size, least)
+        assert [row for some in found for row in range(count)[some]] == list(range(count))
+        assert len(found) == 1 or len(found) % 2 == 0 or count < 8 * least
+        assert all(some.stop - some.start < size + 8 for some in found)
+    assert module.blocks(100, 100) == [slice(0, 100)]

@@ -1,0 +1,72 @@
+"""Contacts on many small blocks, which one or two threads work on."""
+
+import numpy as np
+import pytest
+
+from geometry import Control, Spectrum, Surface, synthesise
+from geometry.statistics import derivatives
+from micro import HalfSpaceModel
+from micro.boundary_elements import half_space_grid, inverse
+from support import cores
+from support.cores import allocated
+
+HEIGHTS = synthesise(
+    Spectrum(
+        hurst=0.8, waves=(2, 40), rms_slope=0.1, seed=np.random.SeedSequence().entropy % 2**32
+    ),
+    grid=(190, 193),
+    lengths=(1.0, 1.0),
+).heights
+
+
+def small_blocks(monkeypatch):
+    """Let work be done on blocks of a few rows or cells, as on grids that are far larger."""
+    for owner in (cores, half_space_grid, inverse):
+        monkeypatch.setattr(owner, "BLOCK", 2**14)
+    monkeypatch.setattr(cores, "CELLS", 300)
+
+
+@pytest.mark.parametrize("hardness", [None, 0.03])
+@pytest.mark.parametrize("periodic", [True, False])
+def test_a_contact_does_not_depend_on_blocks_and_threads(monkeypatch, periodic, hardness):
+    surface = Surface(heights=HEIGHTS, lengths=(1.0, 1.0), periodic=periodic)
+
+    def pressed():
+        model = HalfSpaceModel(
+            surface=surface, contact_modulus=1.0, periodic=periodic, hardness=hardness
+        )
+        return model.press(Control(force=4e-3))
+
+    whole = pressed()
+    small_blocks(monkeypatch)
+    found = []
+    for threads in (1, 2):
+        with allocated(threads):
+            found.append(pressed())
+    one, two = found
+    assert np.array_equal(one.pressures, two.pressures) and one.moment == two.moment
+    # both solve to a residual of 1e-8
+    assert one.plane.approach == pytest.approx(whole.plane.approach, rel=3e-8)
+    assert one.contact_area == pytest.approx(whole.contact_area, rel=1e-3)
+    assert one.moment == pytest.approx(whole.moment, abs=1e-7 * whole.force)
+    force, (x, y) = one.pressures / HEIGHTS.size, (surface.x[:, None] - 0.5, surface.y - 0.5)
+    assert one.moment == pytest.approx((np.sum(force * x), np.sum(force * y)), abs=1e-15)
+
+
+def test_derivatives_do_not_depend_on_blocks(monkeypatch):
+    small_blocks(monkeypatch)
+    surface = Surface(heights=HEIGHTS, lengths=(1.0, 1.0))
+    (dx, dy), h = surface.spacing, HEIGHTS
+    x, y = (h[2:] - h[:-2]) / (2.0 * dx), (h[:, 2:] - h[:, :-2]) / (2.0 * dy)
+    xx, yy = np.diff(h, 2, axis=0) / dx**2, np.diff(h, 2, axis=1) / dy**2
+    expected = [np.mean(part**2) for part in (x, y, xx, yy, xx[:, 1:-1] + yy[1:-1])]
+    assert derivatives(surface) == pytest.approx(expected, rel=1e-11)  # rounding
+    # of the trigonometric interpolant, by derivatives of its waves
+    waves, number = np.fft.fft2(h), 2.0 * np.pi * np.fft.fftfreq(190, dx)[:, None]
+    other = 2.0 * np.pi * np.fft.fftfreq(193, dy)
+    expected = [
+        np.mean(np.abs(np.fft.ifft2(waves * factor)) ** 2)
+        for factor in (number, other, number**2, other**2, number**2 + other**2)
+    ]
+    periodic = Surface(heights=HEIGHTS, lengths=(1.0, 1.0), periodic=True)
+    assert derivatives(periodic) == pytest.approx(expected, rel=1e-11)
