@@ -30,6 +30,7 @@ from micro.complementarity.rigid_motions import Motions
 from micro.complementarity.slope_iteration import solve_contact
 from micro.complementarity.solver import touches_few_cells
 from micro.half_space.contact_spots import summed
+from micro.half_space.periods import check_plane, no_gap_left
 from micro.half_space.stiffness import elastic_stiffness, stiffness
 from micro.model import Stiffness, checked_patches
 from support.arrays import Array, Flags, Indices
@@ -406,7 +407,7 @@ class HalfSpaceModel:
         if displaced is not None:
             interference = interference - displaced
         if self.periodic:
-            self._check_periodic(control, interference)
+            check_plane(control, interference, self.surface.area, self.slopes, self.hardness)
         problem, first = self.problem(interference, control.free, control.loads), None
         if start is not None:
             known = np.divide(start.values, self.contact_modulus)
@@ -420,7 +421,7 @@ class HalfSpaceModel:
                 solved = solve_contact(problem, first, same_slopes=same_slopes)
         except BeyondFullContactError as error:
             assert control.approach is not None
-            raise _no_gap_left(control.approach, error.beyond) from None
+            raise no_gap_left(control.approach, error.beyond) from None
         motion[control.free] = solved.motion * self._units[control.free]
         return solved, RigidPlane.moved(self.surface, motion)
 
@@ -490,26 +491,3 @@ class HalfSpaceModel:
         """Return the approach at which a plane of given slopes first touches."""
         plane = RigidPlane.above(self.surface, 0.0, tilt)
         return Control(approach=-float(self.interference(plane, depth).max()), tilt=tilt)
-
-    def _check_periodic(self, control: Control, interference: Array) -> None:
-        """Refuse planes that are not level, and approaches beyond full contact."""
-        if control.tilt is None or any(control.tilt):
-            problem, value = "a plane over a periodic surface must be level", control.tilt or "free"
-            raise InputError(problem, value=value, allowed="tilt (0, 0)")
-        mean = float(interference.mean())
-        # under a hardness no approach closes all gaps, and finite slopes change the last one
-        bounded = self.hardness is None and not self.slopes
-        if control.approach is not None and mean >= 0.0 and bounded:
-            raise _no_gap_left(control.approach, mean)
-        young = min((one.material.young_modulus for one in self.slopes), default=np.inf)
-        mean = 0.0 if control.force is None else control.force / self.surface.area
-        if mean >= young:
-            problem = "finite slopes end where the mean pressure is the Young's modulus"
-            raise InputError(problem, value=control.force, allowed=f"a pressure < {young:.6g} MPa")
-
-
-def _no_gap_left(approach: float, beyond: float) -> InputError:
-    """Return the error of a period at an approach beyond the last one by so much [mm]."""
-    allowed = f"< {approach - beyond:.6g} mm; beyond it give the force"
-    problem = "a periodic surface has no gap left at this approach"
-    return InputError(problem, value=approach, allowed=allowed)
