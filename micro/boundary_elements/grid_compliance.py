@@ -378,7 +378,8 @@ class Compliance:
     def patch_means(self, pressure: Array, lengths: Pair, patches: PatchGrid) -> Array | None:
         """Return the mean displacements of N patches, without finite slopes, shape (N,) [mm].
 
-        A matrix gives them, which is cached; None where other cells than ``few`` are loaded.
+        A matrix gives them, which is cached; None where other cells than ``few`` are loaded, and
+        where these are none.
 
         Args:
             pressure: Pressures / E* of all cells of the surface, shape (nx, ny).
@@ -386,7 +387,7 @@ class Compliance:
             patches: The patches.
         """
         few = self._few_cells
-        if few is None or not few.hold(pressure):
+        if few is None or not few.cells.size or not few.hold(pressure):
             return None
         if self._on_patches is None or self._on_patches[0] is not patches:
             spacing = lengths[0] / pressure.shape[0], lengths[1] / pressure.shape[1]
