@@ -38,6 +38,8 @@ _RESIDUAL, _FORCING = 3e-4, 1e-2
 """Largest error of displacements in the stiffness, relative to the shift, and part of the present
 one that a solution leaves; the error of the stiffness is the square."""
 _MOST_PASSES, _MOST_ITERATIONS = 12, 100
+_MOST_CROSSES = 2
+"""Grids whose cross compliance is kept: that of the contact, and a coarser or finer one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -174,6 +176,8 @@ class FrictionModel:
         if self.body is None and self.materials.dundurs_beta == 0.0:
             return None
         if grid not in self._crosses:
+            if len(self._crosses) >= _MOST_CROSSES:
+                self._crosses.pop(next(iter(self._crosses)))  # the oldest
             self._crosses[grid] = self._make_cross(grid)
         return self._crosses[grid]
 
