@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 import scipy
@@ -18,43 +17,106 @@ _SPIKE = 10.0
 """Standard deviations that make a spike: none on 40 self-affine surfaces, H = 0.3 … 0.95."""
 
 
+def form(heights: Array, order: int) -> Array:
+    """Return the least-squares polynomial of total degree ``order`` through what was measured.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing, which weighs nothing.
+        order: 0 mean, 1 mean plane, 2 mean quadratic.
+
+    Returns:
+        The polynomial at all places, also those of missing heights, shape (nx, ny) [mm].
+
+    Raises:
+        InputError: For another order.
+    """
+    if order not in (0, 1, 2):
+        raise InputError("this order of detrending is unknown", value=order, allowed="0, 1, 2")
+    u, v = np.meshgrid(*((2 * np.arange(n) + 1) / n - 1 for n in heights.shape), indexing="ij")
+    powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
+    basis = np.stack([(u**i * v**j).ravel() for i, j in powers], axis=1)
+    known = ~np.isnan(heights.ravel())
+    rows = (basis, heights.ravel()) if known.all() else (basis[known], heights.ravel()[known])
+    weights, *_ = np.linalg.lstsq(*rows, rcond=None)
+    return np.asarray((basis @ weights).reshape(heights.shape))
+
+
+def levelled(heights: Array, order: int) -> Array:
+    """Return what is left of heights without their form, see `form`; level where only rounding is.
+
+    Args:
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing, which they stay.
+        order: 0 mean, 1 mean plane, 2 mean quadratic.
+
+    Raises:
+        InputError: For another order.
+    """
+    rest = heights - form(heights, order)
+    return np.where(np.isnan(rest), rest, 0.0) if is_level(rest, among=heights) else rest
+
+
 def smoothed(
     heights: Array, spacing: tuple[float, float], cut_off: float, *, periodic: bool = False
 ) -> Array:
     """Return the waves longer than a cut-off: the areal Gaussian filter.
 
     The weight is exp(−π r²/(α λc)²)/(α λc)² with α = √(ln 2/π), so that a wave of length λ keeps
-    exp(−π (α λc/λ)²) of its amplitude, half where λ = λc. Beyond the border of a map that is not
-    periodic nothing weighs, and the weights within are divided by their sum.
+    exp(−π (α λc/λ)²) of its amplitude, half where λ = λc. Missing heights weigh nothing, nor does
+    what is beyond the border of a map that is not periodic, and the weights of the others are
+    divided by their sum. At a missing height the mean of those around it is known where they have
+    a quarter of all weights, as they have in the corner of a map.
 
     Args:
-        heights: Heights, shape (nx, ny) [mm].
+        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
         spacing: Sides (dx, dy) of a cell [mm].
         cut_off: Cut-off wavelength λc [mm].
         periodic: Whether the heights continue periodically.
 
-    Source: ISO 16610-61.
+    Returns:
+        The means; not a number at missing heights that are further from all others.
+
+    Source: ISO 16610-61; Knutsson and Westin 1993, doi 10.1109/CVPR.1993.341081.
     """
+    missing = np.isnan(heights)
+    if not missing.any():
+        sums = _weighted(heights, spacing, cut_off, periodic)
+        if periodic:
+            return sums
+        sides = [np.ones((n, 1)) for n in heights.shape]  # the weights are products of two
+        along, across = (
+            _weighted(one, (step, 1.0), cut_off, periodic, axes=(0,))
+            for one, step in zip(sides, spacing, strict=True)
+        )
+        return np.asarray(sums / (along * across.T))
+    sums, weights = (
+        _weighted(one, spacing, cut_off, periodic)
+        for one in (np.where(missing, 0.0, heights), np.where(missing, 0.0, 1.0))
+    )
+    return np.where(missing & (weights < 0.25), np.nan, sums / np.where(weights > 0.0, weights, 1))
+
+
+def _weighted(
+    heights: Array,
+    spacing: tuple[float, float],
+    cut_off: float,
+    periodic: bool,
+    axes: tuple[int, ...] = (0, 1),
+) -> Array:
+    """Return the sums of heights with the Gaussian weights of a cut-off along some axes."""
     alpha = math.sqrt(math.log(2.0) / math.pi)
-    for axis, step in enumerate(spacing):
-        count = heights.shape[axis]
+    for axis in axes:
+        step, count = spacing[axis], heights.shape[axis]
         # at the distance of a cut-off 6e-7 of the weight are left
         reach = 0 if periodic else math.ceil(cut_off / step)
         size = count if periodic else scipy.fft.next_fast_len(count + reach, real=True)
         waves = scipy.fft.rfftfreq(size, step)  # per mm
         kept = np.exp(-math.pi * (alpha * cut_off * waves) ** 2)
-
-        def passed(values: Array, size: int = size, kept: Array = kept) -> Array:
-            return scipy.fft.irfft(scipy.fft.rfft(values, size) * kept, size)[
-                ..., : values.shape[-1]
-            ]
-
-        rows = passed(np.moveaxis(heights, axis, -1))
-        heights = np.moveaxis(rows if periodic else rows / passed(np.ones(count)), -1, axis)
+        rows = scipy.fft.rfft(np.moveaxis(heights, axis, -1), size) * kept
+        heights = np.moveaxis(scipy.fft.irfft(rows, size)[..., :count], -1, axis)
     return np.ascontiguousarray(heights)
 
 
-def spikes(heights: Array, spacing: tuple[float, float]) -> Flags:
+def spikes(heights: Array, spacing: tuple[float, float], order: int = 1) -> Flags:
     """Find heights that stand out of their neighbourhood: dust, errors of an instrument, codes.
 
     * A height that differs from the median around it by more than 10 robust standard deviations of
@@ -64,25 +126,50 @@ def spikes(heights: Array, spacing: tuple[float, float]) -> Flags:
     * The lowest or highest value, when several heights have exactly it and its distance from all
       others is more than their range: it means "no data".
 
+    The first two are looked for without the form of the other heights, so that the tilt of a
+    specimen makes and hides none.
+
     Args:
         heights: Heights, shape (nx, ny) [mm]; not a number where missing.
         spacing: Sides (dx, dy) of a cell [mm].
+        order: Degree of the form.
     """
-    spiking = np.zeros(heights.shape, dtype=np.bool_)
-    lonely = partial(_lonely_spikes, spacing=spacing)
+    spiking, increment = np.zeros(heights.shape, dtype=np.bool_), _increment(heights)
+
+    def local(heights: Array) -> Flags:
+        return _local_spikes(heights, form(heights, order), increment)
+
+    def lonely(heights: Array) -> Flags:
+        return _lonely_spikes(levelled(heights, order), spacing)
+
     with np.errstate(over="ignore", invalid="ignore"):  # heights of no scale are refused later
-        for search in (_codes, _local_spikes, lonely, _codes):  # a spike misleads no later search
-            spiking |= search(np.where(spiking, np.nan, heights))
+        # a spike misleads no later search; a huge one tilts the form of the first
+        for search in (_codes, local, local, lonely, _codes):
+            known = np.where(spiking, np.nan, heights)
+            if not np.isnan(known).all():
+                spiking |= search(known)
     return spiking
 
 
-def _local_spikes(heights: Array) -> Flags:
-    """Find heights that differ much from the median of their neighbours."""
-    difference = np.abs(heights - _median(_median(heights).T).T)  # not a number where missing
-    some = difference[difference > 0.0]
+def _increment(heights: Array) -> float:
+    """Return the increment that all heights are whole numbers of; 0 where there is none [mm]."""
+    some = heights.ravel()[:: max(heights.size // 2**16, 1)]
+    levels = np.unique(some[np.isfinite(some)])
+    if len(levels) < 2:
+        return 0.0
+    counts = (levels - levels[0]) / (increment := float(np.diff(levels).min()))
+    return increment if float(np.abs(counts - np.rint(counts)).max()) < 1e-3 else 0.0
+
+
+def _local_spikes(heights: Array, form: Array, increment: float) -> Flags:
+    """Find heights that, without their form, differ much from the median of their neighbours."""
+    rest = heights - form
+    difference = np.abs(rest - _median(_median(rest).T).T)  # not a number where missing
+    some = difference[difference > 1e-13 * (np.abs(heights) + np.abs(form))]  # beyond rounding
     if not some.size:
         return np.zeros(heights.shape, dtype=np.bool_)
-    return np.asarray(difference > _SPIKE * 1.4826 * float(np.median(some)))
+    # heights in whole numbers rise by one now and then, and are level in between
+    return np.asarray(difference > _SPIKE * max(1.4826 * float(np.median(some)), increment))
 
 
 def _median(rows: Array) -> Array:

@@ -8,15 +8,18 @@ from typing import Literal
 
 import numpy as np
 
-from geometry.filters import filled, regridded, smoothed, spikes
-from geometry.plausibility import MAPS, check_slopes
+from geometry.filters import filled, levelled, regridded, smoothed, spikes
+from geometry.plausibility import MAPS, check_slopes, surface_notes
 from geometry.surface import Surface
 from support.arrays import Array, Flags
-from support.checks import cell_counts
+from support.checks import LARGEST, cell_counts, check_scale, is_level
 from support.errors import InputError
 from support.fields import Heights, Length, PositiveLength
 
 Interval = tuple[Length, Length]
+
+_FORMS = ("none", "mean", "plane", "quadratic")
+"""Kinds of ``detrend``, by the degree of the form less one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,9 +54,10 @@ class Filter:
 class Preparation:
     """What is done to a map.
 
-    It is done in this order: ``swap_xy``, ``crop``, ``outliers``, ``missing``, ``detrend``,
-    ``filter``, ``resample``. ISO 25178-3 takes the S-filter before the form. Here the form goes
-    first, as a tilt would disturb the filter along the borders of the map.
+    It is done in this order: ``swap_xy``, ``crop``, ``outliers``, ``detrend``, ``filter``,
+    ``missing``, ``resample``. Form and means of filters are those of heights that were measured;
+    what fills gaps comes after them. ISO 25178-3 takes the S-filter before the form. Here the form
+    goes first, as a tilt would disturb the filter along the borders of the map.
 
     Args:
         swap_xy: Whether x and y of the map are exchanged: rows of a text without sides, and the
@@ -84,93 +88,130 @@ def prepared(surface: Surface, steps: Preparation, advice: str = MAPS) -> Surfac
 
     Args:
         surface: The surface; its source then says what was done.
-        steps: What is done; `completed` does what comes before the form.
+        steps: What is done; `prepared_map` does what comes before the form.
         advice: What may be wrong where it is too steep, see `check_slopes`.
 
     Raises:
         InputError: When a cut-off or the new grid does not fit the surface, or it is too steep.
     """
-    done = []
-    if steps.detrend != "none":
-        surface = surface.detrended(("mean", "plane", "quadratic").index(steps.detrend))
-        done.append(f"its {steps.detrend} removed")
-    short, long = steps.filter.short, steps.filter.long
-    _check_cut_offs(surface, short, long)
-    h, spacing, periodic = surface.heights, surface.spacing, surface.periodic
-    if short is not None:
-        h = smoothed(h, spacing, short, periodic=periodic)
-        done.append(f"waves below {1e3 * short:g} µm removed (Gaussian)")
-    if long is not None:
-        h = h - smoothed(h, spacing, long, periodic=periodic)
-        done.append(f"waves beyond {1e3 * long:g} µm removed (Gaussian)")
-    if steps.resample is not None:
-        mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
-        h = regridded(h, surface.lengths, (mx, my), periodic=periodic)
-        done.append(f"resampled from {surface.grid[0]} × {surface.grid[1]} heights")
-    if done:
-        surface = replace(surface, heights=h, source=", ".join((surface.source, *done)))
+    heights, done = _filtered(surface.heights, surface.lengths, surface.periodic, steps)
+    periodic = surface.periodic and steps.detrend in ("none", "mean")
+    heights, more = _resampled(heights, surface.lengths, periodic, steps)
+    if done := [*done, *more]:
+        source = ", ".join((surface.source, *done))
+        surface = replace(surface, heights=heights, periodic=periodic, source=source)
     check_slopes(surface, advice)
     return surface
 
 
-def completed(
-    heights: Array, lengths: tuple[float, float], steps: Preparation
-) -> tuple[Array, tuple[float, float], list[str], list[str]]:
-    """Crop a map, remove its spikes, then fill its gaps.
+def prepared_map(
+    heights: Array,
+    lengths: tuple[float, float],
+    steps: Preparation,
+    *,
+    periodic: bool = False,
+    source: str = "",
+    notes: tuple[str, ...] = (),
+) -> Surface:
+    """Prepare a measured map: all steps but the first, as x and y are swapped already.
 
     Args:
-        heights: Heights, shape (nx, ny) [mm]; not a number where missing.
+        heights: Heights, shape (nx, ny) [mm]; missing where they are not a number, or none that an
+            instrument measures.
         lengths: Sides (Lx, Ly) [mm].
-        steps: What is done; x and y are swapped already, and what comes after the gaps is left to
-            `prepared`.
-
-    Returns:
-        Heights without gaps, their sides [mm], what was done, and what a user should know of it.
+        steps: What is done.
+        periodic: Whether the heights continue periodically.
+        source: Where they come from; what was done is added.
+        notes: What a user should know of them already.
 
     Raises:
-        InputError: When the crop does not fit, or heights are missing that are not to be filled.
+        InputError: When they are no surface, a step does not fit, heights are missing that are not
+            to be filled, or it is too steep.
     """
-    done: list[str] = []
-    notes: list[str] = []
+    said, found = [source], list(notes)
+    if heights.ndim != 2 or not heights.size:  # refused as a surface
+        return Surface(heights=heights, lengths=lengths)
+    heights = np.where(np.abs(heights) <= LARGEST, heights, np.nan)
     if steps.crop != Crop():
         heights, lengths, sentence = _cropped(heights, lengths, steps.crop)
-        done.append(sentence)
-    if np.isinf(heights).any():  # refused as a surface
-        return heights, lengths, done, notes
-    gaps = np.isnan(heights)
-    if steps.missing == "refuse":
-        _refuse_gaps(gaps)
+        said.append(sentence)
+    gaps, removed = np.isnan(heights), steps.outliers == "remove"
+    if gaps.any() and (steps.missing == "refuse" or gaps.all()):
+        raise _missing(gaps)
     spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
-    outlying = spikes(heights, spacing)
-    known = np.where(outlying, np.nan, heights)
-    removed, kept = steps.outliers == "remove", known[~np.isnan(known)]
+    outlying = spikes(heights, spacing, max(_FORMS.index(steps.detrend) - 1, 1))
     if outlying.any() and not removed:
-        notes += _on_spikes(heights[outlying], kept)
-    if gaps.any() or (removed and outlying.any()):
-        whole, _ = filled(known, spacing)  # what is no height must not reach into the gaps
-        share, count = float(gaps.mean()), int(np.count_nonzero(outlying))
-        if share:
-            done.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
-        if removed and count:
-            done.append(f"{count} spikes removed and filled")
+        found += _on_spikes(heights[outlying], heights[~(gaps | outlying)])
+    if removed and outlying.any():
+        said.append(f"{np.count_nonzero(outlying)} spikes removed and filled")
+        heights = np.where(outlying, np.nan, heights)
+    check_scale(heights)
+    if is_level(heights) and np.nanmin(heights) < np.nanmax(heights):
+        heights = np.where(np.isnan(heights), np.nan, np.nanmean(heights))
+        said.append("level but for rounding")
+    heights, done = _filtered(heights, lengths, periodic, steps)
+    said += done
+    if np.isnan(heights).any():
+        # what is no height must not reach into the gaps
+        known = np.where(outlying, np.nan, heights)
+        whole, _ = filled(known, spacing)
+        kept = known[~np.isnan(known)]
+        found += _on_filling(whole[np.isnan(known)], kept)
+        heights = np.where(np.isnan(heights), whole, heights)
+    if share := float(gaps.mean()):
+        said.append(f"{100 * share:.3g} % of the heights missing and filled by a membrane")
         if share > 0.3:
-            notes.append(
+            found.append(
                 f"{100 * share:.0f} % of the heights are missing: what fills them is smooth and "
                 "has no summits, and forces and contact areas are those of the rest"
             )
-        notes += _on_filling(whole[np.isnan(known)], kept)
-        heights = whole if removed else np.where(outlying, heights, whole)
-    return heights, lengths, done, notes
+    heights, done = _resampled(heights, lengths, periodic, steps)
+    surface = Surface(
+        heights=heights, lengths=lengths, periodic=periodic, source=", ".join((*said, *done))
+    )
+    check_slopes(surface, MAPS)
+    return replace(surface, notes=(*found, *surface_notes(surface)))
 
 
-def _refuse_gaps(gaps: Flags) -> None:
-    if gaps.any():
-        i, j = np.argwhere(gaps)[0]
-        raise InputError(
-            f"{np.count_nonzero(gaps)} of {gaps.size} heights are missing, the first at index "
-            f"({i}, {j})",
-            allowed="finite heights; missing = 'fill' closes gaps by a membrane",
-        )
+def _filtered(
+    heights: Array, lengths: tuple[float, float], periodic: bool, steps: Preparation
+) -> tuple[Array, list[str]]:
+    """Return heights without their form and the waves that are not wanted, and what was done."""
+    done = []
+    if steps.detrend != "none":
+        heights = levelled(heights, _FORMS.index(steps.detrend) - 1)
+        done.append(f"its {steps.detrend} removed")
+    spacing = lengths[0] / heights.shape[0], lengths[1] / heights.shape[1]
+    short, long = steps.filter.short, steps.filter.long
+    _check_cut_offs(spacing, lengths, short, long)
+    if short is not None:
+        heights = smoothed(heights, spacing, short, periodic=periodic)
+        done.append(f"waves below {1e3 * short:g} µm removed (Gaussian)")
+    if long is not None:
+        heights = heights - smoothed(heights, spacing, long, periodic=periodic)
+        done.append(f"waves beyond {1e3 * long:g} µm removed (Gaussian)")
+    return heights, done
+
+
+def _resampled(
+    heights: Array, lengths: tuple[float, float], periodic: bool, steps: Preparation
+) -> tuple[Array, list[str]]:
+    """Return heights on the grid that is wanted, and what was done."""
+    if steps.resample is None:
+        return heights, []
+    mx, my = cell_counts(steps.resample, "the new grid of the surface", smallest=4)
+    done = [f"resampled from {heights.shape[0]} × {heights.shape[1]} heights"]
+    return regridded(heights, lengths, (mx, my), periodic=periodic), done
+
+
+def _missing(gaps: Flags) -> InputError:
+    (i, j), count = np.argwhere(gaps)[0], np.count_nonzero(gaps)
+    return InputError(
+        f"{count} of {gaps.size} heights are missing, the first at index ({i}, {j})"
+        if count < gaps.size
+        else "all heights are missing",
+        allowed=f"finite heights within ±{LARGEST:g} mm; missing = 'fill' closes gaps by a membrane",
+    )
 
 
 def _on_spikes(spiking: Array, others: Array) -> list[str]:
@@ -232,9 +273,14 @@ def _cells_between(
     return lo, hi
 
 
-def _check_cut_offs(surface: Surface, short: float | None, long: float | None) -> None:
+def _check_cut_offs(
+    spacing: tuple[float, float],
+    lengths: tuple[float, float],
+    short: float | None,
+    long: float | None,
+) -> None:
     """Refuse cut-offs that the grid cannot resolve, that exceed the map or leave no waves."""
-    least, most = 2.0 * max(surface.spacing), min(surface.lengths)
+    least, most = 2.0 * max(spacing), min(lengths)
     for name, value in (("short", short), ("long", long)):
         if value is not None and not (math.isfinite(value) and least <= value <= most):
             raise InputError(

@@ -10,6 +10,7 @@ from math import ceil
 import numpy as np
 from numpy.typing import ArrayLike
 
+from geometry.filters import levelled
 from geometry.interpolant import Interpolant, cell_centres
 from support.arrays import Array
 from support.checks import LARGEST, frozen_array, is_level, positive_lengths
@@ -140,15 +141,7 @@ class Surface(Displayed):
         Raises:
             InputError: For another order.
         """
-        if order not in (0, 1, 2):
-            raise InputError("this order of detrending is unknown", value=order, allowed="0, 1, 2")
-        u, v = np.meshgrid(self.x / self.lengths[0], self.y / self.lengths[1], indexing="ij")
-        powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
-        basis = np.stack([((2 * u - 1) ** i * (2 * v - 1) ** j).ravel() for i, j in powers], axis=1)
-        weights, *_ = np.linalg.lstsq(basis, self.heights.ravel(), rcond=None)
-        heights = self.heights - (basis @ weights).reshape(self.grid)
-        if is_level(heights, among=self.heights):
-            heights = np.zeros(self.grid)
+        heights = levelled(self.heights, order)
         return replace(self, heights=heights, periodic=self.periodic and order == 0)
 
     def piece(self, x: tuple[float, float], y: tuple[float, float]) -> Surface:

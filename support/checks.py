@@ -92,12 +92,13 @@ def is_level(heights: Array, among: Array | None = None) -> bool:
 
     Args:
         heights: Heights [mm]; those that are not finite do not count.
-        among: The heights that they were computed from [mm]; by default they themselves.
+        among: The heights that they were computed from [mm], those that are finite; by default
+            they themselves.
     """
     finite = heights[np.isfinite(heights)]
     if not finite.size:
         return False
-    size = float(np.abs(finite if among is None else among).max())
+    size = float(np.abs(finite if among is None else among[np.isfinite(among)]).max())
     # halves, as the range of heights near the largest number would overflow
     return float(np.ptp(0.5 * finite)) <= 32.0 * float(np.finfo(float).eps) * size
 

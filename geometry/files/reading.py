@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +12,12 @@ from numpy.typing import ArrayLike
 from geometry.files.content import LENGTH_UNITS, FileContent, length_unit, read_array
 from geometry.files.instruments import UnknownFormat, read_instrument
 from geometry.files.text import load_text, read_text
-from geometry.plausibility import reading_notes, surface_notes
-from geometry.preparation import Preparation, completed, prepared
+from geometry.plausibility import reading_notes
+from geometry.preparation import Preparation, prepared_map
 from geometry.surface import Surface
 from support.checks import (
     cell_counts,
     check_file,
-    check_scale,
-    is_level,
     path_of,
     positive_lengths,
     real_array,
@@ -140,24 +137,14 @@ def _surface(
     said = [name, *([f"channel {content.channel!r}"] if content.channel else []), *content.remarks]
     if content.unit is None:  # a factor of 1000 is not to go unnoticed
         said.append(f"heights taken in {unit.replace('um', 'µm')}")
-    notes: list[str] = []
-    heights = content.heights
-    if heights.ndim == 2 and heights.size:
-        if content.lengths is None:
-            notes += reading_notes((heights.shape[0], heights.shape[1]), sides)
-        if unit != "mm":
-            with np.errstate(over="ignore"):
-                heights = heights * LENGTH_UNITS[unit]
-        heights, sides, done, prepared_notes = completed(heights, sides, steps)
-        notes += prepared_notes
-        check_scale(heights)
-        if is_level(heights) and 0.0 < np.ptp(heights) < np.inf:
-            heights = np.full_like(heights, heights.mean())
-            done.append("level but for rounding")
-        said += done
-    raw = Surface(heights=heights, lengths=sides, periodic=periodic, source=", ".join(said))
-    surface = prepared(raw, steps)
-    return replace(surface, notes=(*notes, *surface_notes(surface)))
+    heights, notes = content.heights, ()
+    if heights.ndim == 2 and content.lengths is None:
+        notes = tuple(reading_notes((heights.shape[0], heights.shape[1]), sides))
+    with np.errstate(over="ignore"):
+        heights = heights * LENGTH_UNITS[unit]
+    return prepared_map(
+        heights, sides, steps, periodic=periodic, source=", ".join(said), notes=notes
+    )
 
 
 def _content(file: Path, channel: str | int | None) -> FileContent:

@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from geometry import InputError, Spectrum, Surface, read_surface, synthesise
-from geometry.filters import spikes
+from geometry.files.reading import surface_of
+from geometry.filters import smoothed, spikes
 from geometry.preparation import Crop, Filter, Preparation, prepared
 
 X = (np.arange(64) + 0.5) / 64
@@ -40,10 +41,10 @@ def test_a_map_is_cropped_filled_levelled_filtered_and_resampled(tmp_path):
         "heights taken in mm",
         "cropped to 500 × 1000 µm from x = 500 µm",
         "y = 0 µm",
-        "0.0488 % of the heights missing and filled by a membrane",
         "its plane removed",
         "waves below 100 µm removed (Gaussian)",
         "waves beyond 400 µm removed (Gaussian)",
+        "0.0488 % of the heights missing and filled by a membrane",
         "resampled from 32 × 64 heights",
     ]
 
@@ -140,3 +141,98 @@ def test_surfaces_of_python_are_prepared_alike(tmp_path):
     done = prepared(surface, Preparation(detrend="quadratic"))
     assert done.source == "mine, its quadratic removed"
     np.testing.assert_array_equal(done.heights, surface.detrended(2).heights)
+
+
+def drawn_map(rng, kind):
+    """Return a rough map and where it is missing: columns, a disc's outside, scattered, a strip."""
+    nx, ny = rng.integers(40, 60, 2)
+    noise = rng.standard_normal((nx, ny))
+    heights = 1e-3 * (smoothed(noise, (1.0, 1.0), 6.0, periodic=True) + 0.02 * noise)
+    x, y = np.meshgrid(np.linspace(-1, 1, nx), np.linspace(-1, 1, ny), indexing="ij")
+    first, width = rng.integers(0, nx - 10), rng.integers(2, 9)
+    missing = {
+        "columns": lambda: (np.arange(nx) >= first)[:, None] & (np.arange(nx) < first + width)[:, None] & (y < 2),
+        "border": lambda: x < -1.0 + rng.uniform(0.1, 0.5),
+        "outside": lambda: np.hypot(x, y) > 1.0,
+        "disc": lambda: np.hypot(x - rng.uniform(-1, 1), y - rng.uniform(-1, 1)) < 0.5,
+        "scattered": lambda: rng.random((nx, ny)) < 0.3,
+    }[kind]()
+    return heights, missing, (x, y)
+
+
+@pytest.mark.parametrize("kind", ["columns", "border", "outside", "disc", "scattered"])
+@pytest.mark.parametrize("order", ["plane", "quadratic"])
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"outliers": "remove"}, {"filter": Filter(short=0.1)},
+     {"outliers": "remove", "filter": Filter(short=0.1, long=0.5), "resample": (24, 31)}],
+    ids=["level", "outliers", "short", "all"],
+)  # fmt: skip
+def test_the_form_of_a_raw_map_changes_no_levelled_result(kind, order, more):
+    """Whatever is missing: the form is that of measured heights, before any is invented."""
+    rng = np.random.default_rng([len(kind), len(order), len(str(more))])
+    for _ in range(3):
+        heights, missing, (x, y) = drawn_map(rng, kind)
+        spiking = tuple(rng.integers(3, 37, (2, 4)))
+        heights[spiking] += rng.choice([-0.02, 0.03], 4)
+        form = rng.normal() * x + rng.normal() * y + rng.normal()
+        if order == "quadratic":
+            form += rng.normal() * x**2 + rng.normal() * x * y + rng.normal() * y**2
+        steps = {"lengths": (1.0, 1.3), "missing": "fill", "detrend": order, **more}
+        own, other = (
+            surface_of(np.where(missing, np.nan, one), **steps)
+            for one in (heights, heights + 0.1 * form)
+        )
+        # rounding of the form, up to 1 mm, some 1e-16 of it in a height and ten times as much
+        # in what is solved for between heights
+        np.testing.assert_allclose(other.heights, own.heights, rtol=0, atol=1e-14)
+        assert other.source == own.source
+
+
+@pytest.mark.parametrize("order", ["plane", "quadratic"])
+def test_what_is_nothing_but_its_form_is_level(order):
+    """Eight by eight heights of a plane, two columns missing, left 1.131 µm."""
+    u = np.arange(8) - 3.5
+    heights = 0.01 * np.add.outer(u, 0.3 * u)
+    if order == "quadratic":
+        heights += 0.003 * np.multiply.outer(u, u)
+    for gaps in (np.s_[:2], np.s_[6:], np.s_[3:5]):
+        gappy = heights.copy()
+        gappy[gaps] = np.nan
+        surface = surface_of(gappy, lengths=(8.0, 8.0), missing="fill", detrend=order)
+        np.testing.assert_array_equal(surface.heights, 0.0)
+
+
+def test_filters_weigh_what_was_measured():
+    """Means with the weights of the heights that are known, summed one by one."""
+    rng = np.random.default_rng(4)
+    heights, spacing, cut_off = rng.standard_normal((17, 14)), (0.5, 0.4), 6.0
+    heights[rng.random(heights.shape) < 0.4] = np.nan
+    for periodic in (False, True):
+        passed = smoothed(heights, spacing, cut_off, periodic=periodic)
+        alpha, (i, j) = np.sqrt(np.log(2.0) / np.pi), np.nonzero(~np.isnan(heights))
+        for p, q in np.ndindex(heights.shape):
+            weight, full = np.zeros(len(i)), 0.0
+            images = range(-3, 4) if periodic else (0,)
+            for a in images:
+                for b in images:
+                    dx, dy = spacing[0] * (i - p + 17 * a), spacing[1] * (j - q + 14 * b)
+                    weight += np.exp(-np.pi * (dx**2 + dy**2) / (alpha * cut_off) ** 2)
+            full = (alpha * cut_off) ** 2 / (spacing[0] * spacing[1])  # all weights of a plane
+            mean = weight @ heights[i, j] / weight.sum()
+            if not np.isnan(heights[p, q]):
+                assert passed[p, q] == pytest.approx(mean, abs=3e-6)  # weight is cut where 6e-7 are left
+            elif weight.sum() > 0.2501 * full:
+                assert passed[p, q] == pytest.approx(mean, abs=3e-6)
+            elif weight.sum() < 0.2499 * full:
+                assert np.isnan(passed[p, q])
+
+
+def test_whole_numbers_of_an_increment_are_no_spikes():
+    """Levelling turns their steps into saw-teeth, smaller than the step of a single height."""
+    rng = np.random.default_rng(2)
+    counts = np.rint(np.add.outer(0.07 * np.arange(60.0), 0.03 * np.arange(50)))
+    counts[tuple(rng.integers(2, 48, (2, 12)))] += 1.0
+    assert not spikes(1e-6 * counts, (1.0, 1.0)).any()
+    counts[17, 23] += 40.0
+    assert np.argwhere(spikes(1e-6 * counts, (1.0, 1.0))).tolist() == [[17, 23]]
